@@ -1,0 +1,122 @@
+"""Piston speed from position samples that are rare, noisy and late.
+
+A Luenberger observer with a disturbance state runs at the control rate on the control model (pressures are measured at
+every period), and is corrected when a position sample arrives, against what it believed when that sample was taken:
+    y' = v,  v' = f(y, v) + g F + d,  d' = 0;  correction gains 3 w Ts, 3 w^2 Ts, w^3 Ts  (triple pole at w)
+The disturbance d stands for the user's force, Coulomb friction and the model's errors, as an acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from birthsim_env import geometry, mechanics
+from birthsim_env.compilation import kernel
+from birthsim_env.inverse_kinematics import piston_motion
+from birthsim_env.lanes import (  # fmt: skip
+    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, COS_GAMMA3, D_PRODUCT, D_SQUARES, FV1, FV2, GRAVITY, HALF_L1, HALF_L2, K1, K2,
+    MASS, SIN_GAMMA3, Array,
+)
+from birthsim_env.parameters import Parameters
+from birthsim_env.signals import Mask, Measurement
+
+BANDWIDTH = 60.0
+"""1/s; assumed: as fast as 0.1 mm of noise at 240 Hz allows the valves without chatter."""
+
+
+@kernel
+def _update(
+    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, age: Array, pressures: Array, p: Array,
+    period: float, bandwidth: float, fresh: Array,
+) -> None:  # fmt: skip
+    """One control period. ``estimate`` (6, N): y1, y2, v1, v2, d1, d2. ``history`` (H, 2, N): past y1, y2, ring at ``slot``.
+
+    ``sampled`` (N,) time since the previous sample, s, zero where none is new; ``age`` (N,) of the newest sample, s;
+    ``fresh`` (N,) 1 where the lane starts anew.
+    """
+    depth = history.shape[0]
+    motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
+    for i in range(estimate.shape[1]):
+        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
+        if fresh[i] > 0.0:
+            piston_motion(motion, p, joints, 1)
+            for cylinder in range(2):
+                estimate[cylinder, i] = joints[cylinder, 0]
+                estimate[2 + cylinder, i] = 0.0
+                estimate[4 + cylinder, i] = 0.0
+                for k in range(depth):
+                    history[k, cylinder, i] = joints[cylinder, 0]
+            continue
+        y1, y2, v1, v2 = estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i]
+        r4, r2 = y1 + p[K1], y2 + p[K2]
+        w = r4 * r4 - p[D_SQUARES]
+        s2 = geometry.s_squared(w, p[D_PRODUCT])
+        root = math.sqrt(s2)
+        kappa = geometry.amplification(r2, r4, root)
+        sine = geometry.sin_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
+        cosine = geometry.cos_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
+        load1 = mechanics.piston_force(pressures[0, i], pressures[1, i], p[AREA_P1], p[AREA_N1], p[ATMOSPHERE]) - p[FV1] * v1
+        load2 = mechanics.piston_force(pressures[2, i], pressures[3, i], p[AREA_P2], p[AREA_N2], p[ATMOSPHERE]) - p[FV2] * v2
+        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[MASS], p[GRAVITY]) + estimate[4, i]
+        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[MASS], p[GRAVITY]) + estimate[5, i]
+        estimate[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[HALF_L1]), p[HALF_L1])
+        estimate[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[HALF_L2]), p[HALF_L2])
+        estimate[2, i] = v1 + period * a1
+        estimate[3, i] = v2 + period * a2
+        history[slot, 0, i] = estimate[0, i]
+        history[slot, 1, i] = estimate[1, i]
+        if sampled[i] > 0.0:
+            piston_motion(motion, p, joints, 1)
+            periods = age[i] / period
+            back = min(int(periods), depth - 2)
+            part = min(periods - back, 1.0)
+            for cylinder in range(2):
+                newer = history[(slot - back) % depth, cylinder, i]
+                older = history[(slot - back - 1) % depth, cylinder, i]
+                innovation = joints[cylinder, 0] - (newer + part * (older - newer))
+                estimate[cylinder, i] += 3.0 * bandwidth * sampled[i] * innovation
+                estimate[2 + cylinder, i] += 3.0 * bandwidth**2 * sampled[i] * innovation
+                estimate[4 + cylinder, i] += bandwidth**3 * sampled[i] * innovation
+                for k in range(depth):
+                    history[k, cylinder, i] += 3.0 * bandwidth * sampled[i] * innovation
+
+
+class PistonObserver:
+    """Positions and speeds of both pistons, (4, N): y1, y2 (m), v1, v2 (m/s), from sampled positions."""
+
+    def __init__(self, parameters: Parameters, lane_parameters: Array, bandwidth: float = BANDWIDTH) -> None:
+        board = parameters.electronics
+        self._period = board.control_period
+        self._bandwidth = bandwidth
+        self._p = lane_parameters
+        self._depth = int((board.position_latency + 1 / board.position_rate) / self._period) + 4
+        self._estimate: Array = np.empty((6, 0))
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        if lanes is None:
+            self._estimate = np.empty((6, 0))
+        elif self._estimate.shape[1]:
+            self._fresh[lanes] = 1.0
+
+    def update(self, measurement: Measurement) -> Array:
+        """Take one control period's measurement (over N lanes) and return the estimate (4, N)."""
+        lanes = measurement.position.shape[1]
+        if self._estimate.shape[1] != lanes:
+            self._estimate = np.zeros((6, lanes))
+            self._history: Array = np.zeros((self._depth, 2, lanes))
+            self._slot = 0
+            self._fresh: Array = np.ones(lanes)
+            self._last: Array = measurement.position_time.copy()
+        self._slot = (self._slot + 1) % self._depth
+        sampled = measurement.position_time - self._last
+        age = measurement.time - measurement.position_time
+        _update(
+            self._estimate, self._history, self._slot, sampled, measurement.position, age, measurement.pressures, self._p,
+            self._period, self._bandwidth, self._fresh,
+        )  # fmt: skip
+        self._last = measurement.position_time.copy()
+        self._fresh[:] = 0.0
+        return self._estimate[:4]

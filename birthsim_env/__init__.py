@@ -1,0 +1,40 @@
+"""BirthSIM: a pneumatic haptic interface as Gymnasium environments.
+
+Importing this package registers ``BirthSIM/Circle-v0``, ``Probe-v0``, ``Descent-v0``, ``Forceps-v0`` and ``Dystocia-v0``.
+"""
+
+from gymnasium.envs.registration import register, registry
+
+from birthsim_env.parameters import Parameters
+from birthsim_env.plant import Plant
+from birthsim_env.references import Circle, Hold, Path, Trajectory
+from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.signals import Measurement, Reference
+from birthsim_env.stiffness_schedules import StiffnessSchedule
+from birthsim_env.user_forces import ForceProfile, UserForce
+
+__all__ = [
+    "Circle",
+    "ForceProfile",
+    "Hold",
+    "Measurement",
+    "Parameters",
+    "Path",
+    "Plant",
+    "Reference",
+    "StiffnessSchedule",
+    "Trajectory",
+    "UserForce",
+]
+
+__version__ = "0.1.0"
+
+for _scenario in SCENARIOS:
+    _id = f"BirthSIM/{_scenario.capitalize()}-v0"
+    if _id not in registry:
+        register(
+            _id,
+            entry_point="birthsim_env.env:BirthSIMEnv",
+            vector_entry_point="birthsim_env.vector_env:BirthSIMVectorEnv",
+            kwargs={"scenario": _scenario},
+        )

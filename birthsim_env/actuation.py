@@ -1,0 +1,127 @@
+"""From a policy's action to spool openings: directly, or as mass flows through the inverse valve characteristic.
+
+An actuation is asked once per policy step where ``every_period`` is False, else at every control period. Layout
+``two_valves`` has one valve per chamber, ``one_valve`` one 5/3 valve per cylinder (its chambers get opposite openings).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from birthsim_env import valves
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import (  # fmt: skip
+    ATMOSPHERE, CONDUCTANCE, CRITICAL, HALF_L1, HALF_L2, LEAKAGE, PN1, PN2, PP1, PP2, RHO0, SUPPLY, T0, TEMPERATURE, TN1, TN2, TP1,
+    TP2, Y1, Y2, Array,
+)
+from birthsim_env.signals import Mask
+
+if TYPE_CHECKING:
+    from birthsim_env.simulation import Simulation
+
+VALVE_LAYOUTS = ("two_valves", "one_valve")
+
+
+class Actuation(Protocol):
+    """What stands between a policy and the valves.
+
+    ``size`` is the length of an action and ``names`` describes its entries. ``begin(lanes)`` starts new episodes in the
+    lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
+    ``openings(simulation)`` returns the spool openings (4, N) from now on.
+    """
+
+    size: int
+    names: tuple[str, ...]
+    every_period: bool
+
+    def begin(self, lanes: Mask) -> None: ...
+
+    def accept(self, actions: Array) -> None: ...
+
+    def openings(self, simulation: Simulation) -> Array: ...
+
+
+class ValveActuation:
+    """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
+
+    every_period = False
+
+    def __init__(self, layout: str) -> None:
+        self._one_valve = layout == "one_valve"
+        chambers = ("cylinder 1", "cylinder 2") if self._one_valve else ("P1", "N1", "P2", "N2")
+        self.names = tuple(f"opening of the valve of {chamber}, 1" for chamber in chambers)
+        self.size = len(self.names)
+
+    def begin(self, lanes: Mask) -> None:
+        pass
+
+    def accept(self, actions: Array) -> None:
+        self._openings = np.stack([actions[0], -actions[0], actions[1], -actions[1]]) if self._one_valve else actions
+
+    def openings(self, simulation: Simulation) -> Array:
+        return self._openings
+
+
+@kernel
+def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
+    for i in range(state.shape[1]):
+        source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
+        full = p[CONDUCTANCE, i] * p[SUPPLY, i] * source
+        for cylinder in range(2):
+            pp, tp, pn, tn = (PP1, TP1, PN1, TN1) if cylinder == 0 else (PP2, TP2, PN2, TN2)
+            dp = valves.density_factor(state[tp, i], p[RHO0, i], p[T0, i])
+            dn = valves.density_factor(state[tn, i], p[RHO0, i], p[T0, i])
+            fill_p = valves.orifice_flow(1.0, p[SUPPLY, i], source, state[pp, i], dp, p[CRITICAL, i])
+            drain_p = valves.orifice_flow(1.0, state[pp, i], dp, p[ATMOSPHERE, i], source, p[CRITICAL, i])
+            fill_n = valves.orifice_flow(1.0, p[SUPPLY, i], source, state[pn, i], dn, p[CRITICAL, i])
+            drain_n = valves.orifice_flow(1.0, state[pn, i], dn, p[ATMOSPHERE, i], source, p[CRITICAL, i])
+            row = 2 * cylinder
+            if one_valve:
+                half = p[HALF_L1, i] if cylinder == 0 else p[HALF_L2, i]
+                y = max(-0.95 * half, min(0.95 * half, state[Y1, i] if cylinder == 0 else state[Y2, i]))
+                opened = valves.opening_for_active_flow(
+                    full * wanted[cylinder, i], fill_p, drain_p, fill_n, drain_n, half / (half + y), half / (half - y),
+                    p[CONDUCTANCE, i], p[LEAKAGE, i],
+                )  # fmt: skip
+                openings[row, i], openings[row + 1, i] = opened, -opened
+            else:
+                flow_p, flow_n = full * wanted[row, i], full * wanted[row + 1, i]
+                openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[CONDUCTANCE, i], p[LEAKAGE, i])
+                openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[CONDUCTANCE, i], p[LEAKAGE, i])
+
+
+class FlowActuation:
+    """The action is a net mass flow in units of the choked flow C rho0 Ps sqrt(T0/T) (3.2 g/s by default).
+
+    The inverse of the valve characteristic at the present pressures turns it into openings at every control period. With
+    ``two_valves`` there is a flow per chamber (into it is positive), with ``one_valve`` the active flow qA (8) per cylinder.
+    """
+
+    every_period = True
+
+    def __init__(self, layout: str) -> None:
+        self._one_valve = layout == "one_valve"
+        unit = "unit of the choked flow"
+        self.names = (
+            (f"active flow qA of cylinder 1, {unit}", f"active flow qA of cylinder 2, {unit}")
+            if self._one_valve
+            else tuple(f"flow into chamber {chamber}, {unit}" for chamber in ("P1", "N1", "P2", "N2"))
+        )
+        self.size = len(self.names)
+
+    def begin(self, lanes: Mask) -> None:
+        pass
+
+    def accept(self, actions: Array) -> None:
+        self._wanted = actions
+
+    def openings(self, simulation: Simulation) -> Array:
+        plant = simulation.plant
+        openings = np.empty((4, plant.num_envs))
+        _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
+        return openings
+
+
+ACTUATIONS = {"valve": ValveActuation, "flow": FlowActuation}

@@ -1,0 +1,144 @@
+"""Builds the simulation of an environment from the arguments of ``gym.make``, refusing what cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from birthsim_env import observation
+from birthsim_env.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
+from birthsim_env.parameters import Parameters, load_parameters
+from birthsim_env.randomization import checked_ranges, documented_ranges
+from birthsim_env.references import Trajectory
+from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.sensors import SENSORS
+from birthsim_env.simulation import Simulation
+from birthsim_env.stiffness_schedules import StiffnessSchedule
+from birthsim_env.user_forces import UserForce
+
+Randomize = bool | str | Mapping[str, tuple[float, float]]
+RENDER_MODES = ("human", "rgb_array")
+FRAMES_PER_SECOND = 50
+
+
+def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
+    """``value`` if it is allowed, else a ``ValueError`` that lists what is."""
+    if not any(value is option or (isinstance(value, str) and value == option) for option in allowed):
+        raise ValueError(f"{name} = {value!r}; allowed: {', '.join(repr(option) for option in allowed)}")
+    return value
+
+
+def instance_of(name: str, value: Any, kind: type, default: Any) -> Any:
+    """``value`` if it is of ``kind``, ``default`` if it is None."""
+    if value is None:
+        return default
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} = {value!r}; allowed: None or a {kind.__module__}.{kind.__name__}")
+    return value
+
+
+def policy_periods(policy_period: float, parameters: Parameters) -> int:
+    """Control periods in a policy period, which must be a whole number of them."""
+    control = parameters.electronics.control_period
+    valid = isinstance(policy_period, (int, float)) and math.isfinite(policy_period) and policy_period > 0
+    periods = round(policy_period / control) if valid else 0
+    if periods < 1 or abs(periods * control - policy_period) > 1e-9:
+        raise ValueError(f"policy_period = {policy_period!r}; allowed: a multiple of the control period {control:g} s")
+    return periods
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an environment is made of."""
+
+    simulation: Simulation
+    actuation: Actuation
+    duration: float
+    policy_period: float
+    title: str
+    single_observation_space: spaces.Box
+    single_action_space: spaces.Box
+    observation_names: tuple[str, ...]
+
+    @property
+    def steps(self) -> int:
+        """Policy steps until the scenario ends."""
+        return max(1, round(self.duration / self.policy_period))
+
+
+def assemble(
+    num_envs: int,
+    scenario: str,
+    action_mode: str = "valve",
+    valves: str = "two_valves",
+    sensors: str = "ideal",
+    randomize: Randomize = False,
+    reference: Trajectory | None = None,
+    user_force: UserForce | None = None,
+    stiffness: StiffnessSchedule | None = None,
+    parameters: Parameters | str | Path | None = None,
+    policy_period: float = 0.01,
+    duration: float | None = None,
+    actuation: Actuation | None = None,
+) -> Setup:
+    """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed."""
+    table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
+    rig = load_parameters(parameters)
+    one_of("valves", valves, VALVE_LAYOUTS)
+    one_of("sensors", sensors, tuple(SENSORS))
+    chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
+    if isinstance(randomize, Mapping):
+        ranges, varied = checked_ranges(randomize), False
+    else:
+        one_of("randomize", randomize, (False, True, "plant", "scenario"))
+        ranges = documented_ranges() if randomize in (True, "plant") else {}
+        varied = randomize in (True, "scenario")
+    default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
+    if duration is not None and not (isinstance(duration, (int, float)) and math.isfinite(duration) and duration > 0):
+        raise ValueError(f"duration = {duration!r}; allowed: None or a positive number (s)")
+    simulation = Simulation(
+        num_envs,
+        rig,
+        ranges,
+        instance_of("reference", reference, Trajectory, default_reference),
+        instance_of("user_force", user_force, UserForce, default_force),
+        instance_of("stiffness", stiffness, StiffnessSchedule, default_stiffness),
+        sensors,
+        chosen,
+        policy_periods(policy_period, rig),
+    )
+    limit = observation.LIMIT
+    size = observation.SIZE + chosen.size
+    return Setup(
+        simulation,
+        chosen,
+        float(duration or table.duration),
+        float(policy_period),
+        table.title,
+        spaces.Box(-limit, limit, (size,), np.float32),
+        spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
+        (*(str(entry) for entry in observation.ENTRIES), *(f"last action: {name}" for name in chosen.names)),
+    )
+
+
+def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong."""
+    try:
+        array = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"action = {actions!r}; allowed: {size} numbers in [-1, 1]") from error
+    if array.shape != (num_envs, size):
+        shape = (size,) if num_envs == 1 else (num_envs, size)
+        shown = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
+        raise ValueError(f"action has shape {shown}; allowed: {shape}, in [-1, 1]")
+    extreme = np.abs(array).max()
+    if not extreme <= 1.0:
+        lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
+        raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1")
+    return np.ascontiguousarray(array.T)

@@ -1,0 +1,275 @@
+"""Primitives: colours, a pen in metres that skips whatever is not finite, markers, the force arrow, and lettering."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pygame
+import pygame.font
+from numpy.typing import NDArray
+
+Point = tuple[float, float]
+Colour = tuple[int, int, int]
+
+PAPER: Colour = (250, 251, 252)
+INK: Colour = (38, 44, 52)
+GREY: Colour = (128, 136, 146)
+FAINT: Colour = (222, 226, 231)
+STEEL: Colour = (196, 202, 209)
+CAP: Colour = (92, 100, 110)
+SKIN: Colour = (246, 214, 190)
+SKIN_EDGE: Colour = (158, 104, 74)
+# The markers differ in luminance (about 15, 95 and 165 of 255) as well as in hue and shape, so they survive a grey print.
+END_EFFECTOR: Colour = (14, 14, 18)
+TARGET: Colour = (0, 112, 128)
+COMPLIANT: Colour = (255, 150, 0)
+PATH: Colour = (176, 184, 194)
+FORCE: Colour = (196, 16, 72)
+LOW_PRESSURE: Colour = (240, 246, 252)
+HIGH_PRESSURE: Colour = (14, 52, 128)
+
+# SDL keeps coordinates in integers; far beyond any surface nothing can be seen anyway.
+_LARGEST_PIXEL = 30000.0
+# Surfaces are drawn this many times finer than the picture and scaled down: that smooths every edge.
+FINE = 2
+
+
+def mix(low: Colour, high: Colour, share: float) -> Colour:
+    """Colour ``share`` (0 to 1, clipped) of the way from ``low`` to ``high``; grey where ``share`` is not a number."""
+    if math.isnan(share):
+        return STEEL
+    share = min(max(share, 0.0), 1.0)
+    return (
+        round(low[0] + share * (high[0] - low[0])),
+        round(low[1] + share * (high[1] - low[1])),
+        round(low[2] + share * (high[2] - low[2])),
+    )
+
+
+def drawable(points: Iterable[Point]) -> bool:
+    """Whether all points (pixels) are finite and near enough for SDL."""
+    return all(abs(x) < _LARGEST_PIXEL and abs(y) < _LARGEST_PIXEL for x, y in points)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle of the picture, px."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def right(self) -> int:
+        """Column just past the box."""
+        return self.x + self.width
+
+    @property
+    def bottom(self) -> int:
+        """Row just past the box."""
+        return self.y + self.height
+
+    def holds(self, at: Point, half: Point) -> bool:
+        """Whether a rectangle with half sizes ``half`` around ``at`` lies inside."""
+        across = self.x + half[0] <= at[0] <= self.right - half[0]
+        return across and self.y + half[1] <= at[1] <= self.bottom - half[1]
+
+    def nearest(self, at: Point, half: Point) -> Point:
+        """``at`` moved as little as puts a rectangle with half sizes ``half`` around it inside."""
+        return (
+            min(max(at[0], self.x + half[0]), self.right - half[0]),
+            min(max(at[1], self.y + half[1]), self.bottom - half[1]),
+        )
+
+
+def sheet(box: Box) -> pygame.Surface:
+    """A fine surface for one box of the picture."""
+    return pygame.Surface((box.width * FINE, box.height * FINE), 0, 32)
+
+
+def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box) -> None:
+    """Scale a fine surface down into its box of the picture."""
+    pygame.transform.smoothscale(fine, (box.width, box.height), picture.subsurface((box.x, box.y, box.width, box.height)))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in the plane: ``at(s, n)`` is the point ``s`` m along it and ``n`` m to its left."""
+
+    origin: Point
+    along: Point
+
+    def at(self, s: float, n: float = 0.0) -> Point:
+        """World point (x, y), m."""
+        (ox, oy), (ax, ay) = self.origin, self.along
+        return ox + s * ax - n * ay, oy + s * ay + n * ax
+
+    def box(self, start: float, end: float, half: float) -> list[Point]:
+        """Corners of the rectangle from ``start`` to ``end`` along the axis, ``half`` m to either side."""
+        return [self.at(start, half), self.at(end, half), self.at(end, -half), self.at(start, -half)]
+
+
+class Pen:
+    """Draws in world coordinates (m, y up) on a fine surface.
+
+    Widths and radii named ``..._px`` are pixels of the final picture.
+    """
+
+    def __init__(self, surface: pygame.Surface, origin: Point, pixels_per_metre: float) -> None:
+        """``origin`` is where world (0, 0) lies and ``pixels_per_metre`` the scale, both in final pixels."""
+        self.surface, self.scale = surface, pixels_per_metre
+        self._x, self._y = origin[0] * FINE, origin[1] * FINE
+        self._scale = pixels_per_metre * FINE
+
+    def pixel(self, point: Point) -> Point:
+        """Fine pixel of a world point (m)."""
+        return self._x + self._scale * point[0], self._y - self._scale * point[1]
+
+    def polygon(self, points: Sequence[Point], fill: Colour, edge: Colour | None = None, edge_px: float = 1.0) -> None:
+        """Filled polygon of world points (m), optionally outlined."""
+        pixels = [self.pixel(point) for point in points]
+        if drawable(pixels):
+            pygame.draw.polygon(self.surface, fill, pixels)
+            if edge is not None:
+                pygame.draw.lines(self.surface, edge, True, pixels, self._width(edge_px))
+
+    def line(self, points: Sequence[Point], colour: Colour, px: float = 1.0) -> None:
+        """Open polyline of world points (m)."""
+        pixels = [self.pixel(point) for point in points]
+        if drawable(pixels):
+            pygame.draw.lines(self.surface, colour, False, pixels, self._width(px))
+
+    def curve(self, points: NDArray[np.float64], colour: Colour, px: float = 1.0) -> None:
+        """Open polyline of many world points (M, 2), m, broken where a point cannot be drawn."""
+        pixels = np.array([self._x, self._y]) + points * np.array([self._scale, -self._scale])
+        seen = np.all(np.abs(pixels) < _LARGEST_PIXEL, axis=1)
+        edges = np.flatnonzero(np.diff(seen)) + 1
+        for run, visible in zip(np.split(pixels, edges), np.split(seen, edges), strict=True):
+            if len(run) > 1 and visible[0]:
+                pygame.draw.lines(self.surface, colour, False, run.tolist(), self._width(px))
+
+    def disc(
+        self, centre: Point, radius_px: float, fill: Colour | None, edge: Colour | None = None, edge_px: float = 1.0
+    ) -> None:
+        """Disc or, without ``fill``, ring around a world point (m)."""
+        pixel = self.pixel(centre)
+        if drawable([pixel]):
+            if fill is not None:
+                pygame.draw.circle(self.surface, fill, pixel, radius_px * FINE)
+            if edge is not None:
+                pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px))
+
+    def shape(self, centre: Point, corners_px: Sequence[Point], fill: Colour, edge: Colour | None = None) -> None:
+        """Filled polygon whose corners are pixel offsets (y down) from a world point (m)."""
+        x, y = self.pixel(centre)
+        pixels = [(x + dx * FINE, y + dy * FINE) for dx, dy in corners_px]
+        if drawable(pixels):
+            pygame.draw.polygon(self.surface, fill, pixels)
+            if edge is not None:
+                pygame.draw.lines(self.surface, edge, True, pixels, FINE)
+
+    def _width(self, px: float) -> int:
+        return max(1, round(px * FINE))
+
+
+def target_marker(pen: Pen, at: Point, size: float) -> None:
+    """Hollow ring with four ticks, ``size`` px in radius: it leaves free what lies inside it."""
+    pen.disc(at, size + 1, None, PAPER, 0.3 * size + 2)
+    inner, outer, half = 0.95 * size, 1.6 * size, max(0.6, 0.13 * size)
+    tick = [(inner, half), (outer, half), (outer, -half), (inner, -half)]
+    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        pen.shape(at, [(dx * r + dy * h, dy * r + dx * h) for r, h in tick], TARGET)
+    pen.disc(at, size, None, TARGET, max(1.2, 0.26 * size))
+
+
+def compliant_marker(pen: Pen, at: Point, size: float) -> None:
+    """Filled diamond, ``size`` px from centre to corner."""
+    pen.shape(at, [(size, 0), (0, size), (-size, 0), (0, -size)], COMPLIANT, INK)
+
+
+def end_effector_marker(pen: Pen, at: Point, size: float) -> None:
+    """Black dot with a light rim, ``size`` px in radius."""
+    pen.disc(at, size + 0.8, PAPER)
+    pen.disc(at, size, END_EFFECTOR)
+
+
+def arrow(pen: Pen, start: Point, end: Point, px: float) -> None:
+    """Force arrow between two world points (m), shaft ``px`` wide, with a light rim to lift it off what lies below."""
+    length = math.dist(start, end)
+    if not (length > 0 and math.isfinite(length)):
+        return
+    axis = Axis(start, ((end[0] - start[0]) / length, (end[1] - start[1]) / length))
+    wide = px / pen.scale
+    neck, half = max(length - 3.2 * wide, 0.0), wide / 2
+    left = [axis.at(0, half), axis.at(neck, half), axis.at(neck, 3.2 * half)]
+    right = [axis.at(neck, -3.2 * half), axis.at(neck, -half), axis.at(0, -half)]
+    outline = [*left, end, *right]
+    pen.line([*outline, outline[0]], PAPER, 3.0)
+    pen.polygon(outline, FORCE)
+
+
+class Lettering:
+    """Text with every rendered string kept, since most strings return frame after frame."""
+
+    def __init__(self, size: int) -> None:
+        """``size`` is the height of the built-in typeface, px."""
+        if not pygame.font.get_init():
+            pygame.font.init()
+        # Rendered at four times the size and scaled down: at text size the typeface's own hinting leaves gaps inside words.
+        self._font = pygame.font.Font(None, 4 * size)
+        self.height = self._font.get_height() // 4
+        self._kept: dict[tuple[str, Colour, bool], pygame.Surface] = {}
+
+    def width(self, text: str) -> int:
+        """Width of a text, px."""
+        return math.ceil(self._font.size(text)[0] / 4)
+
+    def fit(self, choices: Sequence[str], width: float) -> str:
+        """The first choice that fits in ``width`` px, else the last one cut short."""
+        for text in choices:
+            if self.width(text) <= width:
+                return text
+        text = choices[-1]
+        while text and self.width(text + "...") > width:
+            text = text[:-1]
+        return text + "..." if text else ""
+
+    def write(
+        self,
+        surface: pygame.Surface,
+        text: str,
+        at: Point,
+        colour: Colour = INK,
+        anchor: Point = (0.0, 0.0),
+        halo: bool = False,
+    ) -> None:
+        """Write ``text`` with the point ``anchor`` of its box, (0, 0) top left to (1, 1) bottom right, at the pixel ``at``."""
+        if not drawable([at]):
+            return
+        key = (text, colour, halo)
+        image = self._kept.get(key)
+        if image is None:
+            if len(self._kept) > 4000:
+                self._kept.clear()
+            image = self._kept[key] = self._render(text, colour, halo)
+        surface.blit(image, (round(at[0] - anchor[0] * image.get_width()), round(at[1] - anchor[1] * image.get_height())))
+
+    def _render(self, text: str, colour: Colour, halo: bool) -> pygame.Surface:
+        plain = self._small(text, colour)
+        if not halo:
+            return plain
+        image = pygame.Surface((plain.get_width() + 4, plain.get_height() + 4), pygame.SRCALPHA)
+        light = self._small(text, PAPER)
+        for dx in range(5):
+            for dy in range(5):
+                image.blit(light, (dx, dy))
+        image.blit(plain, (2, 2))
+        return image
+
+    def _small(self, text: str, colour: Colour) -> pygame.Surface:
+        large = self._font.render(text, True, colour)
+        return pygame.transform.smoothscale(large, (math.ceil(large.get_width() / 4), math.ceil(large.get_height() / 4)))

@@ -1,0 +1,214 @@
+"""The right-hand side of the whole rig, written once, and its integrator: kernels over lanes.
+
+State rows are those of ``lanes.STATE_NAMES``. A kernel copies one block of lanes at a time into scratch arrays of constant
+shape, works there, and copies back; the right-hand side is inlined where it is used.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from birthsim_env import chambers, friction, geometry, mechanics, valves
+from birthsim_env.compilation import BLOCK, helper, kernel
+from birthsim_env.lanes import (  # fmt: skip
+    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, BRISTLE_S0, BRISTLE_S1, CONDUCTANCE, COS_GAMMA3, CRITICAL,
+    D_PRODUCT, D_SQUARES, DEAD_VOLUME, FC1, FC2, FS1, FS2, FV1, FV2, G12, GAMMA, GAS, GRAVITY, H_WALL, HALF_L1, HALF_L2,
+    K1, K2, LEAKAGE, LUGRE, MASS, PARAMETERS, PERIMETER1, PERIMETER2, PN1, PN2, PP1, PP2, RHO0, S1N, S1P, S2N, S2P,
+    SIGN_SPEED, SIN_GAMMA3, STATES, STOP_DAMPING, STOP_STIFFNESS, STRIBECK, SUPPLY, T0, TAU, TEMPERATURE, TN1, TN2, TP1,
+    TP2, V1, V2, Y1, Y2, Z1, Z2, Array,
+)
+
+
+INTEGRATION_STEP = 0.25e-3
+"""s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
+
+
+@helper
+def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
+    """Mass flow from the supply into a chamber given by its state rows, kg/s."""
+    c = valves.supply_conductance(x[spool, i], p[CONDUCTANCE, i], p[LEAKAGE, i])
+    source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
+    inside = valves.density_factor(x[temperature, i], p[RHO0, i], p[T0, i])
+    return valves.orifice_flow(c, p[SUPPLY, i], source, x[pressure, i], inside, p[CRITICAL, i])
+
+
+@helper
+def exhausted_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
+    """Mass flow from a chamber given by its state rows to the atmosphere, kg/s."""
+    c = valves.exhaust_conductance(x[spool, i], p[CONDUCTANCE, i], p[LEAKAGE, i])
+    source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
+    inside = valves.density_factor(x[temperature, i], p[RHO0, i], p[T0, i])
+    return valves.orifice_flow(c, x[pressure, i], inside, p[ATMOSPHERE, i], source, p[CRITICAL, i])
+
+
+@helper
+def chamber_rates(
+    x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, spool: int, area: int, perimeter: int,
+    length: float, length_rate: float,
+) -> None:  # fmt: skip
+    """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
+    supplied = supplied_flow(x, p, i, pressure, temperature, spool)
+    exhausted = exhausted_flow(x, p, i, pressure, temperature, spool)
+    t, wall = x[temperature, i], p[TEMPERATURE, i]
+    carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
+    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[H_WALL, i], p[G12, i])
+    volume = p[DEAD_VOLUME, i] + p[area, i] * length
+    volume_rate = p[area, i] * length_rate
+    rate = chambers.pressure_rate(x[pressure, i], volume, volume_rate, carried, heat, p[GAS, i], p[GAMMA, i])
+    dx[pressure, i] = rate
+    dx[temperature, i] = chambers.temperature_rate(x[pressure, i], t, rate, volume, volume_rate, supplied - exhausted, p[GAS, i])
+
+
+@helper
+def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
+    """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
+    for i in range(n):
+        y1, v1, y2, v2 = x[Y1, i], x[V1, i], x[Y2, i], x[V2, i]
+        r4, r2 = y1 + p[K1, i], y2 + p[K2, i]
+        w = r4 * r4 - p[D_SQUARES, i]
+        s2 = geometry.s_squared(w, p[D_PRODUCT, i])
+        root = math.sqrt(s2)
+        kappa = geometry.amplification(r2, r4, root)
+        sine = geometry.sin_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
+        cosine = geometry.cos_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
+
+        s0, s1 = p[BRISTLE_S0, i], p[BRISTLE_S1, i]
+        level1 = friction.stribeck_level(v1, p[FC1, i], p[FS1, i], p[STRIBECK, i])
+        level2 = friction.stribeck_level(v2, p[FC2, i], p[FS2, i], p[STRIBECK, i])
+        dz1 = friction.bristle_rate(v1, x[Z1, i], level1, s0)
+        dz2 = friction.bristle_rate(v2, x[Z2, i], level2, s0)
+        lugre1 = friction.lugre_force(v1, x[Z1, i], dz1, s0, s1, p[FV1, i])
+        lugre2 = friction.lugre_force(v2, x[Z2, i], dz2, s0, s1, p[FV2, i])
+        coulomb1 = friction.coulomb_force(v1, p[FC1, i], p[FV1, i], p[SIGN_SPEED, i])
+        coulomb2 = friction.coulomb_force(v2, p[FC2, i], p[FV2, i], p[SIGN_SPEED, i])
+        is_lugre = p[LUGRE, i] > 0.5
+        friction1 = lugre1 if is_lugre else coulomb1
+        friction2 = lugre2 if is_lugre else coulomb2
+
+        force1 = (
+            mechanics.piston_force(x[PP1, i], x[PN1, i], p[AREA_P1, i], p[AREA_N1, i], p[ATMOSPHERE, i])
+            - friction1
+            - mechanics.stop_force(y1, v1, p[HALF_L1, i], p[STOP_STIFFNESS, i], p[STOP_DAMPING, i])
+            + mechanics.user_force1(f[0, i], f[1, i], kappa, sine, cosine)
+        )
+        force2 = (
+            mechanics.piston_force(x[PP2, i], x[PN2, i], p[AREA_P2, i], p[AREA_N2, i], p[ATMOSPHERE, i])
+            - friction2
+            - mechanics.stop_force(y2, v2, p[HALF_L2, i], p[STOP_STIFFNESS, i], p[STOP_DAMPING, i])
+            + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
+        )
+        dx[Y1, i] = v1
+        dx[V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[MASS, i], p[GRAVITY, i])
+        dx[Y2, i] = v2
+        dx[V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[MASS, i], p[GRAVITY, i])
+        dx[Z1, i] = dz1 if is_lugre else 0.0
+        dx[Z2, i] = dz2 if is_lugre else 0.0
+
+        chamber_rates(x, p, dx, i, PP1, TP1, TN1, S1P, AREA_P1, PERIMETER1, p[HALF_L1, i] + y1, v1)
+        chamber_rates(x, p, dx, i, PN1, TN1, TP1, S1N, AREA_N1, PERIMETER1, p[HALF_L1, i] - y1, -v1)
+        chamber_rates(x, p, dx, i, PP2, TP2, TN2, S2P, AREA_P2, PERIMETER2, p[HALF_L2, i] + y2, v2)
+        chamber_rates(x, p, dx, i, PN2, TN2, TP2, S2N, AREA_N2, PERIMETER2, p[HALF_L2, i] - y2, -v2)
+        dx[S1P, i] = (u[0, i] - x[S1P, i]) / p[TAU, i]
+        dx[S1N, i] = (u[1, i] - x[S1N, i]) / p[TAU, i]
+        dx[S2P, i] = (u[2, i] - x[S2P, i]) / p[TAU, i]
+        dx[S2N, i] = (u[3, i] - x[S2N, i]) / p[TAU, i]
+
+
+@helper
+def load(source: Array, first: int, n: int, scratch: Array) -> None:
+    """Copy ``n`` lanes, starting at lane ``first``, into the rows of a scratch array."""
+    for row in range(source.shape[0]):
+        for i in range(n):
+            scratch[row, i] = source[row, first + i]
+
+
+@helper
+def store(scratch: Array, first: int, n: int, target: Array) -> None:
+    """Copy ``n`` lanes of a scratch array back."""
+    for row in range(target.shape[0]):
+        for i in range(n):
+            target[row, first + i] = scratch[row, i]
+
+
+@kernel
+def derivatives(state: Array, command: Array, force: Array, parameters: Array, rates: Array) -> None:
+    """Writes d(state)/dt into ``rates`` (18, N)."""
+    x, u, f = np.empty((STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((PARAMETERS, BLOCK)), np.empty((STATES, BLOCK))
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        load(state, first, n, x)
+        load(command, first, n, u)
+        load(force, first, n, f)
+        load(parameters, first, n, p)
+        right_hand_side(x, u, f, p, dx, n)
+        store(dx, first, n, rates)
+
+
+@kernel
+def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
+    """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
+    for i in range(state.shape[1]):
+        flows[0, i] = supplied_flow(state, parameters, i, PP1, TP1, S1P)
+        flows[1, i] = supplied_flow(state, parameters, i, PN1, TN1, S1N)
+        flows[2, i] = supplied_flow(state, parameters, i, PP2, TP2, S2P)
+        flows[3, i] = supplied_flow(state, parameters, i, PN2, TN2, S2N)
+        flows[4, i] = exhausted_flow(state, parameters, i, PP1, TP1, S1P)
+        flows[5, i] = exhausted_flow(state, parameters, i, PN1, TN1, S1N)
+        flows[6, i] = exhausted_flow(state, parameters, i, PP2, TP2, S2P)
+        flows[7, i] = exhausted_flow(state, parameters, i, PN2, TN2, S2N)
+
+
+@helper
+def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
+    for row in range(STATES):
+        for i in range(n):
+            total[row, i] += weight * dx[row, i]
+            trial[row, i] = x[row, i] + ahead * dx[row, i]
+
+
+@helper
+def record_impacts(x: Array, p: Array, impacts: Array, n: int) -> None:
+    """Keeps the largest speed at which a piston runs into an end stop, m/s."""
+    for i in range(n):
+        outward1 = x[V1, i] if x[Y1, i] > 0.0 else -x[V1, i]
+        outward2 = x[V2, i] if x[Y2, i] > 0.0 else -x[V2, i]
+        impacts[0, i] = max(impacts[0, i], outward1 if abs(x[Y1, i]) > p[HALF_L1, i] else 0.0)
+        impacts[1, i] = max(impacts[1, i], outward2 if abs(x[Y2, i]) > p[HALF_L2, i] else 0.0)
+
+
+@kernel
+def advance(state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array) -> None:
+    """Integrates ``state`` in place by classical Runge-Kutta.
+
+    ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
+    the largest speed at which each piston ran into an end stop.
+    """
+    x, u, f = np.empty((STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((PARAMETERS, BLOCK)), np.empty((STATES, BLOCK))
+    total, trial, hit = np.empty((STATES, BLOCK)), np.empty((STATES, BLOCK)), np.empty((2, BLOCK))
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        load(state, first, n, x)
+        load(command, first, n, u)
+        load(parameters, first, n, p)
+        hit[:] = 0.0
+        for sample in range(forces.shape[0]):
+            load(forces[sample], first, n, f)
+            for _ in range(steps):
+                total[:] = x
+                right_hand_side(x, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 6.0, step / 2.0)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 3.0, step / 2.0)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 3.0, step)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 6.0, 0.0)
+                x[:] = total
+                record_impacts(x, p, hit, n)
+        store(x, first, n, state)
+        store(hit, first, n, impacts)

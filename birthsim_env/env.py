@@ -1,0 +1,163 @@
+"""The single environment: one lane of the simulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.assembly import FRAMES_PER_SECOND, RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.episodes import Episodes
+from birthsim_env.info import single_info
+from birthsim_env.signals import Measurement, Reference
+
+_ONE = np.ones(1, dtype=np.bool_)
+
+
+class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
+    """The haptic half of BirthSIM: two pneumatic cylinders carry the end effector, the fetal head, in a vertical plane.
+
+    ## Description
+    The policy drives four servovalves. The end effector should follow a target and give way to the hand that pushes it as a
+    spring of the stiffness asked for: to stay on the *compliant target* xk = xt + Fx/Kclx, yk = yt + Fy/Kcly (19). The plant
+    is that of Herzig et al. (IROS 2015) with temperature, dead volume, leakage, spool lag and LuGre friction; it is
+    integrated by Runge-Kutta steps of 0.25 ms.
+
+    | id | experiment | s |
+    |---|---|---|
+    | `BirthSIM/Circle-v0` | Fig. 4: a circle of 50 mm under pushes of 30 N, stiffness 2000 then 4000 N/m | 16 |
+    | `BirthSIM/Probe-v0` | hold still and be pushed: the stiffness test | 5 |
+    | `BirthSIM/Descent-v0` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
+    | `BirthSIM/Forceps-v0` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
+    | `BirthSIM/Dystocia-v0` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
+
+    ## Action space
+    `Box(-1, 1, (n,), float32)`, held for one policy period (10 ms):
+
+    | `action_mode` | `valves` | entries |
+    |---|---|---|
+    | `"valve"` | `"two_valves"` | spool openings of chambers P1, N1, P2, N2; 1 fills from the supply, -1 empties (5 V +- 5 V) |
+    | `"valve"` | `"one_valve"` | openings of one 5/3 valve per cylinder; chamber N gets the opposite of chamber P |
+    | `"flow"` | `"two_valves"` | net mass flows into P1, N1, P2, N2, in units of the choked flow (3.2 g/s) |
+    | `"flow"` | `"one_valve"` | active mass flows qA (8) of cylinders 1 and 2, in the same unit |
+
+    ## Observation space
+    `Box(-10, 10, (20 + n,), float32)`, roughly [-1, 1], from what the sensors say; `observation_names` lists this table:
+
+    | index | entry | value that maps to 1 |
+    |---|---|---|
+    | 0, 1 | tracking error x, y: end effector minus compliant target | 0.01 m |
+    | 2, 3 | end effector velocity x, y | 0.2 m/s |
+    | 4, 5 | piston positions y1, y2 | half a stroke |
+    | 6, 7 | piston forces F - Fext of cylinders 1, 2 | 200 N |
+    | 8, 9 | pneumatic stiffness (9) of cylinders 1, 2 | 5000, 2500 N/m |
+    | 10, 11 | its setpoints | 5000, 2500 N/m |
+    | 12, 13 | closed-loop stiffness setpoints Kclx, Kcly | 5000 N/m |
+    | 14, 15 | user force x, y | 50 N |
+    | 16, 17 | target velocity x, y | 0.2 m/s |
+    | 18, 19 | target acceleration x, y | 0.5 m/s2 |
+    | 20 ... | last action | 1 |
+
+    ## Reward
+    Per step of 10 ms, the sum of three terms that are also in `info`:
+    `reward_tracking` = -min((|ex| + |ey|) / 2 mm, 5), zero for 0.3 s after a jump of the force or of a stiffness setpoint;
+    `reward_action_change` = -0.05 sum |a - last a|; `reward_failure` = -250 when the episode terminates.
+
+    ## Start and end of an episode
+    It starts on the target, moving with it, chambers in balance with weight and friction at the pneumatic stiffness asked
+    for. It terminates when the state leaves the physical range: a piston runs into an end stop faster than
+    `parameters.mechanics.impact_speed` (0.1 m/s), or a chamber leaves 0.2 to 20 bar or 100 to 1000 K. It is truncated at the
+    scenario's end. `reset(options={"position": (x, y)})` starts the end effector there, at rest.
+
+    ## Info
+    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, and the reward terms.
+
+    ## Arguments
+    - `action_mode`, `valves`: see above.
+    - `sensors`: `"ideal"`, or `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures.
+    - `randomize`: `False`; `"plant"` draws the rig from its documented ranges at every episode, `"scenario"` varies the
+      experiment, `True` does both; a mapping such as `{"mechanics.mass": (2, 5)}` draws just these parameters.
+    - `reference` (`Trajectory`), `user_force` (`UserForce`), `stiffness` (`StiffnessSchedule`): your own instead of the
+      scenario's.
+    - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
+    - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s.
+    - `render_mode`: `None`, `"rgb_array"` or `"human"`.
+
+    Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.
+
+    ## Errors
+    `ValueError` naming the argument, its value and what is allowed: modes, parameters, ranges, references that leave the
+    workspace, actions that are not finite numbers in [-1, 1] of the right shape.
+
+    ## Version history
+    - v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}
+
+    def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Any) -> None:
+        self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
+        setup = assemble(1, scenario, **arguments)
+        self.observation_space, self.action_space = setup.single_observation_space, setup.single_action_space
+        self.observation_names = setup.observation_names
+        self.simulation = setup.simulation
+        self._steps = setup.steps
+        self._episodes = Episodes(setup)
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the sensors say now: the input of a controller. Arrays without a lane axis."""
+        seen = self.simulation.measurement
+        return Measurement(
+            seen.time[0],
+            seen.position[:, 0],
+            seen.position_time[0],
+            seen.velocity[:, 0],
+            seen.pressures[:, 0],
+            seen.user_force[:, 0],
+            seen.sampled,
+        )
+
+    @property
+    def reference(self) -> Reference:
+        """What is asked for now: the other input of a controller."""
+        return Reference(self.simulation.reference.rows[:, 0])
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; a seed makes this and all following episodes repeatable."""
+        super().reset(seed=seed)
+        self._episodes.seed(seed, self.np_random)
+        self._episodes.begin(_ONE, options)
+        self._render_human()
+        return self._episodes.observation()[0], single_info(self._episodes.describe())
+
+    def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """One policy step."""
+        episodes = self._episodes
+        rewards, terms, failed = episodes.step(checked_actions([action], 1, episodes.action_size))
+        terminated = bool(failed[0])
+        truncated = not terminated and bool(episodes.elapsed[0] >= self._steps)
+        info: dict[str, Any] = single_info(episodes.describe())
+        for name, values in terms.items():
+            info[name] = float(values[0])
+        self._render_human()
+        return episodes.observation()[0], float(rewards[0]), terminated, truncated, info
+
+    def render(self) -> Any:
+        """A frame (480, 640, 3), uint8, in mode ``rgb_array``."""
+        if self.render_mode != "rgb_array":
+            return None
+        frames = self._episodes.render("rgb_array", 1)
+        return frames[0] if frames else None
+
+    def _render_human(self) -> None:
+        if self.render_mode == "human":
+            self._episodes.render("human", 1)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._episodes.close()

@@ -1,0 +1,133 @@
+"""What the single and the vector environment share: episodes of lanes, their seeds, rewards, observations and frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env import observation
+from birthsim_env.assembly import FRAMES_PER_SECOND, Setup
+from birthsim_env.info import describe
+from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
+from birthsim_env.seeding import lane_seeds
+from birthsim_env.signals import Mask
+
+if TYPE_CHECKING:
+    from birthsim_env.rendering import Renderer, Scene
+
+PATH_POINTS = 160
+
+
+class Episodes:
+    """The lanes of a ``Setup`` with their clocks and seeds; ``elapsed`` (N,) counts policy steps since an episode began."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self.simulation = setup.simulation
+        self.action_size = setup.actuation.size
+        lanes = setup.simulation.plant.num_envs
+        self.elapsed: NDArray[np.int64] = np.zeros(lanes, dtype=np.int64)
+        self._numbers: NDArray[np.int64] = np.full(lanes, -1, dtype=np.int64)
+        self._seeds: list[int] = []
+        self._action: Array = np.zeros((self.action_size, lanes))
+        self._renderer: Renderer | None = None
+        self._path: Array | None = None
+
+    def seed(self, seed: int | list[int | None] | None, generator: np.random.Generator) -> None:
+        """Give the lanes new seeds; without any, lanes that have seeds go on with the next episode of theirs."""
+        if seed is not None or not self._seeds:
+            self._seeds = lane_seeds(seed, len(self.elapsed), generator)
+            self._numbers[:] = -1
+
+    def begin(self, lanes: Mask, options: dict[str, Any] | None = None) -> None:
+        """Start the next episode in the lanes of a mask (N,)."""
+        position = _start(options)
+        self._numbers[lanes] += 1
+        self.elapsed[lanes] = 0
+        self._action[:, lanes] = 0.0
+        self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
+        self._path = None
+
+    def step(self, actions: Array) -> tuple[Array, dict[str, Array], NDArray[np.bool_]]:
+        """One policy step; returns rewards (N,), their terms and which lanes have left the physical range."""
+        if not self._seeds:
+            raise RuntimeError("step() before reset(): call reset(seed=...) first")
+        simulation = self.simulation
+        simulation.step(actions)
+        self.elapsed += 1
+        terms, failed = observation.assess(
+            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump, actions,
+            self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
+        )  # fmt: skip
+        self._action = actions
+        return terms.sum(axis=0), dict(zip(observation.REWARD_TERMS, terms, strict=True)), failed
+
+    def observation(self) -> NDArray[np.float32]:
+        """Observations of all lanes now, (N, size)."""
+        simulation = self.simulation
+        seen = simulation.measurement
+        return observation.observe(
+            seen, simulation.reference, self._action, simulation.nominal
+        )
+
+    def describe(self) -> Array:
+        """The fields of ``info`` of all lanes now."""
+        return describe(self.simulation)
+
+    def render(self, mode: str, lanes: int) -> tuple[Any, ...] | None:
+        """Frames (H, W, 3) of the first ``lanes`` lanes, or None once the first is shown in a window."""
+        # Rendering needs pygame, which those who only compute need not load.
+        from birthsim_env.rendering import Renderer
+
+        if self._renderer is None:
+            self._renderer = Renderer(self.simulation.parameters)
+        if self._path is None:
+            instants = np.linspace(0.0, self._setup.duration, PATH_POINTS)
+            count = len(self.elapsed)
+            self._path = np.stack([self.simulation.trajectory.sample(np.full(count, t))[:2] for t in instants])
+        if mode == "human":
+            self._renderer.show(self._scene(0), min(FRAMES_PER_SECOND, 1 / self._setup.policy_period))
+            return None
+        return tuple(self._renderer.frame(self._scene(lane)) for lane in range(lanes))
+
+    def _scene(self, lane: int) -> Scene:
+        from birthsim_env.rendering import Scene
+
+        simulation, reference = self.simulation, self.simulation.reference
+        state = simulation.plant.state
+        assert self._path is not None
+
+        def pair(values: Array) -> tuple[float, float]:
+            return float(values[0, lane]), float(values[1, lane])
+
+        return Scene(
+            time=float(simulation.time[lane]),
+            piston=(float(state[Y1, lane]), float(state[Y2, lane])),
+            target=pair(reference.position),
+            compliant_target=pair(reference.compliant_target(simulation.force)),
+            user_force=pair(simulation.force),
+            pressures=tuple(float(state[row, lane]) for row in PRESSURES),  # type: ignore[arg-type]
+            stiffness=pair(reference.stiffness),
+            path=self._path[:, :, lane],
+            title=self._setup.title,
+        )
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def _start(options: dict[str, Any] | None) -> Array | None:
+    unknown = set(options or {}) - {"position"}
+    if unknown:
+        raise ValueError(f"options has {', '.join(map(repr, sorted(unknown)))}; allowed: 'position', (x, y) in m")
+    if not options:
+        return None
+    position = np.asarray(options["position"], dtype=np.float64)
+    if position.shape != (2,) or not np.isfinite(position).all():
+        raise ValueError(f"options['position'] = {options['position']!r}; allowed: (x, y), finite, in m")
+    return position

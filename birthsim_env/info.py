@@ -1,0 +1,101 @@
+"""The ``info`` of the environments: the true state of the rig and its task in SI units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from birthsim_env import control_model, dynamics
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import (  # fmt: skip
+    AREA_N1, AREA_N2, AREA_P1, AREA_P2, HALF_L1, HALF_L2, INDEX, PN1, PN2, PP1, PP2, PRESSURES, SPOOLS, TEMPERATURES, TN1, TN2, TP1,
+    TP2, S1N, S1P, S2N, S2P, V1, V2, Y1, Y2, Array,
+)  # fmt: skip
+from birthsim_env.signals import REFERENCES
+from birthsim_env.simulation import Simulation
+
+FIELDS = {
+    "time": (1, "s since the episode began"),
+    "since_jump": (1, "s since the user force or a stiffness setpoint jumped"),
+    "position": (2, "m, end effector x, y"),
+    "velocity": (2, "m/s, end effector"),
+    "target": (2, "m"),
+    "compliant_target": (2, "m, (19)"),
+    "tracking_error": (2, "m, end effector minus compliant target"),
+    "user_force": (2, "N"),
+    "stiffness_setpoint": (2, "N/m, Kclx and Kcly"),
+    "piston_position": (2, "m, y1 and y2"),
+    "piston_velocity": (2, "m/s"),
+    "pressure": (4, "Pa absolute, chambers P1, N1, P2, N2"),
+    "temperature": (4, "K, chambers P1, N1, P2, N2"),
+    "opening": (4, "1, spools of chambers P1, N1, P2, N2"),
+    "pneumatic_force": (2, "N, Pp Sp - Pn Sn of both cylinders (3)"),
+    "pneumatic_stiffness": (2, "N/m, (9)"),
+    "pneumatic_stiffness_setpoint": (2, "N/m"),
+    "supply_flow": (1, "kg/s drawn from the supply"),
+    "impact_speed": (2, "m/s, fastest collision of each piston with an end stop in the last step; 0 where none"),
+}
+"""Name -> (number of values, unit and meaning)."""
+
+ROWS = sum(size for size, _ in FIELDS.values())
+_STARTS = np.cumsum([0] + [size for size, _ in FIELDS.values()])
+_SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _STARTS[1:], strict=False)}
+
+
+@kernel
+def _describe(
+    time: Array, since: Array, state: Array, motion: Array, reference: Array, force: Array, impacts: Array, p: Array, rows: Array
+) -> None:
+    for i in range(state.shape[1]):
+        rows[0, i], rows[1, i] = time[i], since[i]
+        for k in range(2):
+            compliant = reference[k, i] + force[k, i] / reference[8 + k, i]
+            rows[2 + k, i], rows[4 + k, i] = motion[k, i], motion[2 + k, i]
+            rows[6 + k, i], rows[8 + k, i] = reference[k, i], compliant
+            rows[10 + k, i] = motion[k, i] - compliant
+            rows[12 + k, i], rows[14 + k, i] = force[k, i], reference[8 + k, i]
+            rows[36 + k, i] = reference[10 + k, i]
+            rows[39 + k, i] = impacts[k, i]
+        rows[16, i], rows[17, i], rows[18, i], rows[19, i] = state[Y1, i], state[Y2, i], state[V1, i], state[V2, i]
+        for k in range(4):
+            rows[20 + k, i] = state[PRESSURES[k], i]
+            rows[24 + k, i] = state[TEMPERATURES[k], i]
+            rows[28 + k, i] = state[SPOOLS[k], i]
+        rows[32, i] = state[PP1, i] * p[AREA_P1, i] - state[PN1, i] * p[AREA_N1, i]
+        rows[33, i] = state[PP2, i] * p[AREA_P2, i] - state[PN2, i] * p[AREA_N2, i]
+        half1, half2 = p[HALF_L1, i], p[HALF_L2, i]
+        y1, y2 = max(-0.99 * half1, min(0.99 * half1, state[Y1, i])), max(-0.99 * half2, min(0.99 * half2, state[Y2, i]))
+        rows[34, i] = control_model.pneumatic_stiffness(
+            state[PP1, i], state[PN1, i], p[AREA_P1, i], p[AREA_N1, i], half1 + y1, half1 - y1, p[INDEX, i]
+        )
+        rows[35, i] = control_model.pneumatic_stiffness(
+            state[PP2, i], state[PN2, i], p[AREA_P2, i], p[AREA_N2, i], half2 + y2, half2 - y2, p[INDEX, i]
+        )
+        rows[38, i] = (
+            max(dynamics.supplied_flow(state, p, i, PP1, TP1, S1P), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, PN1, TN1, S1N), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, PP2, TP2, S2P), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, PN2, TN2, S2N), 0.0)
+        )
+
+
+def describe(simulation: Simulation) -> Array:
+    """All fields of all lanes, (ROWS, N), in the order of ``FIELDS``."""
+    plant = simulation.plant
+    rows = np.empty((ROWS, plant.num_envs))
+    assert simulation.reference.rows.shape[0] == REFERENCES
+    _describe(
+        simulation.time, simulation.since_jump, plant.state, simulation.motion, simulation.reference.rows, simulation.force,
+        simulation.impacts, plant.lane_parameters, rows,
+    )  # fmt: skip
+    return rows
+
+
+def vector_info(rows: Array) -> dict[str, Array]:
+    """Name -> (N,) for single values, (N, size) for several."""
+    return {name: rows[part.start] if size == 1 else rows[part].T for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)}
+
+
+def single_info(rows: Array) -> dict[str, float | Array]:
+    """Name -> number or array (size,) of the first lane."""
+    column = rows[:, 0]
+    return {name: float(column[part.start]) if size == 1 else column[part] for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)}

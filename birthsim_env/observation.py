@@ -1,0 +1,175 @@
+"""What a policy sees and what it is paid: one kernel computes both, one table names and scales every entry.
+
+All entries of the observation come from measurements (noisy and late with ``lab`` sensors); the reward and ``info`` come from
+the true state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env import control_model, mechanics
+from birthsim_env.compilation import kernel
+from birthsim_env.inverse_kinematics import piston_motion
+from birthsim_env.lanes import (  # fmt: skip
+    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, HALF_L1, HALF_L2, INDEX, PN1, PN2, PP1, PP2, TN1, TN2, TP1, TP2, Y1, Y2, Array,
+)
+from birthsim_env.signals import Measurement, Reference
+
+LIMIT = 10.0
+"""Bound of every observation entry, in units of its scale."""
+
+ERROR_UNIT = 2e-3
+"""m. Tracking error that costs one unit of reward per 10 ms."""
+
+ERROR_CAP = 5.0
+"""Largest tracking cost of one 10 ms, in units: beyond 10 mm a policy is lost anyway."""
+
+ACTION_CHANGE_COST = 0.05
+FAILURE_COST = 250.0
+"""Cost of leaving the physical range: the capped error for the 50 steps that a discount of 0.98 looks ahead, so that dying
+early never pays."""
+
+JUMP_RATE = 150.0
+"""N/s. A force that changes faster, or any change of a stiffness setpoint, is a jump that tracking cannot follow."""
+
+GRACE = 0.3
+"""s after a jump during which the tracking error costs nothing."""
+
+PRESSURE_RANGE = (0.2e5, 20e5)
+"""Pa. A chamber outside it has left what the model describes."""
+
+TEMPERATURE_RANGE = (100.0, 1000.0)
+"""K, likewise."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One entry of the observation: what it is, its unit and the value that maps to 1."""
+
+    name: str
+    unit: str
+    scale: float
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.scale:g} {self.unit}"
+
+
+ENTRIES = (
+    Entry("tracking error x (end effector - compliant target)", "m", 0.01),
+    Entry("tracking error y (end effector - compliant target)", "m", 0.01),
+    Entry("end effector velocity x", "m/s", 0.2),
+    Entry("end effector velocity y", "m/s", 0.2),
+    Entry("piston position y1", "half strokes", 1.0),
+    Entry("piston position y2", "half strokes", 1.0),
+    Entry("piston force of cylinder 1 (F - Fext)", "N", 200.0),
+    Entry("piston force of cylinder 2 (F - Fext)", "N", 200.0),
+    Entry("pneumatic stiffness of cylinder 1", "N/m", 5000.0),
+    Entry("pneumatic stiffness of cylinder 2", "N/m", 2500.0),
+    Entry("pneumatic stiffness setpoint of cylinder 1", "N/m", 5000.0),
+    Entry("pneumatic stiffness setpoint of cylinder 2", "N/m", 2500.0),
+    Entry("closed-loop stiffness setpoint x", "N/m", 5000.0),
+    Entry("closed-loop stiffness setpoint y", "N/m", 5000.0),
+    Entry("user force x", "N", 50.0),
+    Entry("user force y", "N", 50.0),
+    Entry("target velocity x", "m/s", 0.2),
+    Entry("target velocity y", "m/s", 0.2),
+    Entry("target acceleration x", "m/s2", 0.5),
+    Entry("target acceleration y", "m/s2", 0.5),
+)
+SIZE = len(ENTRIES)
+_SCALES = np.array([entry.scale for entry in ENTRIES])
+
+
+@kernel
+def _observe(
+    position: Array, velocity: Array, pressures: Array, reference: Array, force: Array, action: Array, p: Array, scales: Array,
+    rows: NDArray[np.float32],
+) -> None:  # fmt: skip
+    motion, joints, seen = np.empty((4, 1)), np.empty((4, 1)), np.empty(scales.shape[0])
+    for i in range(position.shape[1]):
+        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
+        motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
+        piston_motion(motion, p, joints, 1)
+        y1, y2 = joints[0, 0], joints[1, 0]
+        pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
+        half1, half2 = p[HALF_L1], p[HALF_L2]
+        edge1, edge2 = 0.02 * half1, 0.02 * half2
+        for axis in range(2):
+            seen[axis] = position[axis, i] - reference[axis, i] - force[axis, i] / reference[8 + axis, i]
+            seen[2 + axis] = velocity[axis, i]
+            seen[10 + axis] = reference[10 + axis, i]
+            seen[12 + axis] = reference[8 + axis, i]
+            seen[14 + axis] = force[axis, i]
+            seen[16 + axis] = reference[2 + axis, i]
+            seen[18 + axis] = reference[4 + axis, i]
+        seen[4], seen[5] = y1 / half1, y2 / half2
+        seen[6] = mechanics.piston_force(pp1, pn1, p[AREA_P1], p[AREA_N1], p[ATMOSPHERE])
+        seen[7] = mechanics.piston_force(pp2, pn2, p[AREA_P2], p[AREA_N2], p[ATMOSPHERE])
+        seen[8] = control_model.pneumatic_stiffness(
+            pp1, pn1, p[AREA_P1], p[AREA_N1], max(half1 + y1, edge1), max(half1 - y1, edge1), p[INDEX]
+        )
+        seen[9] = control_model.pneumatic_stiffness(
+            pp2, pn2, p[AREA_P2], p[AREA_N2], max(half2 + y2, edge2), max(half2 - y2, edge2), p[INDEX]
+        )
+        for k in range(scales.shape[0]):
+            rows[i, k] = max(-LIMIT, min(LIMIT, seen[k] / scales[k]))
+        for k in range(action.shape[0]):
+            rows[i, scales.shape[0] + k] = action[k, i]
+
+
+def observe(seen: Measurement, reference: Reference, action: Array, nominal: Array) -> NDArray[np.float32]:
+    """Observations (N, SIZE + length of the action): ``ENTRIES`` over their scales, clipped to +-LIMIT, then the last action.
+
+    ``action`` (size, N); ``nominal`` (PARAMETERS,) is the rig as its owner describes it: a policy does not know what
+    randomisation drew.
+    """
+    rows = np.empty((seen.position.shape[1], SIZE + action.shape[0]), dtype=np.float32)
+    _observe(
+        seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, action, nominal, _SCALES, rows
+    )
+    return rows
+
+
+@kernel
+def _assess(
+    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array, impacts: Array,
+    impact_speed: float, steps: float, terms: Array, failed: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    for i in range(state.shape[1]):
+        error_x = motion[0, i] - reference[0, i] - force[0, i] / reference[8, i]
+        error_y = motion[1, i] - reference[1, i] - force[1, i] / reference[9, i]
+        cost = min((abs(error_x) + abs(error_y)) / ERROR_UNIT, ERROR_CAP)
+        change = 0.0
+        for k in range(action.shape[0]):
+            change += abs(action[k, i] - last_action[k, i])
+        inside = True
+        for k in (PP1, PN1, PP2, PN2):
+            inside = inside and PRESSURE_RANGE[0] < state[k, i] < PRESSURE_RANGE[1]
+        for k in (TP1, TN1, TP2, TN2):
+            inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
+        inside = inside and math.isfinite(state[Y1, i] + state[Y2, i])
+        failed[i] = not inside or max(impacts[0, i], impacts[1, i]) > impact_speed
+        terms[0, i] = -cost * steps if since_jump[i] >= GRACE else 0.0
+        terms[1, i] = -ACTION_CHANGE_COST * change
+        terms[2, i] = -FAILURE_COST if failed[i] else 0.0
+
+
+REWARD_TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+
+
+def assess(
+    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array,
+    impacts: Array, impact_speed: float, policy_period: float,
+) -> tuple[Array, NDArray[np.bool_]]:  # fmt: skip
+    """Reward terms (3, N) in the order of ``REWARD_TERMS``, and which lanes (N,) have left the physical range."""
+    lanes = state.shape[1]
+    terms, failed = np.empty((3, lanes)), np.empty(lanes, dtype=np.bool_)
+    _assess(
+        state, motion, reference, force, since_jump, action, last_action, impacts, impact_speed, policy_period / 0.01, terms, failed
+    )
+    return terms, failed

@@ -1,0 +1,109 @@
+"""Pictures of the rig for Gymnasium's render modes ``rgb_array`` and ``human``.
+
+pygame is imported when the first ``Renderer`` is made, so that training without pictures never loads it; ``rgb_array``
+needs no display.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.parameters import Parameters
+
+if TYPE_CHECKING:
+    import pygame
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one frame shows; one lane, SI units, pressures absolute. What is not finite is left out of the picture."""
+
+    time: float
+    """s"""
+    piston: tuple[float, float]
+    """Piston positions y1, y2, m from mid stroke."""
+    target: tuple[float, float]
+    """Target of the end effector (x, y), m."""
+    compliant_target: tuple[float, float]
+    """Target moved by the user's force (19), (xk, yk), m."""
+    user_force: tuple[float, float]
+    """(Fx, Fy), N."""
+    pressures: tuple[float, float, float, float]
+    """Pp1, Pn1, Pp2, Pn2, Pa."""
+    stiffness: tuple[float, float]
+    """Closed-loop stiffness setpoints Kclx, Kcly, N/m."""
+    path: NDArray[np.float64]
+    """Reference path (M, 2), m; M may be 0."""
+    title: str = ""
+    """First line of the picture."""
+
+
+class Renderer:
+    """Draws scenes of one rig; the static part, the typefaces and the scale are prepared once.
+
+    ``parameters`` fix the world that is shown: the whole workspace always fits. ``width`` and ``height`` are the picture's
+    size in px, at least 320 x 240; smaller ones raise ``ValueError``.
+    """
+
+    def __init__(self, parameters: Parameters, width: int = 640, height: int = 480) -> None:
+        if width < 320 or height < 240:
+            raise ValueError(f"width x height = {width} x {height}; allowed: at least 320 x 240 px")
+        # Its greeting would end up in the output of the console commands.
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        import pygame
+
+        from birthsim_env.drawing.picture import Picture
+
+        self.parameters, self.width, self.height = parameters, width, height
+        self._pygame = pygame
+        self._picture = Picture(parameters, width, height)
+        self._window: pygame.Surface | None = None
+        self._clock: pygame.time.Clock | None = None
+        self._dismissed = False
+
+    def to_pixel(self, point: tuple[float, float]) -> tuple[float, float]:
+        """Pixel (column, row) of a world point (x, y), m, in the main view; whole numbers are pixel edges."""
+        return self._picture.pixel(point)
+
+    def frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """The picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
+        self._picture.draw(scene)
+        pixels = self._pygame.image.tobytes(self._picture.surface, "RGB")
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(self.height, self.width, 3).copy()
+
+    def show(self, scene: Scene, frames_per_second: float) -> None:
+        """Show ``scene`` in a window and wait so that calls come no faster than ``frames_per_second``.
+
+        Once the user has closed the window, calls do nothing until ``close`` has been called: the run itself goes on.
+        """
+        if not (math.isfinite(frames_per_second) and frames_per_second > 0):
+            raise ValueError(f"frames_per_second = {frames_per_second!r}; allowed: a finite number > 0")
+        if self._dismissed:
+            return
+        pygame = self._pygame
+        if self._window is None or self._clock is None:
+            pygame.display.init()
+            self._window = pygame.display.set_mode((self.width, self.height))
+            pygame.display.set_caption("BirthSIM")
+            self._clock = pygame.time.Clock()
+        self._picture.draw(scene)
+        self._window.blit(self._picture.surface, (0, 0))
+        pygame.display.flip()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self.close()
+            self._dismissed = True
+            return
+        self._clock.tick(frames_per_second)
+
+    def close(self) -> None:
+        """Close the window, if there is one. The renderer can be used again."""
+        if self._window is not None:
+            self._pygame.display.quit()
+        self._window = self._clock = None
+        self._dismissed = False

@@ -1,0 +1,168 @@
+"""N lanes of a scenario: plant, sensors, reference, hand and stiffness setpoints on one clock.
+
+The environments are thin faces of this class. Time counts in control periods; the state is integrated between control
+instants, and at each of them reference, user force and measurement belong to the same instant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.actuation import Actuation
+from birthsim_env.compilation import kernel
+from birthsim_env.equilibrium import balanced_state
+from birthsim_env.geometry import end_effector_motion, inverse_geometry, jacobian
+from birthsim_env.lanes import Array, parameter_column
+from birthsim_env.observation import JUMP_RATE
+from birthsim_env.parameters import Parameters
+from birthsim_env.plant import Plant, checked
+from birthsim_env.randomization import Ranges, draw_parameters
+from birthsim_env.references import Trajectory
+from birthsim_env.seeding import STREAMS, stream
+from birthsim_env.sensors import SENSORS
+from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.stiffness_schedules import StiffnessSchedule
+from birthsim_env.user_forces import UserForce
+
+CHECKS = 64
+"""Instants of a new episode at which its reference is checked against the workspace."""
+
+
+class Simulation:
+    """``num_envs`` lanes under one actuation, ``periods`` control periods per policy step.
+
+    After ``begin`` and after every ``step`` the attributes describe the present instant: ``time`` (N,) s since each lane's
+    episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``reference`` and ``measurement``; ``since_jump``
+    (N,) s since force or stiffness setpoint jumped; ``impacts`` (2, N) m/s, the fastest collision of each piston with an
+    end stop during the last step.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        parameters: Parameters,
+        ranges: Ranges,
+        trajectory: Trajectory,
+        user_force: UserForce,
+        stiffness: StiffnessSchedule,
+        sensors: str,
+        actuation: Actuation,
+        periods: int,
+    ) -> None:
+        self.parameters = parameters
+        self.plant = Plant(parameters, num_envs)
+        self.nominal = parameter_column(parameters)
+        self.trajectory, self.user_force, self.stiffness = trajectory, user_force, stiffness
+        self.sensors = SENSORS[sensors](parameters.electronics, num_envs)
+        self.actuation = actuation
+        for part in (trajectory, user_force, stiffness):
+            part.prepare(num_envs)
+        self.period = parameters.electronics.control_period
+        self.ticks: NDArray[np.int64] = np.zeros(num_envs, dtype=np.int64)
+        self.time: Array = np.zeros(num_envs)
+        self.motion: Array = np.zeros((4, num_envs))
+        self.since_jump: Array = np.zeros(num_envs)
+        self.impacts: Array = np.zeros((2, num_envs))
+        self.reference = Reference(np.zeros((REFERENCES, num_envs)))
+        self.measurement: Measurement
+        stepwise = actuation.every_period or self.sensors.sampled or user_force.closed_loop
+        self._stride, self._strides = (1, periods) if stepwise else (periods, 1)
+        self._ranges = ranges
+        self._forces: Array = np.zeros((self._stride, 2, num_envs))
+
+    @property
+    def force(self) -> Array:
+        """User force now, N, (2, N)."""
+        return np.asarray(self._forces[0])
+
+    def begin(self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None) -> None:
+        """Start new episodes in the lanes of a mask (N,): draw their world and put the pistons on the reference, in balance.
+
+        ``position`` (2,), m, starts the end effector there, at rest, instead. Raises ``ValueError`` for a reference that
+        leaves the workspace within ``duration`` s or a position outside it.
+        """
+        chosen = np.flatnonzero(lanes)
+        for lane in chosen:
+            world = {name: stream(seeds[lane], int(episodes[lane]), name) for name in STREAMS}
+            if self._ranges:
+                drawn = draw_parameters(self.parameters, self._ranges, world["parameters"])
+                self.plant.lane_parameters[:, lane] = parameter_column(drawn)
+            self.trajectory.begin(lane, world["reference"])
+            self.user_force.begin(lane, world["user_force"])
+            self.stiffness.begin(lane, world["stiffness"])
+            self.sensors.begin(lane, world["sensors"])
+        self.actuation.begin(lanes)
+        self.ticks[lanes] = 0
+        self.since_jump[lanes] = 0.0
+        self.impacts[:, lanes] = 0.0
+        self._check_reference(chosen, duration)
+        rows = self._sample_reference(np.zeros(len(lanes)))[:, chosen]
+        start, speed = rows[0:2], rows[2:4]
+        if position is not None:
+            start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
+        piston = inverse_geometry(start, self.parameters)
+        rates = np.linalg.solve(np.moveaxis(jacobian(piston, self.parameters), 2, 0), speed.T[..., None])[..., 0].T
+        own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
+        self.plant.state[:, chosen] = balanced_state(own, piston, rates, rows[10:12])
+        self._look()
+
+    def step(self, actions: Array) -> None:
+        """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
+        self.actuation.accept(actions)
+        impacts = np.zeros_like(self.impacts)
+        for _ in range(self._strides):
+            openings = self.actuation.openings(self)
+            self.plant.advance_unchecked(openings, self._forces, self._stride * self.period)
+            np.maximum(impacts, self.plant.impacts, out=impacts)
+            self.ticks += self._stride
+            forces, setpoints = self._forces, self.reference.rows
+            self._look()
+            _track_jumps(forces, self._forces, setpoints, self.reference.rows, self.period, self.since_jump)
+        self.impacts = impacts
+
+    def _look(self) -> None:
+        """Bring every attribute but ``since_jump`` and ``impacts`` to the present instant."""
+        plant = self.plant
+        self.time = self.ticks * self.period
+        motion = np.empty_like(self.motion)
+        end_effector_motion(plant.state, plant.lane_parameters, motion)
+        self.motion = motion
+        times = self.time + self.period * np.arange(self._stride)[:, None]
+        self._forces = checked("user_force.force(...)", self.user_force.force(times, motion[:2], motion[2:]), self._forces.shape, "N")
+        self.reference = Reference(self._sample_reference(self.time))
+        self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
+
+    def _sample_reference(self, time: Array) -> Array:
+        rows = np.empty((REFERENCES, time.shape[0]))
+        rows[:8] = self.trajectory.sample(time)
+        rows[8:] = self.stiffness.sample(time)
+        return rows
+
+    def _check_reference(self, chosen: NDArray[np.intp], duration: float) -> None:
+        lanes = self.ticks.shape[0]
+        for instant in np.linspace(0.0, duration, CHECKS):
+            time = np.full(lanes, instant)
+            motion = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")
+            setpoints = checked("stiffness.sample(time)", self.stiffness.sample(time), (6, lanes), "SI")
+            if not (setpoints[:4, chosen] > 0).all():
+                raise ValueError(f"stiffness.sample(time = {instant:g} s) = {setpoints[:4, chosen].min():g} N/m; allowed: more than 0")
+            try:
+                inverse_geometry(motion[:2, chosen], self.parameters)
+            except ValueError as error:
+                raise ValueError(f"reference at {instant:.3g} s: {error}") from error
+
+
+@kernel
+def _track_jumps(forces: Array, later: Array, setpoints: Array, new: Array, period: float, since: Array) -> None:
+    """Adds the held time to ``since`` (N,), starting anew at a jump of the force or of a closed-loop setpoint."""
+    samples = forces.shape[0]
+    for i in range(since.shape[0]):
+        for k in range(samples):
+            since[i] += period
+            for axis in range(2):
+                after = forces[k + 1, axis, i] if k + 1 < samples else later[0, axis, i]
+                if abs(after - forces[k, axis, i]) > JUMP_RATE * period:
+                    since[i] = 0.0
+        if setpoints[8, i] != new[8, i] or setpoints[9, i] != new[9, i]:
+            since[i] = 0.0

@@ -1,0 +1,80 @@
+"""Setpoints over time: closed-loop stiffness (steps, as a user may change it at any control period) and pneumatic
+stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import Array
+from birthsim_env.references import minimum_jerk
+from birthsim_env.seeding import Range, draw
+
+
+class StiffnessSchedule:
+    """What stiffness is asked for. A user's own schedule has the same three methods.
+
+    ``sample(time)`` gets the time of every lane, s, (N,), and returns (6, N): Kclx, Kcly (N/m), the pneumatic stiffness
+    setpoints of cylinders 1 and 2 (N/m) and their rates (N/(m s)).
+
+    Arguments, one entry per phase, numbers or ranges (low, high): ``times`` (s) at which the phases start, the first 0;
+    ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given; ``pneumatic1``, ``pneumatic2``
+    (N/m) for the cylinders. ``transition`` (s) of the pneumatic stiffness.
+    """
+
+    def __init__(
+        self,
+        times: Sequence[float] = (0.0,),
+        closed_loop: Sequence[Range] = (2000.0,),
+        pneumatic1: Sequence[Range] = (4600.0,),
+        pneumatic2: Sequence[Range] = (2300.0,),
+        closed_loop_y: Sequence[Range] | None = None,
+        transition: float = 0.5,
+    ) -> None:
+        columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
+        if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns):
+            raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
+        if any(later <= sooner for sooner, later in zip(times, times[1:], strict=False)):
+            raise ValueError(f"times = {times!r}; allowed: increasing (s)")
+        for setpoint in (number for column in columns for number in column):
+            if not np.min(setpoint) > 0:
+                raise ValueError(f"stiffness setpoint {setpoint!r}; allowed: more than 0 (N/m)")
+        self.times, self.transition = times, transition
+        self.closed_loop, self.closed_loop_y = closed_loop, closed_loop_y
+        self.pneumatic1, self.pneumatic2 = pneumatic1, pneumatic2
+
+    def prepare(self, num_envs: int) -> None:
+        """Make room for ``num_envs`` lanes."""
+        self._starts: Array = np.array(self.times, dtype=np.float64)
+        self._values: Array = np.zeros((len(self.times), 4, num_envs))
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+        for phase in range(len(self.times)):
+            x = draw(self.closed_loop[phase], rng)
+            y = x if self.closed_loop_y is None else draw(self.closed_loop_y[phase], rng)
+            self._values[phase, :, lane] = (x, y, draw(self.pneumatic1[phase], rng), draw(self.pneumatic2[phase], rng))
+
+    def sample(self, time: Array) -> Array:
+        """Setpoints (6, N) at ``time`` (N,), s."""
+        rows = np.empty((6, time.shape[0]))
+        _sample(time, self._starts, self._values, self.transition, rows)
+        return rows
+
+
+@kernel
+def _sample(time: Array, starts: Array, values: Array, transition: float, rows: Array) -> None:
+    for i in range(time.shape[0]):
+        phase = 0
+        # Half a microsecond of grace: a phase that starts on a control instant starts there, whatever the rounding.
+        while phase + 1 < starts.shape[0] and time[i] >= starts[phase + 1] - 5e-7:
+            phase += 1
+        rows[0, i], rows[1, i] = values[phase, 0, i], values[phase, 1, i]
+        u = (time[i] - starts[phase]) / transition
+        for k in range(2):
+            now = values[phase, 2 + k, i]
+            before = values[max(phase - 1, 0), 2 + k, i]
+            rows[2 + k, i] = before + (now - before) * minimum_jerk(u, 0)
+            rows[4 + k, i] = (now - before) * minimum_jerk(u, 1) / transition

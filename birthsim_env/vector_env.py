@@ -1,0 +1,101 @@
+"""The native vector environment: N lanes of one scenario in one kernel call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from birthsim_env.assembly import FRAMES_PER_SECOND, RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.episodes import Episodes
+from birthsim_env.info import vector_info
+from birthsim_env.lanes import Array
+from birthsim_env.signals import Measurement, Reference
+
+Observations = NDArray[np.float32]
+
+
+class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
+    """``num_envs`` lanes of a scenario, made by ``gymnasium.make_vec(id, num_envs=N)``.
+
+    Actions, observations, rewards, arguments and episode ends are those of ``BirthSIMEnv``, per lane; arrays carry the lane
+    first. A lane that ends starts anew within the same step (``AutoresetMode.SAME_STEP``): ``infos["final_obs"]`` and
+    ``infos["final_info"]`` hold what it ended with. ``reset(seed=s)`` seeds lane i with s + i (a list gives every lane its
+    own seed); lane i seeded s runs bit for bit as the single environment seeded s. ``max_episode_steps`` shortens episodes.
+    """
+
+    metadata: dict[str, Any] = {
+        "render_modes": list(RENDER_MODES),
+        "render_fps": FRAMES_PER_SECOND,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self, scenario: str, num_envs: int = 1, render_mode: str | None = None, max_episode_steps: int | None = None, **arguments: Any
+    ) -> None:
+        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
+        self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
+        setup = assemble(int(num_envs), scenario, **arguments)
+        self.num_envs = int(num_envs)
+        self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_names = setup.observation_names
+        self.simulation = setup.simulation
+        self._steps = min(setup.steps, max_episode_steps or setup.steps)
+        self._episodes = Episodes(setup)
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the sensors say now, over the lanes: the input of a controller."""
+        return self.simulation.measurement
+
+    @property
+    def reference(self) -> Reference:
+        """What is asked for now, over the lanes: the other input of a controller."""
+        return self.simulation.reference
+
+    def reset(  # type: ignore[override]
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start new episodes in all lanes. ``options["position"]`` (x, y), m, starts the end effector there, at rest."""
+        super().reset(seed=seed if isinstance(seed, int) else None)
+        self._episodes.seed(seed, self.np_random)
+        self._episodes.begin(np.ones(self.num_envs, dtype=np.bool_), options)
+        return self._episodes.observation(), vector_info(self._episodes.describe())
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """One policy step of all lanes; raises ``ValueError`` for actions that are not (num_envs, size) numbers in [-1, 1]."""
+        episodes = self._episodes
+        rewards, terms, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
+        truncated = (episodes.elapsed >= self._steps) & ~terminated
+        observation = episodes.observation()
+        infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms}
+        ended = terminated | truncated
+        if ended.any():
+            last, final = observation, infos
+            episodes.begin(ended)
+            observation = episodes.observation()
+            # The signals of this instant are those of the new episodes; the reward still belongs to the ended step.
+            infos = {**vector_info(episodes.describe()), **terms, "final_info": {**final, **{f"_{k}": ended for k in final}}}
+            infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
+            for lane in np.flatnonzero(ended):
+                infos["final_obs"][lane] = last[lane]
+            infos["_final_obs"] = infos["_final_info"] = ended
+        return observation, rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A frame of every lane (``rgb_array``), or lane 0 in a window (``human``)."""
+        if self.render_mode is None:
+            return None
+        return self._episodes.render(self.render_mode, self.num_envs if self.render_mode == "rgb_array" else 1)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        self._episodes.close()

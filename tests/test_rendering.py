@@ -1,0 +1,317 @@
+"""The pictures: where things are drawn, in which colour, for which rigs, with and without a window."""
+
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from birthsim_env.parameters import Parameters
+from birthsim_env.rendering import Renderer, Scene
+
+RIG = Parameters()
+NOWHERE = (math.nan, math.nan)
+# Targets are left out unless a test looks for them: they would lie over the end effector.
+SCENE = Scene(
+    time=1.0,
+    piston=(0.02, 0.05),
+    target=NOWHERE,
+    compliant_target=NOWHERE,
+    user_force=(0.0, 0.0),
+    pressures=(2e5, 3e5, 4e5, 5e5),
+    stiffness=(2000.0, 2000.0),
+    path=np.zeros((0, 2)),
+    title="test",
+)
+
+
+def changed(**values):
+    return dataclasses.replace(SCENE, **values)
+
+
+def linkage(piston, rig=RIG):
+    """End effector, joint and pivot of cylinder 1 by intersecting circles: shares no formula with the package."""
+    g = rig.geometry
+    pivot = complex(g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3))
+    r4, r2 = piston[0] + g.k1, piston[1] + g.k2
+    # Law of cosines: angle at O1 between the line to the pivot and cylinder 2, which lies clockwise of it.
+    angle = math.acos((g.d3**2 + g.d6**2 - r4**2) / (2 * g.d3 * g.d6))
+    direction = pivot / abs(pivot) * complex(math.cos(angle), -math.sin(angle))
+    return r2 * direction, g.d6 * direction, pivot
+
+
+def near(picture, colour, tolerance=8):
+    """Mask (height, width) of the pixels of one colour."""
+    return np.all(np.abs(picture.astype(int) - colour) <= tolerance, axis=2)
+
+
+def pixel(picture, renderer, point):
+    column, row = renderer.to_pixel((point.real, point.imag))
+    return picture[int(row), int(column)].astype(int)
+
+
+def luminance(colour):
+    return float(np.dot(colour, (0.299, 0.587, 0.114)))
+
+
+@pytest.mark.parametrize("size", [(640, 480), (320, 240), (1280, 960), (1000, 250), (321, 777)])
+def test_frame_has_the_asked_shape_and_shows_something(size):
+    picture = Renderer(RIG, *size).frame(SCENE)
+    assert picture.shape == (size[1], size[0], 3)
+    assert picture.dtype == np.uint8
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
+
+
+def test_frames_are_independent_arrays_and_depend_on_the_scene_only():
+    renderer = Renderer(RIG)
+    first = renderer.frame(SCENE)
+    kept = first.copy()
+    renderer.frame(changed(piston=(-0.05, 0.1), user_force=(80.0, -30.0), title="other"))
+    np.testing.assert_array_equal(first, kept)
+    first[:] = 0
+    np.testing.assert_array_equal(renderer.frame(SCENE), kept)
+
+
+def test_too_small_a_picture_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"319 x 240.*320 x 240"):
+        Renderer(RIG, 319, 240)
+
+
+def test_the_transform_is_to_scale_with_y_up():
+    renderer = Renderer(RIG)
+    (x0, y0), (x1, y1), (x2, y2) = (renderer.to_pixel(p) for p in ((0, 0), (0.1, 0), (0, 0.1)))
+    assert x1 - x0 == pytest.approx(y0 - y2)
+    assert x1 - x0 > 40, "the mechanism must fill the view"
+    assert (y1, x2) == (pytest.approx(y0), pytest.approx(x0))
+
+
+@pytest.mark.parametrize("piston", [(0.0, 0.0), (0.06, 0.12), (-0.07, -0.1), (-0.09, 0.18)])
+def test_the_end_effector_is_drawn_where_the_geometry_says(piston):
+    renderer = Renderer(RIG)
+    picture = renderer.frame(changed(piston=piston))
+    point, _, _ = linkage(piston)
+    column, row = renderer.to_pixel((point.real, point.imag))
+    around = near(picture, (14, 14, 18))[int(row) - 12 : int(row) + 13, int(column) - 12 : int(column) + 13]
+    rows, columns = np.nonzero(around)
+    assert len(rows) >= 9
+    assert np.mean(columns) + int(column) - 12 + 0.5 == pytest.approx(column, abs=0.8)
+    assert np.mean(rows) + int(row) - 12 + 0.5 == pytest.approx(row, abs=0.8)
+
+
+def test_target_and_compliant_target_are_drawn_at_their_places():
+    renderer = Renderer(RIG)
+    # The magnifier's frame surrounds the compliant target, so that one stands alone.
+    picture = renderer.frame(changed(target=(0.45, -0.12), compliant_target=(0.55, -0.15)))
+    assert near(picture, (255, 150, 0))[tuple(int(v) for v in renderer.to_pixel((0.55, -0.15))[::-1])]
+    column, row = renderer.to_pixel((0.45, -0.12))
+    ring = near(picture, (0, 112, 128), 40)[int(row) - 12 : int(row) + 13, int(column) - 12 : int(column) + 13]
+    assert ring.any() and not ring[12, 12], "a ring is hollow"
+
+
+def test_a_millimetre_of_error_is_seen_in_the_magnifier():
+    renderer = Renderer(RIG)
+    point, _, _ = linkage(SCENE.piston)
+    places = []
+    for error in (0.0, 0.001):
+        target = (point.real - error, point.imag)
+        picture = renderer.frame(changed(target=target, compliant_target=target))
+        side = near(picture, (14, 14, 18))[60:220, 475:632]
+        places.append(np.mean(np.nonzero(side)[1]))
+    assert places[1] - places[0] == pytest.approx(157 / 20, abs=1.0)
+
+
+@pytest.mark.parametrize("chamber", range(4))
+def test_pressure_darkens_its_own_chamber_and_no_other(chamber):
+    renderer = Renderer(RIG)
+    tip, joint, pivot = linkage((0.0, 0.0))
+    along1, along2 = (joint - pivot) / abs(joint - pivot), tip / abs(tip)
+    # A quarter of the stroke to either side of the piston, off the axis where the rod runs.
+    g, half1, half2 = RIG.geometry, RIG.cylinder1.stroke / 2, RIG.cylinder2.stroke / 2
+    front1, front2 = g.k1 - half1 - 0.065, g.k2 - half2 - 0.07
+    points = [
+        pivot + along1 * (front1 - 1.5 * half1 + 1j * 0.013),
+        pivot + along1 * (front1 - 0.5 * half1 + 1j * 0.013),
+        along2 * (front2 - 1.5 * half2 + 1j * 0.013),
+        along2 * (front2 - 0.5 * half2 + 1j * 0.013),
+    ]
+    shades = []
+    for high in (False, True):
+        pressures = [1.5e5] * 4
+        pressures[chamber] = 6.5e5 if high else 1.5e5
+        picture = renderer.frame(changed(piston=(0.0, 0.0), pressures=tuple(pressures)))
+        shades.append([luminance(pixel(picture, renderer, point)) for point in points])
+    change = np.subtract(*shades)
+    assert change[chamber] > 80
+    assert np.abs(np.delete(change, chamber)).max() < 2
+
+
+def test_the_piston_moves_in_the_barrel_by_the_stroke():
+    renderer = Renderer(RIG)
+    places = []
+    for y2 in (-0.1, 0.1):
+        picture = renderer.frame(changed(piston=(-0.0001, y2), pressures=(1.1e5,) * 4))
+        tip, _, _ = linkage((-0.0001, y2))
+        along = tip / abs(tip)
+        # Along the bore beside the rod, the dark piston is what differs from the light chambers.
+        steps = np.arange(-0.14, 0.22, 0.001)
+        dark = [s for s in steps if luminance(pixel(picture, renderer, along * (s + 0.013j))) < 90]
+        places.append(np.median(dark))
+    assert places[1] - places[0] == pytest.approx(0.2, abs=0.006)
+
+
+OTHER_RIGS = [
+    {"cylinder1.stroke": 0.12, "cylinder2.stroke": 0.6, "geometry.k2": 0.62},
+    {"cylinder1.stroke": 0.16, "cylinder2.stroke": 0.1, "geometry.k2": 0.4, "geometry.gamma3": 2.2},
+    {"geometry.gamma3": -1.0, "geometry.d6": 0.3},
+    {"cylinder2.piston_diameter": 0.1, "cylinder2.rod_diameter": 0.05},
+]
+
+
+@pytest.mark.parametrize("changes", OTHER_RIGS)
+@pytest.mark.parametrize("size", [(640, 480), (320, 240)])
+def test_other_rigs_stay_in_the_picture_and_fill_it(changes, size):
+    rig = RIG.replace(changes)
+    renderer = Renderer(rig, *size)
+    half1, half2 = rig.cylinder1.stroke / 2, rig.cylinder2.stroke / 2
+    places = []
+    for piston in ((a, b) for a in (-half1, half1) for b in (-half2, half2)):
+        tip, joint, pivot = linkage(piston, rig)
+        places += [renderer.to_pixel((z.real, z.imag)) for z in (tip, joint, pivot, 0j)]
+        picture = renderer.frame(changed(piston=piston, pressures=(1.1e5,) * 4, title=""))
+        column, row = renderer.to_pixel((tip.real, tip.imag))
+        assert near(picture, (14, 14, 18))[int(row), int(column)]
+        # The view's outermost pixels stay paper: nothing is cut off.
+        assert near(picture[:, 0:2], (250, 251, 252), 12)[-size[1] // 2 :].all()
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    assert low.min() >= 0 and high[0] <= 0.74 * size[0] and high[1] <= size[1]
+    assert max((high[0] - low[0]) / size[0], (high[1] - low[1]) / size[1]) > 0.4
+
+
+def arrow_pixels(force, piston=(0.0, 0.0)):
+    renderer = Renderer(RIG)
+    picture = renderer.frame(changed(user_force=force, piston=piston, path=np.zeros((0, 2))))
+    mask = near(picture, (196, 16, 72), 4)
+    mask[:, 468:] = False  # the legend's own arrow
+    return mask
+
+
+def test_the_arrow_points_along_the_force_and_grows_with_it_up_to_a_limit():
+    assert not arrow_pixels((0.0, 0.0)).any()
+    none_to_strong = [np.count_nonzero(arrow_pixels((0.0, fy))) for fy in (10.0, 60.0, 400.0, 1e9)]
+    assert none_to_strong[0] < none_to_strong[1] < none_to_strong[2]
+    assert none_to_strong[3] < 1.5 * none_to_strong[2]
+    row = Renderer(RIG).to_pixel((0.0, linkage((0.0, 0.0))[0].imag))[1]
+    for fx, fy, axis, sign in ((0, 60, 0, -1), (0, -60, 0, 1), (60, 0, 1, 1), (-60, 0, 1, -1)):
+        counts = np.count_nonzero(arrow_pixels((float(fx), float(fy))), axis=1 - axis)
+        # The longest run is the arrow, the others are the letters of its label. An arrow is widest near its tip.
+        filled = np.flatnonzero(counts)
+        run = max(np.split(filled, np.flatnonzero(np.diff(filled) > 1) + 1), key=len)
+        assert sign * (run[np.argmax(counts[run])] - run.mean()) > 5
+        if axis == 0:
+            assert sign * (run.mean() - row) > 0, "a force across the cylinder is drawn as a pull"
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"piston": (math.nan, 0.0)},
+        {"piston": (0.0, math.nan)},
+        {"piston": (5.0, 0.0)},
+        {"piston": (0.0, 1e30)},
+        {"piston": (0.0, 0.9), "user_force": (30.0, 10.0)},
+        {"target": (math.inf, 0.0), "compliant_target": (1e300, -1e300)},
+        {"user_force": (math.nan, 1.0)},
+        {"user_force": (math.inf, -math.inf)},
+        {"user_force": (1e300, 1e300)},
+        {"pressures": (math.nan, -1e9, 1e12, math.inf)},
+        {"stiffness": (math.nan, math.inf), "time": math.nan},
+        {"path": np.array([[0.4, 0.0], [math.nan, 0.1], [0.5, 0.0], [0.6, 0.1], [1e300, 0.0]])},
+        {"title": "a\0b\nc " * 60},
+        {"title": ""},
+    ],
+)
+def test_nothing_strange_raises(values):
+    assert Renderer(RIG, 320, 240).frame(changed(**values)).any()
+
+
+def test_a_path_is_broken_at_gaps_and_drawn_elsewhere():
+    renderer = Renderer(RIG)
+    path = np.array([[0.45, -0.1], [0.55, -0.1], [math.nan, 0.0], [0.45, -0.2], [0.55, -0.2]])
+    picture = renderer.frame(changed(path=path))
+
+    def darker(point):
+        column, row = (int(v) for v in renderer.to_pixel(point))
+        return picture[row - 2 : row + 3, column - 2 : column + 3].min() < 205
+
+    assert darker((0.5, -0.1)) and darker((0.5, -0.2)) and not darker((0.5, -0.15))
+
+
+SCRIPT = """
+import sys
+import numpy as np
+import birthsim_env
+from birthsim_env.parameters import Parameters
+import birthsim_env.rendering as rendering
+assert "pygame" not in sys.modules, "importing must not load pygame"
+scene = rendering.Scene(0.0, (0.0, 0.0), (0.5, 0.0), (0.5, 0.0), (0.0, 0.0), (2e5,) * 4, (1.0, 1.0), np.zeros((0, 2)))
+rendering.Renderer(Parameters()).frame(scene)
+import pygame
+assert not pygame.display.get_init() and not pygame.mixer.get_init()
+print("done")
+"""
+
+
+def test_frames_need_no_display_and_pygame_is_loaded_late():
+    hidden = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")}
+    result = subprocess.run([sys.executable, "-c", SCRIPT], env=hidden, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == "done\n"
+    assert "ALSA" not in result.stderr
+
+
+@pytest.fixture
+def window(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    renderer = Renderer(RIG, 320, 240)
+    yield renderer
+    renderer.close()
+
+
+def test_the_window_shows_the_frame_keeps_pace_and_closes(window):
+    import pygame
+
+    window.show(SCENE, 50.0)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)
+    np.testing.assert_array_equal(shown, window.frame(SCENE))
+    begin = time.perf_counter()
+    for _ in range(10):
+        window.show(SCENE, 50.0)
+    assert time.perf_counter() - begin > 0.17
+    window.close()
+    assert not pygame.display.get_init()
+    window.close()
+    window.show(SCENE, 1000.0)
+    assert pygame.display.get_init()
+
+
+def test_a_window_closed_by_the_user_stays_closed_until_close(window):
+    import pygame
+
+    window.show(SCENE, 1000.0)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    window.show(SCENE, 1000.0)
+    window.show(SCENE, 1000.0)
+    assert not pygame.display.get_init()
+    window.close()
+    window.show(SCENE, 1000.0)
+    assert pygame.display.get_init()
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf])
+def test_an_impossible_pace_is_refused(window, rate):
+    with pytest.raises(ValueError, match="frames_per_second"):
+        window.show(SCENE, rate)

@@ -1,0 +1,171 @@
+"""Servovalves: ISO 6358 flows, the spool's lag and the exact inverses of the characteristic, through the plant itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from birthsim_env import valves
+from birthsim_env.lanes import PRESSURES, SPOOLS, TEMPERATURES, Array
+from birthsim_env.parameters import Parameters
+from birthsim_env.plant import Plant
+
+C, B, CL = 3.9e-9, 0.30, 0.005 * 3.9e-9
+RHO0, T0, SUPPLY, ATMOSPHERE = 1.185, 293.15, 7.0e5, 1.013e5
+"""Design section 4: sonic conductance, critical ratio, leakage; ISO 6358 reference state; absolute pressures."""
+
+
+def iso_6358(conductance: float, p_up: float, t_up: float, p_down: float) -> float:
+    """Mass flow, kg/s, from the higher pressure to the lower, written from ISO 6358-1:2013 with its laminar end."""
+    ratio = p_down / p_up
+    if ratio <= B:
+        psi = 1.0
+    elif ratio <= 0.99:
+        psi = math.sqrt(1 - ((ratio - B) / (1 - B)) ** 2)
+    else:
+        psi = 100 * (1 - ratio) * math.sqrt(1 - ((0.99 - B) / (1 - B)) ** 2)
+    return conductance * RHO0 * p_up * math.sqrt(T0 / t_up) * psi
+
+
+def both_ways(conductance: float, pa: float, ta: float, pb: float, tb: float) -> float:
+    """Mass flow from a to b, negative when it runs the other way with upstream and downstream exchanged."""
+    return iso_6358(conductance, pa, ta, pb) if pa > pb else -iso_6358(conductance, pb, tb, pa)
+
+
+def plant_flows(pressure: Array, temperature: Array, spool: Array, changes: dict[str, float] | None = None) -> Array:
+    """``Plant.mass_flows`` with all four chambers of each lane in one condition, as (2, N): supplied and exhausted."""
+    lanes = np.size(pressure)
+    plant = Plant(Parameters().replace(changes or {}), lanes)
+    plant.state[list(PRESSURES)], plant.state[list(TEMPERATURES)], plant.state[list(SPOOLS)] = pressure, temperature, spool
+    flows = plant.mass_flows().reshape(2, 4, lanes)
+    assert np.all(flows == flows[:, :1]), "the four chambers have equal valves"
+    return flows[:, 0]
+
+
+def test_flows_of_the_plant_are_iso_6358_everywhere() -> None:
+    rng = np.random.default_rng(0)
+    pressure, temperature = rng.uniform(0.3e5, 12e5, 2000), rng.uniform(200, 450, 2000)
+    spool = rng.uniform(-1, 1, 2000)
+    spool[:200] = 0
+    supplied, exhausted = plant_flows(pressure, temperature, spool)
+    for p, t, s, got_in, got_out in zip(pressure, temperature, spool, supplied, exhausted, strict=True):
+        assert got_in == pytest.approx(both_ways(C * max(s, 0) + CL, SUPPLY, T0, p, t), rel=1e-12)
+        assert got_out == pytest.approx(both_ways(C * max(-s, 0) + CL, p, t, ATMOSPHERE, T0), rel=1e-12)
+    assert (supplied < 0).any() and (exhausted < 0).any(), "both reverse flows must have occurred"
+
+
+def test_flow_function_plateau_knee_and_ends() -> None:
+    psi = valves.flow_function
+    assert all(psi(ratio, B) == 1 for ratio in (0.0, 0.1, 0.29, B))
+    assert psi(1.0, B) == 0
+    for knee in (B, 0.99):
+        assert psi(knee + 1e-9, B) == pytest.approx(psi(knee - 1e-9, B), abs=1e-7)
+    assert psi(0.995, B) == pytest.approx(psi(0.99, B) / 2, rel=1e-12), "linear to zero"
+    ratios = np.linspace(0, 1, 1001)
+    assert np.all(np.diff([psi(r, B) for r in ratios]) <= 0)
+    # The ellipse of ISO 6358: half way from b to 1 the flow is sqrt(3)/2.
+    assert psi((1 + B) / 2, B) == pytest.approx(math.sqrt(3) / 2, rel=1e-14)
+    assert psi(0.5, 0.0) == pytest.approx(math.sqrt(3) / 2, rel=1e-14)
+
+
+def test_nominal_flow_is_100_litres_per_minute() -> None:
+    """Nominal flow as data sheets state it: 6 bar gauge upstream, 5 bar gauge downstream, reference state ANR."""
+    changes = {"air.supply_pressure": 7.013e5, "valves.leakage_ratio": 0.0}
+    supplied, exhausted = plant_flows(np.array([6.013e5]), np.array([T0]), np.array([1.0]), changes)
+    assert supplied[0] / RHO0 * 60000 == pytest.approx(100, rel=0.1)
+    assert exhausted[0] == 0
+
+
+def test_flow_is_choked_below_b_and_reverses_with_roles_exchanged() -> None:
+    low = plant_flows(np.array([0.2e5, 1.0e5, 0.299 * SUPPLY]), np.full(3, T0), np.ones(3))[0]
+    np.testing.assert_allclose(low, 1.005 * C * RHO0 * SUPPLY, rtol=1e-12)
+    flow, factor = valves.orifice_flow, valves.density_factor
+    hot, cold = factor(350.0, RHO0, T0), factor(250.0, RHO0, T0)
+    there, back = flow(C, 5e5, hot, 3e5, cold, B), flow(C, 3e5, cold, 5e5, hot, B)
+    assert there > 0 and back == -there
+    assert there == pytest.approx(iso_6358(C, 5e5, 350.0, 3e5), rel=1e-12)
+    assert flow(C, 4e5, hot, 4e5, cold, B) == 0
+
+
+def test_closed_spool_leaks_half_a_percent_both_ways() -> None:
+    supplied, exhausted = plant_flows(np.array([2.0e5, 4.0e5]), np.full(2, T0), np.zeros(2))
+    assert supplied[0] == pytest.approx(0.005 * C * RHO0 * SUPPLY, rel=1e-12)
+    assert exhausted[1] == pytest.approx(0.005 * C * RHO0 * 4.0e5, rel=1e-12)
+    tight = plant_flows(np.array([2.0e5, 4.0e5]), np.full(2, T0), np.zeros(2), {"valves.leakage_ratio": 0.0})
+    assert np.all(tight == 0)
+
+
+@pytest.mark.parametrize("tau", [0.0015, 0.004, 0.008])
+def test_spool_is_a_first_order_lag(tau: float) -> None:
+    plant = Plant(Parameters().replace({"valves.time_constant": tau}))
+    start, command = np.array([0.0, 0.2, -1.0, 1.0]), np.array([1.0, -0.7, 0.3, 1.0])
+    plant.state[list(SPOOLS), 0] = start
+    for k in range(1, 6):
+        plant.advance(command[:, None], np.zeros((2, 1)), tau)
+        expected = command + (start - command) * math.exp(-k)
+        np.testing.assert_allclose(plant.state[list(SPOOLS), 0], expected, rtol=0, atol=2e-5 if tau < 0.004 else 1e-6)
+    assert plant.state[SPOOLS[3], 0] == 1, "already there"
+
+
+def per_conductance(pressure: float, temperature: float) -> tuple[float, float]:
+    """Flows through a supply and an exhaust orifice of conductance 1 (fill, drain)."""
+    return both_ways(1.0, SUPPLY, T0, pressure, temperature), both_ways(1.0, pressure, temperature, ATMOSPHERE, T0)
+
+
+inside = st.floats(1.02 * ATMOSPHERE, 0.98 * SUPPLY)
+warmth = st.floats(230, 400)
+
+
+@given(pressure=inside, temperature=warmth, spool=st.floats(-1, 1))
+def test_opening_for_flow_inverts_the_plants_net_flow(pressure: float, temperature: float, spool: float) -> None:
+    supplied, exhausted = plant_flows(np.array([pressure]), np.array([temperature]), np.array([spool]))
+    opening = valves.opening_for_flow(supplied[0] - exhausted[0], *per_conductance(pressure, temperature), C, CL)
+    assert opening == pytest.approx(spool, abs=1e-12)
+
+
+@given(pressure=inside, temperature=warmth, wish=st.floats(-2, 2))
+def test_opening_for_flow_saturates_beyond_full_opening_only(pressure: float, temperature: float, wish: float) -> None:
+    full = np.repeat(pressure, 2), np.repeat(temperature, 2), np.array([-1.0, 1.0])
+    supplied, exhausted = plant_flows(*full)
+    least, most = supplied - exhausted
+    wanted = wish * max(-least, most)
+    opening = valves.opening_for_flow(wanted, *per_conductance(pressure, temperature), C, CL)
+    assert -1 <= opening <= 1
+    if wanted > most:
+        assert opening == 1
+    elif wanted < least:
+        assert opening == -1
+    else:
+        got_in, got_out = plant_flows(np.array([pressure]), np.array([temperature]), np.array([opening]))
+        assert got_in[0] - got_out[0] == pytest.approx(wanted, abs=1e-12 * max(-least, most))
+
+
+def test_opening_is_bounded_where_there_is_no_driving_pressure() -> None:
+    for pressure, wanted, expected in ((SUPPLY, 1e-4, 1.0), (ATMOSPHERE, -1e-4, -1.0)):
+        assert valves.opening_for_flow(wanted, *per_conductance(pressure, T0), C, CL) == expected
+    fill, drain = per_conductance(3e5, T0)
+    assert valves.opening_for_flow(CL * (fill - drain), fill, drain, C, CL) == 0, "what leaks anyway needs no opening"
+
+
+shares = st.floats(0.5, 8.0)
+
+
+@given(pp=inside, pn=inside, tp=warmth, tn=warmth, share_p=shares, share_n=shares, spool=st.floats(-1, 1))
+def test_opening_for_active_flow_inverts_one_valve_per_cylinder(
+    pp: float, pn: float, tp: float, tn: float, share_p: float, share_n: float, spool: float
+) -> None:
+    supplied, exhausted = plant_flows(np.array([pp, pn]), np.array([tp, tn]), np.array([spool, -spool]))
+    flow_p, flow_n = supplied - exhausted
+    active = share_p * flow_p - share_n * flow_n
+    at = (*per_conductance(pp, tp), *per_conductance(pn, tn), share_p, share_n, C, CL)
+    assert valves.opening_for_active_flow(active, *at) == pytest.approx(spool, abs=1e-12)
+    most, least = (
+        share_p * (q[0][0] - q[1][0]) - share_n * (q[0][1] - q[1][1])
+        for q in (plant_flows(np.array([pp, pn]), np.array([tp, tn]), np.array([s, -s])) for s in (1.0, -1.0))
+    )
+    assert valves.opening_for_active_flow(most + 1e-3, *at) == 1
+    assert valves.opening_for_active_flow(least - 1e-3, *at) == -1
