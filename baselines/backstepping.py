@@ -17,8 +17,8 @@ from birthsim_env.signals import Mask, Measurement, Reference
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
 
-SIGN_WIDTH = 0.01
-"""m/s; assumed: over this speed the law's sign(v) goes from rest to sliding."""
+SIGN_WIDTH = 0.002
+"""m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
 
 
 @kernel
@@ -79,9 +79,7 @@ class BacksteppingController:
             _measured_joints(measurement.position, measurement.velocity, self._p, joints)
         believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
         openings = np.empty((4, lanes))
-        backstepping_law.command(
-            joints, measurement.pressures, reference.rows, believed, self._p, *self._options, openings
-        )
+        backstepping_law.command(joints, measurement.pressures, reference.rows, believed, self._p, *self._options, openings)
         return openings
 
     def _command_one(self, measurement: Measurement, reference: Reference, believed_force: Array | None) -> Array:

@@ -19,13 +19,11 @@ import numpy as np
 from baselines.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.gains import equal_gain
 from birthsim_env import control_model, geometry, mechanics, valves
+from birthsim_env import lanes as at
 from birthsim_env.compilation import BLOCK, helper, kernel
 from birthsim_env.dynamics import load, store
 from birthsim_env.inverse_kinematics import piston_reference
-from birthsim_env.lanes import (  # fmt: skip
-    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, CONDUCTANCE, COS_GAMMA3, CRITICAL, D_PRODUCT, D_SQUARES, FC1, FC2, FV1, FV2,
-    GAS, GRAVITY, HALF_L1, HALF_L2, INDEX, K1, K2, LEAKAGE, MASS, RHO0, SIN_GAMMA3, SUPPLY, T0, TEMPERATURE, Array,
-)
+from birthsim_env.lanes import Array
 from birthsim_env.signals import REFERENCES
 
 
@@ -70,7 +68,7 @@ def valve_openings(
     length_p: float, length_n: float, v: float, p: Array,
 ) -> None:  # fmt: skip
     """Openings of one cylinder's two valves for the wanted dF/dt and dK/dt: (10), inverse A-T, inverse characteristic."""
-    index, gas_t = p[INDEX], p[GAS] * p[TEMPERATURE]
+    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
     force = pp * ap - pn * an
     stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
     active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
@@ -80,13 +78,13 @@ def valve_openings(
     flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
     flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
     # The controller measures no temperatures: all air counts as ambient.
-    d = valves.density_factor(p[TEMPERATURE], p[RHO0], p[T0])
-    fill_p = valves.orifice_flow(1.0, p[SUPPLY], d, pp, d, p[CRITICAL])
-    drain_p = valves.orifice_flow(1.0, pp, d, p[ATMOSPHERE], d, p[CRITICAL])
-    fill_n = valves.orifice_flow(1.0, p[SUPPLY], d, pn, d, p[CRITICAL])
-    drain_n = valves.orifice_flow(1.0, pn, d, p[ATMOSPHERE], d, p[CRITICAL])
-    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[CONDUCTANCE], p[LEAKAGE])
-    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[CONDUCTANCE], p[LEAKAGE])
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
+    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
+    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
 
 
 @helper
@@ -102,22 +100,22 @@ def law(
     for i in range(n):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
-        m, gravity, atmosphere = p[MASS], p[GRAVITY], p[ATMOSPHERE]
-        r4, r2 = y1 + p[K1], y2 + p[K2]
-        w = r4 * r4 - p[D_SQUARES]
-        s2 = geometry.s_squared(w, p[D_PRODUCT])
+        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        r4, r2 = y1 + p[at.K1], y2 + p[at.K2]
+        w = r4 * r4 - p[at.D_SQUARES]
+        s2 = geometry.s_squared(w, p[at.D_PRODUCT])
         root = math.sqrt(s2)
         kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
-        cosine = geometry.cos_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
+        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
         pole = 2.0 * r4 * w / s2
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + pole * v1
 
-        drag1 = p[FC1] * smooth_sign(v1, width) + p[FV1] * v1
-        drag2 = p[FC2] * smooth_sign(v2, width) + p[FV2] * v2
-        load1 = mechanics.piston_force(pp1, pn1, p[AREA_P1], p[AREA_N1], atmosphere) - drag1 + believed[0, i]
-        load2 = mechanics.piston_force(pp2, pn2, p[AREA_P2], p[AREA_N2], atmosphere) - drag2 + believed[1, i]
+        drag1 = p[at.FC1] * smooth_sign(v1, width) + p[at.FV1] * v1
+        drag2 = p[at.FC2] * smooth_sign(v2, width) + p[at.FV2] * v2
+        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - drag1 + believed[0, i]
+        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - drag2 + believed[1, i]
         a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity)
         neglected = gravity * cosine + r2 * turn * turn
         a2 = load2 / m + compensate * neglected
@@ -126,8 +124,8 @@ def law(
         mass1 = m * kappa * kappa
         k1 = joint_stiffness1(target[8, i], target[9, i], kappa, sine, cosine)
         k2 = joint_stiffness2(target[8, i], target[9, i], sine, cosine)
-        c1 = equal_gain(k1, mass1, p[FV1])
-        c2 = equal_gain(k2, m, p[FV2])
+        c1 = equal_gain(k1, mass1, p[at.FV1])
+        c2 = equal_gain(k2, m, p[at.FV2])
 
         accel1 = outer_acceleration(y1, v1, wanted[0, i], wanted[2, i], wanted[4, i], c1)
         jerk1 = outer_jerk(v1, a1, wanted[2, i], wanted[4, i], wanted[6, i], c1)
@@ -136,11 +134,11 @@ def law(
         pole_rate = v1 * ((2.0 * w + 4.0 * r4 * r4) / s2 + 2.0 * pole * pole)
         growth_rate = stretch + a1 / r4 - v1 * v1 / (r4 * r4) + pole * a1 + pole_rate * v1
         transport_rate = a1 * (growth + v2 / r2) + v1 * (growth_rate + stretch)
-        net1 = pp1 * p[AREA_P1] - pn1 * p[AREA_N1]
+        net1 = pp1 * p[at.AREA_P1] - pn1 * p[at.AREA_N1]
         star1 = mass1 * (accel1 + transport) + (net1 - load1) - m * kappa * gravity * sine
         star1_rate = (
             mass1 * (2.0 * growth * (accel1 + transport) + jerk1 + transport_rate)
-            + (p[FC1] * smooth_sign_slope(v1, width) + p[FV1]) * a1
+            + (p[at.FC1] * smooth_sign_slope(v1, width) + p[at.FV1]) * a1
             - m * gravity * kappa * (growth * sine + cosine * turn)
         )
         rate1 = force_rate_command(star1_rate, net1, star1, y1, v1, wanted[0, i], wanted[2, i], c1, mass1)
@@ -148,21 +146,21 @@ def law(
         accel2 = outer_acceleration(y2, v2, wanted[1, i], wanted[3, i], wanted[5, i], c2)
         jerk2 = outer_jerk(v2, a2, wanted[3, i], wanted[5, i], wanted[7, i], c2)
         neglected_rate = -gravity * sine * turn + v2 * turn * turn + 2.0 * r2 * turn * turn_rate
-        net2 = pp2 * p[AREA_P2] - pn2 * p[AREA_N2]
+        net2 = pp2 * p[at.AREA_P2] - pn2 * p[at.AREA_N2]
         star2 = m * (accel2 - compensate * neglected) + (net2 - load2)
-        star2_rate = m * (jerk2 - compensate * neglected_rate) + (p[FC2] * smooth_sign_slope(v2, width) + p[FV2]) * a2
+        star2_rate = m * (jerk2 - compensate * neglected_rate) + (p[at.FC2] * smooth_sign_slope(v2, width) + p[at.FV2]) * a2
         rate2 = force_rate_command(star2_rate, net2, star2, y2, v2, wanted[1, i], wanted[3, i], c2, m)
 
-        lp1, ln1, lp2, ln2 = p[HALF_L1] + y1, p[HALF_L1] - y1, p[HALF_L2] + y2, p[HALF_L2] - y2
+        lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
         # Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning.
         lp1, ln1 = max(lp1, 0.002), max(ln1, 0.002)
         lp2, ln2 = max(lp2, 0.002), max(ln2, 0.002)
-        kp1 = control_model.pneumatic_stiffness(pp1, pn1, p[AREA_P1], p[AREA_N1], lp1, ln1, p[INDEX])
-        kp2 = control_model.pneumatic_stiffness(pp2, pn2, p[AREA_P2], p[AREA_N2], lp2, ln2, p[INDEX])
+        kp1 = control_model.pneumatic_stiffness(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, p[at.INDEX])
+        kp2 = control_model.pneumatic_stiffness(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, p[at.INDEX])
         kp1_rate = target[12, i] - c4 * (kp1 - target[10, i])
         kp2_rate = target[13, i] - c4 * (kp2 - target[11, i])
-        valve_openings(u, i, 0, rate1, kp1_rate, pp1, pn1, p[AREA_P1], p[AREA_N1], lp1, ln1, v1, p)
-        valve_openings(u, i, 2, rate2, kp2_rate, pp2, pn2, p[AREA_P2], p[AREA_N2], lp2, ln2, v2, p)
+        valve_openings(u, i, 0, rate1, kp1_rate, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
+        valve_openings(u, i, 2, rate2, kp2_rate, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
 
 
 @kernel

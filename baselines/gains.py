@@ -12,7 +12,7 @@ import math
 from birthsim_env.compilation import helper
 
 ITERATIONS = 8
-"""Newton from above on a convex function: quadratic, at rounding error after six."""
+"""Newton from above on a convex function: quadratic, at rounding error after six unless beside the least stiffness."""
 
 
 @helper
@@ -23,8 +23,10 @@ def equal_gain(stiffness: float, apparent_mass: float, viscous: float) -> float:
     """
     linear = 2.0 * apparent_mass - 3.0 * stiffness
     constant = stiffness * viscous / apparent_mass
-    # The cubic's minimum lies at ``lowest``; staying above it keeps Newton's slope positive.
-    lowest = 1.001 * math.sqrt(max(-linear / (3.0 * apparent_mass), 1e-6))
+    # Newton's slope is positive above the cubic's minimum. The largest root of a feasible setpoint lies above Fv/(2 m_e),
+    # which renders the least stiffness within 1 % (for Fv/m_e > 7 1/s); below Fv/(3 m_e) the piston would not hold at all.
+    minimum = 1.001 * math.sqrt(max(-linear / (3.0 * apparent_mass), 1e-6))
+    lowest = max(minimum, 0.5 * viscous / apparent_mass)
     c = math.sqrt(3.0 * stiffness / apparent_mass)
     for _ in range(ITERATIONS):
         value = (apparent_mass * c * c + linear) * c + constant

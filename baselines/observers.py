@@ -13,12 +13,10 @@ import math
 import numpy as np
 
 from birthsim_env import geometry, mechanics
+from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
-from birthsim_env.lanes import (  # fmt: skip
-    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, COS_GAMMA3, D_PRODUCT, D_SQUARES, FV1, FV2, GRAVITY, HALF_L1, HALF_L2, K1, K2,
-    MASS, SIN_GAMMA3, Array,
-)
+from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.signals import Mask, Measurement
 
@@ -50,19 +48,25 @@ def _update(
                     history[k, cylinder, i] = joints[cylinder, 0]
             continue
         y1, y2, v1, v2 = estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i]
-        r4, r2 = y1 + p[K1], y2 + p[K2]
-        w = r4 * r4 - p[D_SQUARES]
-        s2 = geometry.s_squared(w, p[D_PRODUCT])
+        r4, r2 = y1 + p[at.K1], y2 + p[at.K2]
+        w = r4 * r4 - p[at.D_SQUARES]
+        s2 = geometry.s_squared(w, p[at.D_PRODUCT])
         root = math.sqrt(s2)
         kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
-        cosine = geometry.cos_theta1(w, root, p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
-        load1 = mechanics.piston_force(pressures[0, i], pressures[1, i], p[AREA_P1], p[AREA_N1], p[ATMOSPHERE]) - p[FV1] * v1
-        load2 = mechanics.piston_force(pressures[2, i], pressures[3, i], p[AREA_P2], p[AREA_N2], p[ATMOSPHERE]) - p[FV2] * v2
-        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[MASS], p[GRAVITY]) + estimate[4, i]
-        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[MASS], p[GRAVITY]) + estimate[5, i]
-        estimate[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[HALF_L1]), p[HALF_L1])
-        estimate[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[HALF_L2]), p[HALF_L2])
+        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        load1 = (
+            mechanics.piston_force(pressures[0, i], pressures[1, i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
+            - p[at.FV1] * v1
+        )
+        load2 = (
+            mechanics.piston_force(pressures[2, i], pressures[3, i], p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
+            - p[at.FV2] * v2
+        )
+        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS], p[at.GRAVITY]) + estimate[4, i]
+        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.MASS], p[at.GRAVITY]) + estimate[5, i]
+        estimate[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
+        estimate[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
         estimate[2, i] = v1 + period * a1
         estimate[3, i] = v2 + period * a2
         history[slot, 0, i] = estimate[0, i]

@@ -6,16 +6,15 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from birthsim_env import lanes as at
 from birthsim_env import valves
 from birthsim_env.compilation import kernel
-from birthsim_env.lanes import (  # fmt: skip
-    ATMOSPHERE, CONDUCTANCE, CRITICAL, HALF_L1, HALF_L2, LEAKAGE, PN1, PN2, PP1, PP2, RHO0, SUPPLY, T0, TEMPERATURE, TN1, TN2, TP1,
-    TP2, Y1, Y2, Array,
-)
+from birthsim_env.lanes import Array
 from birthsim_env.signals import Mask
 
 if TYPE_CHECKING:
@@ -67,29 +66,29 @@ class ValveActuation:
 @kernel
 def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
     for i in range(state.shape[1]):
-        source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
-        full = p[CONDUCTANCE, i] * p[SUPPLY, i] * source
+        source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+        full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * source
         for cylinder in range(2):
-            pp, tp, pn, tn = (PP1, TP1, PN1, TN1) if cylinder == 0 else (PP2, TP2, PN2, TN2)
-            dp = valves.density_factor(state[tp, i], p[RHO0, i], p[T0, i])
-            dn = valves.density_factor(state[tn, i], p[RHO0, i], p[T0, i])
-            fill_p = valves.orifice_flow(1.0, p[SUPPLY, i], source, state[pp, i], dp, p[CRITICAL, i])
-            drain_p = valves.orifice_flow(1.0, state[pp, i], dp, p[ATMOSPHERE, i], source, p[CRITICAL, i])
-            fill_n = valves.orifice_flow(1.0, p[SUPPLY, i], source, state[pn, i], dn, p[CRITICAL, i])
-            drain_n = valves.orifice_flow(1.0, state[pn, i], dn, p[ATMOSPHERE, i], source, p[CRITICAL, i])
+            pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
+            dp = valves.density_factor(state[tp, i], p[at.RHO0, i], p[at.T0, i])
+            dn = valves.density_factor(state[tn, i], p[at.RHO0, i], p[at.T0, i])
+            fill_p = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pp, i], dp, p[at.CRITICAL, i])
+            drain_p = valves.orifice_flow(1.0, state[pp, i], dp, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
+            fill_n = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pn, i], dn, p[at.CRITICAL, i])
+            drain_n = valves.orifice_flow(1.0, state[pn, i], dn, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
             row = 2 * cylinder
             if one_valve:
-                half = p[HALF_L1, i] if cylinder == 0 else p[HALF_L2, i]
-                y = max(-0.95 * half, min(0.95 * half, state[Y1, i] if cylinder == 0 else state[Y2, i]))
+                half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
+                y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))
                 opened = valves.opening_for_active_flow(
                     full * wanted[cylinder, i], fill_p, drain_p, fill_n, drain_n, half / (half + y), half / (half - y),
-                    p[CONDUCTANCE, i], p[LEAKAGE, i],
+                    p[at.CONDUCTANCE, i], p[at.LEAKAGE, i],
                 )  # fmt: skip
                 openings[row, i], openings[row + 1, i] = opened, -opened
             else:
                 flow_p, flow_n = full * wanted[row, i], full * wanted[row + 1, i]
-                openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[CONDUCTANCE, i], p[LEAKAGE, i])
-                openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[CONDUCTANCE, i], p[LEAKAGE, i])
+                openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+                openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
 
 
 class FlowActuation:
@@ -124,4 +123,4 @@ class FlowActuation:
         return openings
 
 
-ACTUATIONS = {"valve": ValveActuation, "flow": FlowActuation}
+ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

@@ -94,7 +94,7 @@ def assemble(
     one_of("sensors", sensors, tuple(SENSORS))
     chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
     if isinstance(randomize, Mapping):
-        ranges, varied = checked_ranges(randomize), False
+        ranges, varied = checked_ranges(randomize, rig), False
     else:
         one_of("randomize", randomize, (False, True, "plant", "scenario"))
         ranges = documented_ranges() if randomize in (True, "plant") else {}
@@ -141,4 +141,5 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
     if not extreme <= 1.0:
         lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
         raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1")
-    return np.ascontiguousarray(array.T)
+    # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
+    return np.array(array.T, order="C")

@@ -1,8 +1,8 @@
 """A chamber of the plant: pressure, temperature and heat exchange (design section 3; the paper's section V).
 
-    V = V0 + S L,   Q = h (2 S + pi D L)(Twall - T) + G12 (Tother - T)
-    dP/dt = [gamma r (Tin qin - T qout) - gamma P dV/dt + (gamma - 1) Q] / V
-    dT/dt = T [ (dP/dt)/P + (dV/dt)/V - (qin - qout) r T / (P V) ]
+V = V0 + S L,   Q = h (2 S + pi D L)(Twall - T) + G12 (Tother - T)
+dP/dt = [gamma r (Tin qin - T qout) - gamma P dV/dt + (gamma - 1) Q] / V
+dT/dt = T [ (dP/dt)/P + (dV/dt)/V - (qin - qout) r T / (P V) ]
 """
 
 from __future__ import annotations

@@ -32,12 +32,12 @@ _PACKAGES = ("birthsim_env", "baselines", "agents")
 
 @cache
 def _source_stamp() -> str:
-    """One hash of every module with kernels: Numba itself only looks at the file of the outermost function."""
+    """One hash of every module with kernels and of the row numbers they share: Numba itself only looks at the file of the outermost function."""
     digest = hashlib.sha256(numba.__version__.encode())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).glob("*.py")):
             text = path.read_bytes()
-            if b"import kernel" in text or b"import helper" in text or path.name == "compilation.py":
+            if b"\n@kernel\n" in text or b"\n@helper\n" in text or path.name in ("compilation.py", "lanes.py"):
                 digest.update(path.name.encode() + text)
     return digest.hexdigest()
 
@@ -97,14 +97,16 @@ class _Announcer(event.Listener):
 
 if _PackageCacheLocator not in CacheImpl._locator_classes:
     CacheImpl._locator_classes.insert(0, _PackageCacheLocator)
-    event.register("numba:compile", _Announcer())
+    event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 
 
 def kernel(function: F) -> F:
     """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
-    return numba.njit(error_model="numpy", cache=_cache_folder() is not None, nogil=True)(function)  # type: ignore[no-any-return]
+    compiled: Any = numba.njit(error_model="numpy", cache=_cache_folder() is not None, nogil=True)(function)
+    return compiled  # type: ignore[no-any-return]
 
 
 def helper(function: F) -> F:
     """Compile a scalar helper that is always inlined into the kernels that call it."""
-    return numba.njit(error_model="numpy", forceinline=True)(function)  # type: ignore[no-any-return]
+    compiled: Any = numba.njit(error_model="numpy", forceinline=True)(function)
+    return compiled  # type: ignore[no-any-return]

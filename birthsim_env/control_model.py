@@ -10,13 +10,17 @@ from birthsim_env.compilation import helper
 
 
 @helper
-def polytropic_rate_p(pressure: float, flow: float, speed: float, area: float, length: float, index: float, gas_t: float) -> float:
+def polytropic_rate_p(
+    pressure: float, flow: float, speed: float, area: float, length: float, index: float, gas_t: float
+) -> float:
     """dPp/dt of (6), Pa/s; ``gas_t`` is r T, J/kg, ``length`` Lp."""
     return index * (gas_t * flow - pressure * area * speed) / (area * length)
 
 
 @helper
-def polytropic_rate_n(pressure: float, flow: float, speed: float, area: float, length: float, index: float, gas_t: float) -> float:
+def polytropic_rate_n(
+    pressure: float, flow: float, speed: float, area: float, length: float, index: float, gas_t: float
+) -> float:
     """dPn/dt of (6), Pa/s; ``length`` is Ln."""
     return index * (gas_t * flow + pressure * area * speed) / (area * length)
 
@@ -88,7 +92,15 @@ def stiffness_rate(
 
 @helper
 def pressurization_flow_for(
-    rate: float, force: float, stiffness: float, speed: float, active: float, length_p: float, length_n: float, index: float, gas_t: float
+    rate: float,
+    force: float,
+    stiffness: float,
+    speed: float,
+    active: float,
+    length_p: float,
+    length_n: float,
+    index: float,
+    gas_t: float,
 ) -> float:
     """The qT that gives dK/dt = ``rate`` in (10), kg/s."""
     drift = stiffness_drift(force, stiffness, speed, active, length_p, length_n, index, gas_t)

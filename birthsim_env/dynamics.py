@@ -11,15 +11,9 @@ import math
 import numpy as np
 
 from birthsim_env import chambers, friction, geometry, mechanics, valves
+from birthsim_env import lanes as at
 from birthsim_env.compilation import BLOCK, helper, kernel
-from birthsim_env.lanes import (  # fmt: skip
-    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, BRISTLE_S0, BRISTLE_S1, CONDUCTANCE, COS_GAMMA3, CRITICAL,
-    D_PRODUCT, D_SQUARES, DEAD_VOLUME, FC1, FC2, FS1, FS2, FV1, FV2, G12, GAMMA, GAS, GRAVITY, H_WALL, HALF_L1, HALF_L2,
-    K1, K2, LEAKAGE, LUGRE, MASS, PARAMETERS, PERIMETER1, PERIMETER2, PN1, PN2, PP1, PP2, RHO0, S1N, S1P, S2N, S2P,
-    SIGN_SPEED, SIN_GAMMA3, STATES, STOP_DAMPING, STOP_STIFFNESS, STRIBECK, SUPPLY, T0, TAU, TEMPERATURE, TN1, TN2, TP1,
-    TP2, V1, V2, Y1, Y2, Z1, Z2, Array,
-)
-
+from birthsim_env.lanes import Array
 
 INTEGRATION_STEP = 0.25e-3
 """s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
@@ -28,19 +22,19 @@ INTEGRATION_STEP = 0.25e-3
 @helper
 def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
     """Mass flow from the supply into a chamber given by its state rows, kg/s."""
-    c = valves.supply_conductance(x[spool, i], p[CONDUCTANCE, i], p[LEAKAGE, i])
-    source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
-    inside = valves.density_factor(x[temperature, i], p[RHO0, i], p[T0, i])
-    return valves.orifice_flow(c, p[SUPPLY, i], source, x[pressure, i], inside, p[CRITICAL, i])
+    c = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+    inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
+    return valves.orifice_flow(c, p[at.SUPPLY, i], source, x[pressure, i], inside, p[at.CRITICAL, i])
 
 
 @helper
 def exhausted_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
     """Mass flow from a chamber given by its state rows to the atmosphere, kg/s."""
-    c = valves.exhaust_conductance(x[spool, i], p[CONDUCTANCE, i], p[LEAKAGE, i])
-    source = valves.density_factor(p[TEMPERATURE, i], p[RHO0, i], p[T0, i])
-    inside = valves.density_factor(x[temperature, i], p[RHO0, i], p[T0, i])
-    return valves.orifice_flow(c, x[pressure, i], inside, p[ATMOSPHERE, i], source, p[CRITICAL, i])
+    c = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+    inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
+    return valves.orifice_flow(c, x[pressure, i], inside, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
 
 
 @helper
@@ -51,69 +45,71 @@ def chamber_rates(
     """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
     supplied = supplied_flow(x, p, i, pressure, temperature, spool)
     exhausted = exhausted_flow(x, p, i, pressure, temperature, spool)
-    t, wall = x[temperature, i], p[TEMPERATURE, i]
+    t, wall = x[temperature, i], p[at.TEMPERATURE, i]
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
-    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[H_WALL, i], p[G12, i])
-    volume = p[DEAD_VOLUME, i] + p[area, i] * length
+    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
+    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
     volume_rate = p[area, i] * length_rate
-    rate = chambers.pressure_rate(x[pressure, i], volume, volume_rate, carried, heat, p[GAS, i], p[GAMMA, i])
+    rate = chambers.pressure_rate(x[pressure, i], volume, volume_rate, carried, heat, p[at.GAS, i], p[at.GAMMA, i])
     dx[pressure, i] = rate
-    dx[temperature, i] = chambers.temperature_rate(x[pressure, i], t, rate, volume, volume_rate, supplied - exhausted, p[GAS, i])
+    dx[temperature, i] = chambers.temperature_rate(
+        x[pressure, i], t, rate, volume, volume_rate, supplied - exhausted, p[at.GAS, i]
+    )
 
 
 @helper
 def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
     """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
     for i in range(n):
-        y1, v1, y2, v2 = x[Y1, i], x[V1, i], x[Y2, i], x[V2, i]
-        r4, r2 = y1 + p[K1, i], y2 + p[K2, i]
-        w = r4 * r4 - p[D_SQUARES, i]
-        s2 = geometry.s_squared(w, p[D_PRODUCT, i])
+        y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
+        r4, r2 = y1 + p[at.K1, i], y2 + p[at.K2, i]
+        w = r4 * r4 - p[at.D_SQUARES, i]
+        s2 = geometry.s_squared(w, p[at.D_PRODUCT, i])
         root = math.sqrt(s2)
         kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
-        cosine = geometry.cos_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
+        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
+        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
 
-        s0, s1 = p[BRISTLE_S0, i], p[BRISTLE_S1, i]
-        level1 = friction.stribeck_level(v1, p[FC1, i], p[FS1, i], p[STRIBECK, i])
-        level2 = friction.stribeck_level(v2, p[FC2, i], p[FS2, i], p[STRIBECK, i])
-        dz1 = friction.bristle_rate(v1, x[Z1, i], level1, s0)
-        dz2 = friction.bristle_rate(v2, x[Z2, i], level2, s0)
-        lugre1 = friction.lugre_force(v1, x[Z1, i], dz1, s0, s1, p[FV1, i])
-        lugre2 = friction.lugre_force(v2, x[Z2, i], dz2, s0, s1, p[FV2, i])
-        coulomb1 = friction.coulomb_force(v1, p[FC1, i], p[FV1, i], p[SIGN_SPEED, i])
-        coulomb2 = friction.coulomb_force(v2, p[FC2, i], p[FV2, i], p[SIGN_SPEED, i])
-        is_lugre = p[LUGRE, i] > 0.5
+        s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
+        level1 = friction.stribeck_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
+        level2 = friction.stribeck_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
+        dz1 = friction.bristle_rate(v1, x[at.Z1, i], level1, s0)
+        dz2 = friction.bristle_rate(v2, x[at.Z2, i], level2, s0)
+        lugre1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
+        lugre2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
+        coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SPEED, i])
+        coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SPEED, i])
+        is_lugre = p[at.LUGRE, i] > 0.5
         friction1 = lugre1 if is_lugre else coulomb1
         friction2 = lugre2 if is_lugre else coulomb2
 
         force1 = (
-            mechanics.piston_force(x[PP1, i], x[PN1, i], p[AREA_P1, i], p[AREA_N1, i], p[ATMOSPHERE, i])
+            mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
             - friction1
-            - mechanics.stop_force(y1, v1, p[HALF_L1, i], p[STOP_STIFFNESS, i], p[STOP_DAMPING, i])
+            - mechanics.stop_force(y1, v1, p[at.HALF_L1, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
             + mechanics.user_force1(f[0, i], f[1, i], kappa, sine, cosine)
         )
         force2 = (
-            mechanics.piston_force(x[PP2, i], x[PN2, i], p[AREA_P2, i], p[AREA_N2, i], p[ATMOSPHERE, i])
+            mechanics.piston_force(x[at.PP2, i], x[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], p[at.ATMOSPHERE, i])
             - friction2
-            - mechanics.stop_force(y2, v2, p[HALF_L2, i], p[STOP_STIFFNESS, i], p[STOP_DAMPING, i])
+            - mechanics.stop_force(y2, v2, p[at.HALF_L2, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
             + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
         )
-        dx[Y1, i] = v1
-        dx[V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[MASS, i], p[GRAVITY, i])
-        dx[Y2, i] = v2
-        dx[V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[MASS, i], p[GRAVITY, i])
-        dx[Z1, i] = dz1 if is_lugre else 0.0
-        dx[Z2, i] = dz2 if is_lugre else 0.0
+        dx[at.Y1, i] = v1
+        dx[at.V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.Y2, i] = v2
+        dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.Z1, i] = dz1 if is_lugre else 0.0
+        dx[at.Z2, i] = dz2 if is_lugre else 0.0
 
-        chamber_rates(x, p, dx, i, PP1, TP1, TN1, S1P, AREA_P1, PERIMETER1, p[HALF_L1, i] + y1, v1)
-        chamber_rates(x, p, dx, i, PN1, TN1, TP1, S1N, AREA_N1, PERIMETER1, p[HALF_L1, i] - y1, -v1)
-        chamber_rates(x, p, dx, i, PP2, TP2, TN2, S2P, AREA_P2, PERIMETER2, p[HALF_L2, i] + y2, v2)
-        chamber_rates(x, p, dx, i, PN2, TN2, TP2, S2N, AREA_N2, PERIMETER2, p[HALF_L2, i] - y2, -v2)
-        dx[S1P, i] = (u[0, i] - x[S1P, i]) / p[TAU, i]
-        dx[S1N, i] = (u[1, i] - x[S1N, i]) / p[TAU, i]
-        dx[S2P, i] = (u[2, i] - x[S2P, i]) / p[TAU, i]
-        dx[S2N, i] = (u[3, i] - x[S2N, i]) / p[TAU, i]
+        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
+        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
+        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
+        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+        dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) / p[at.TAU, i]
+        dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) / p[at.TAU, i]
+        dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) / p[at.TAU, i]
+        dx[at.S2N, i] = (u[3, i] - x[at.S2N, i]) / p[at.TAU, i]
 
 
 @helper
@@ -135,8 +131,8 @@ def store(scratch: Array, first: int, n: int, target: Array) -> None:
 @kernel
 def derivatives(state: Array, command: Array, force: Array, parameters: Array, rates: Array) -> None:
     """Writes d(state)/dt into ``rates`` (18, N)."""
-    x, u, f = np.empty((STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx = np.empty((PARAMETERS, BLOCK)), np.empty((STATES, BLOCK))
+    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)
@@ -151,20 +147,20 @@ def derivatives(state: Array, command: Array, force: Array, parameters: Array, r
 def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
     """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
     for i in range(state.shape[1]):
-        flows[0, i] = supplied_flow(state, parameters, i, PP1, TP1, S1P)
-        flows[1, i] = supplied_flow(state, parameters, i, PN1, TN1, S1N)
-        flows[2, i] = supplied_flow(state, parameters, i, PP2, TP2, S2P)
-        flows[3, i] = supplied_flow(state, parameters, i, PN2, TN2, S2N)
-        flows[4, i] = exhausted_flow(state, parameters, i, PP1, TP1, S1P)
-        flows[5, i] = exhausted_flow(state, parameters, i, PN1, TN1, S1N)
-        flows[6, i] = exhausted_flow(state, parameters, i, PP2, TP2, S2P)
-        flows[7, i] = exhausted_flow(state, parameters, i, PN2, TN2, S2N)
+        flows[0, i] = supplied_flow(state, parameters, i, at.PP1, at.TP1, at.S1P)
+        flows[1, i] = supplied_flow(state, parameters, i, at.PN1, at.TN1, at.S1N)
+        flows[2, i] = supplied_flow(state, parameters, i, at.PP2, at.TP2, at.S2P)
+        flows[3, i] = supplied_flow(state, parameters, i, at.PN2, at.TN2, at.S2N)
+        flows[4, i] = exhausted_flow(state, parameters, i, at.PP1, at.TP1, at.S1P)
+        flows[5, i] = exhausted_flow(state, parameters, i, at.PN1, at.TN1, at.S1N)
+        flows[6, i] = exhausted_flow(state, parameters, i, at.PP2, at.TP2, at.S2P)
+        flows[7, i] = exhausted_flow(state, parameters, i, at.PN2, at.TN2, at.S2N)
 
 
 @helper
 def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
     """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
-    for row in range(STATES):
+    for row in range(at.STATES):
         for i in range(n):
             total[row, i] += weight * dx[row, i]
             trial[row, i] = x[row, i] + ahead * dx[row, i]
@@ -174,10 +170,10 @@ def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float
 def record_impacts(x: Array, p: Array, impacts: Array, n: int) -> None:
     """Keeps the largest speed at which a piston runs into an end stop, m/s."""
     for i in range(n):
-        outward1 = x[V1, i] if x[Y1, i] > 0.0 else -x[V1, i]
-        outward2 = x[V2, i] if x[Y2, i] > 0.0 else -x[V2, i]
-        impacts[0, i] = max(impacts[0, i], outward1 if abs(x[Y1, i]) > p[HALF_L1, i] else 0.0)
-        impacts[1, i] = max(impacts[1, i], outward2 if abs(x[Y2, i]) > p[HALF_L2, i] else 0.0)
+        outward1 = x[at.V1, i] if x[at.Y1, i] > 0.0 else -x[at.V1, i]
+        outward2 = x[at.V2, i] if x[at.Y2, i] > 0.0 else -x[at.V2, i]
+        impacts[0, i] = max(impacts[0, i], outward1 if abs(x[at.Y1, i]) > p[at.HALF_L1, i] else 0.0)
+        impacts[1, i] = max(impacts[1, i], outward2 if abs(x[at.Y2, i]) > p[at.HALF_L2, i] else 0.0)
 
 
 @kernel
@@ -187,9 +183,9 @@ def advance(state: Array, command: Array, forces: Array, parameters: Array, step
     ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
     the largest speed at which each piston ran into an end stop.
     """
-    x, u, f = np.empty((STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
-    p, dx = np.empty((PARAMETERS, BLOCK)), np.empty((STATES, BLOCK))
-    total, trial, hit = np.empty((STATES, BLOCK)), np.empty((STATES, BLOCK)), np.empty((2, BLOCK))
+    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
+    total, trial, hit = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((2, BLOCK))
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)

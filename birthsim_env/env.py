@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from birthsim_env.assembly import FRAMES_PER_SECOND, RENDER_MODES, assemble, checked_actions, one_of
@@ -95,12 +96,14 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}
+    # Gymnasium declares it as an instance variable with a default.
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}  # noqa: RUF012
 
     def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Any) -> None:
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         setup = assemble(1, scenario, **arguments)
-        self.observation_space, self.action_space = setup.single_observation_space, setup.single_action_space
+        self.observation_space: spaces.Space[Any] = setup.single_observation_space
+        self.action_space: spaces.Space[Any] = setup.single_action_space
         self.observation_names = setup.observation_names
         self.simulation = setup.simulation
         self._steps = setup.steps

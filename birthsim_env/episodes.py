@@ -58,8 +58,8 @@ class Episodes:
         simulation.step(actions)
         self.elapsed += 1
         terms, failed = observation.assess(
-            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump, actions,
-            self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
+            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump,
+            actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
         )  # fmt: skip
         self._action = actions
         return terms.sum(axis=0), dict(zip(observation.REWARD_TERMS, terms, strict=True)), failed
@@ -68,9 +68,7 @@ class Episodes:
         """Observations of all lanes now, (N, size)."""
         simulation = self.simulation
         seen = simulation.measurement
-        return observation.observe(
-            seen, simulation.reference, self._action, simulation.nominal
-        )
+        return observation.observe(seen, simulation.reference, self._action, simulation.nominal)
 
     def describe(self) -> Array:
         """The fields of ``info`` of all lanes now."""

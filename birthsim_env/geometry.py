@@ -42,7 +42,9 @@ def amplification(r2: float, r4: float, root: float) -> float:
 
 
 @helper
-def length_r4(sin_theta: float, cos_theta: float, d_squares: float, d_product: float, sin_gamma3: float, cos_gamma3: float) -> float:
+def length_r4(
+    sin_theta: float, cos_theta: float, d_squares: float, d_product: float, sin_gamma3: float, cos_gamma3: float
+) -> float:
     """Length of cylinder 1 from theta1: law of cosines, the inverse of (1), m."""
     return math.sqrt(d_squares + d_product * (sin_gamma3 * cos_theta - cos_gamma3 * sin_theta))
 
@@ -128,7 +130,7 @@ def jacobian(piston: ArrayLike, parameters: Parameters) -> Array:
 
 def joint_force(force: ArrayLike, piston: ArrayLike, parameters: Parameters) -> Array:
     """Forces along the cylinders that equal a Cartesian force (17): J^T F, N; both (2, ...)."""
-    return np.einsum("ij...,i...->j...", jacobian(piston, parameters), np.asarray(force, dtype=np.float64))
+    return np.asarray(np.einsum("ij...,i...->j...", jacobian(piston, parameters), np.asarray(force, dtype=np.float64)))
 
 
 @kernel

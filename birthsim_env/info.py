@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env import control_model, dynamics
+from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
-from birthsim_env.lanes import (  # fmt: skip
-    AREA_N1, AREA_N2, AREA_P1, AREA_P2, HALF_L1, HALF_L2, INDEX, PN1, PN2, PP1, PP2, PRESSURES, SPOOLS, TEMPERATURES, TN1, TN2, TP1,
-    TP2, S1N, S1P, S2N, S2P, V1, V2, Y1, Y2, Array,
-)  # fmt: skip
+from birthsim_env.lanes import Array
 from birthsim_env.signals import REFERENCES
 from birthsim_env.simulation import Simulation
 
@@ -43,7 +41,15 @@ _SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _S
 
 @kernel
 def _describe(
-    time: Array, since: Array, state: Array, motion: Array, reference: Array, force: Array, impacts: Array, p: Array, rows: Array
+    time: Array,
+    since: Array,
+    state: Array,
+    motion: Array,
+    reference: Array,
+    force: Array,
+    impacts: Array,
+    p: Array,
+    rows: Array,
 ) -> None:
     for i in range(state.shape[1]):
         rows[0, i], rows[1, i] = time[i], since[i]
@@ -55,26 +61,26 @@ def _describe(
             rows[12 + k, i], rows[14 + k, i] = force[k, i], reference[8 + k, i]
             rows[36 + k, i] = reference[10 + k, i]
             rows[39 + k, i] = impacts[k, i]
-        rows[16, i], rows[17, i], rows[18, i], rows[19, i] = state[Y1, i], state[Y2, i], state[V1, i], state[V2, i]
+        rows[16, i], rows[17, i], rows[18, i], rows[19, i] = state[at.Y1, i], state[at.Y2, i], state[at.V1, i], state[at.V2, i]
         for k in range(4):
-            rows[20 + k, i] = state[PRESSURES[k], i]
-            rows[24 + k, i] = state[TEMPERATURES[k], i]
-            rows[28 + k, i] = state[SPOOLS[k], i]
-        rows[32, i] = state[PP1, i] * p[AREA_P1, i] - state[PN1, i] * p[AREA_N1, i]
-        rows[33, i] = state[PP2, i] * p[AREA_P2, i] - state[PN2, i] * p[AREA_N2, i]
-        half1, half2 = p[HALF_L1, i], p[HALF_L2, i]
-        y1, y2 = max(-0.99 * half1, min(0.99 * half1, state[Y1, i])), max(-0.99 * half2, min(0.99 * half2, state[Y2, i]))
+            rows[20 + k, i] = state[at.PRESSURES[k], i]
+            rows[24 + k, i] = state[at.TEMPERATURES[k], i]
+            rows[28 + k, i] = state[at.SPOOLS[k], i]
+        rows[32, i] = state[at.PP1, i] * p[at.AREA_P1, i] - state[at.PN1, i] * p[at.AREA_N1, i]
+        rows[33, i] = state[at.PP2, i] * p[at.AREA_P2, i] - state[at.PN2, i] * p[at.AREA_N2, i]
+        half1, half2 = p[at.HALF_L1, i], p[at.HALF_L2, i]
+        y1, y2 = max(-0.99 * half1, min(0.99 * half1, state[at.Y1, i])), max(-0.99 * half2, min(0.99 * half2, state[at.Y2, i]))
         rows[34, i] = control_model.pneumatic_stiffness(
-            state[PP1, i], state[PN1, i], p[AREA_P1, i], p[AREA_N1, i], half1 + y1, half1 - y1, p[INDEX, i]
+            state[at.PP1, i], state[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], half1 + y1, half1 - y1, p[at.INDEX, i]
         )
         rows[35, i] = control_model.pneumatic_stiffness(
-            state[PP2, i], state[PN2, i], p[AREA_P2, i], p[AREA_N2, i], half2 + y2, half2 - y2, p[INDEX, i]
+            state[at.PP2, i], state[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], half2 + y2, half2 - y2, p[at.INDEX, i]
         )
         rows[38, i] = (
-            max(dynamics.supplied_flow(state, p, i, PP1, TP1, S1P), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, PN1, TN1, S1N), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, PP2, TP2, S2P), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, PN2, TN2, S2N), 0.0)
+            max(dynamics.supplied_flow(state, p, i, at.PP1, at.TP1, at.S1P), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, at.PN1, at.TN1, at.S1N), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, at.PP2, at.TP2, at.S2P), 0.0)
+            + max(dynamics.supplied_flow(state, p, i, at.PN2, at.TN2, at.S2N), 0.0)
         )
 
 
@@ -92,10 +98,16 @@ def describe(simulation: Simulation) -> Array:
 
 def vector_info(rows: Array) -> dict[str, Array]:
     """Name -> (N,) for single values, (N, size) for several."""
-    return {name: rows[part.start] if size == 1 else rows[part].T for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)}
+    return {
+        name: rows[part.start] if size == 1 else rows[part].T
+        for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)
+    }
 
 
 def single_info(rows: Array) -> dict[str, float | Array]:
     """Name -> number or array (size,) of the first lane."""
     column = rows[:, 0]
-    return {name: float(column[part.start]) if size == 1 else column[part] for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)}
+    return {
+        name: float(column[part.start]) if size == 1 else column[part]
+        for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)
+    }

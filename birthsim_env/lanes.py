@@ -39,12 +39,50 @@ PARAMETER_NAMES = (
 )
 PARAMETERS = len(PARAMETER_NAMES)
 (
-    D_SQUARES, D_PRODUCT, SIN_GAMMA3, COS_GAMMA3, K1, K2, HALF_L1, HALF_L2,
-    MASS, GRAVITY, STOP_STIFFNESS, STOP_DAMPING,
-    LUGRE, FC1, FC2, FS1, FS2, FV1, FV2, STRIBECK, BRISTLE_S0, BRISTLE_S1, SIGN_SPEED,
-    AREA_P1, AREA_N1, AREA_P2, AREA_N2, PERIMETER1, PERIMETER2, DEAD_VOLUME, H_WALL, G12,
-    CONDUCTANCE, CRITICAL, LEAKAGE, TAU, SUPPLY, ATMOSPHERE, TEMPERATURE,
-    GAS, GAMMA, INDEX, RHO0, T0,
+    D_SQUARES,
+    D_PRODUCT,
+    SIN_GAMMA3,
+    COS_GAMMA3,
+    K1,
+    K2,
+    HALF_L1,
+    HALF_L2,
+    MASS,
+    GRAVITY,
+    STOP_STIFFNESS,
+    STOP_DAMPING,
+    LUGRE,
+    FC1,
+    FC2,
+    FS1,
+    FS2,
+    FV1,
+    FV2,
+    STRIBECK,
+    BRISTLE_S0,
+    BRISTLE_S1,
+    SIGN_SPEED,
+    AREA_P1,
+    AREA_N1,
+    AREA_P2,
+    AREA_N2,
+    PERIMETER1,
+    PERIMETER2,
+    DEAD_VOLUME,
+    H_WALL,
+    G12,
+    CONDUCTANCE,
+    CRITICAL,
+    LEAKAGE,
+    TAU,
+    SUPPLY,
+    ATMOSPHERE,
+    TEMPERATURE,
+    GAS,
+    GAMMA,
+    INDEX,
+    RHO0,
+    T0,
 ) = range(PARAMETERS)
 
 
@@ -76,5 +114,10 @@ def parameter_array(parameters: Parameters | Sequence[Parameters], num_lanes: in
     if isinstance(parameters, Parameters):
         return np.repeat(parameter_column(parameters)[:, None], num_lanes, axis=1)
     if len(parameters) != num_lanes:
-        raise ValueError(f"parameters has {len(parameters)} entries; allowed: one Parameters, or one for each of {num_lanes} lanes")
+        raise ValueError(
+            f"parameters has {len(parameters)} entries; allowed: one Parameters, or one for each of {num_lanes} lanes"
+        )
+    for lane, rig in enumerate(parameters):
+        if not isinstance(rig, Parameters):
+            raise ValueError(f"parameters[{lane}] = {rig!r}; allowed: a Parameters")
     return np.stack([parameter_column(p) for p in parameters], axis=1)

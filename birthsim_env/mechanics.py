@@ -13,7 +13,17 @@ def piston_force(pressure_p: float, pressure_n: float, area_p: float, area_n: fl
 
 @helper
 def acceleration1(
-    force: float, v1: float, v2: float, r2: float, r4: float, w: float, s2: float, kappa: float, sine: float, mass: float, gravity: float
+    force: float,
+    v1: float,
+    v2: float,
+    r2: float,
+    r4: float,
+    w: float,
+    s2: float,
+    kappa: float,
+    sine: float,
+    mass: float,
+    gravity: float,
 ) -> float:
     """dv1/dt of (5), m/s2. ``force`` is F1 - Fext1 - Ff1 + Fu1, ``s2`` is S^2, ``sine`` sin(theta1)."""
     transport = 2.0 * r4 * w * v1 * v1 / s2 + 2.0 * v1 * v2 / r2 + v1 * v1 / r4

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env import control_model, mechanics
+from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
-from birthsim_env.lanes import (  # fmt: skip
-    AREA_N1, AREA_N2, AREA_P1, AREA_P2, ATMOSPHERE, HALF_L1, HALF_L2, INDEX, PN1, PN2, PP1, PP2, TN1, TN2, TP1, TP2, Y1, Y2, Array,
-)
+from birthsim_env.lanes import Array
 from birthsim_env.signals import Measurement, Reference
 
 LIMIT = 10.0
@@ -97,7 +96,7 @@ def _observe(
         piston_motion(motion, p, joints, 1)
         y1, y2 = joints[0, 0], joints[1, 0]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
-        half1, half2 = p[HALF_L1], p[HALF_L2]
+        half1, half2 = p[at.HALF_L1], p[at.HALF_L2]
         edge1, edge2 = 0.02 * half1, 0.02 * half2
         for axis in range(2):
             seen[axis] = position[axis, i] - reference[axis, i] - force[axis, i] / reference[8 + axis, i]
@@ -108,13 +107,13 @@ def _observe(
             seen[16 + axis] = reference[2 + axis, i]
             seen[18 + axis] = reference[4 + axis, i]
         seen[4], seen[5] = y1 / half1, y2 / half2
-        seen[6] = mechanics.piston_force(pp1, pn1, p[AREA_P1], p[AREA_N1], p[ATMOSPHERE])
-        seen[7] = mechanics.piston_force(pp2, pn2, p[AREA_P2], p[AREA_N2], p[ATMOSPHERE])
+        seen[6] = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
+        seen[7] = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
         seen[8] = control_model.pneumatic_stiffness(
-            pp1, pn1, p[AREA_P1], p[AREA_N1], max(half1 + y1, edge1), max(half1 - y1, edge1), p[INDEX]
+            pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], max(half1 + y1, edge1), max(half1 - y1, edge1), p[at.INDEX]
         )
         seen[9] = control_model.pneumatic_stiffness(
-            pp2, pn2, p[AREA_P2], p[AREA_N2], max(half2 + y2, edge2), max(half2 - y2, edge2), p[INDEX]
+            pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], max(half2 + y2, edge2), max(half2 - y2, edge2), p[at.INDEX]
         )
         for k in range(scales.shape[0]):
             rows[i, k] = max(-LIMIT, min(LIMIT, seen[k] / scales[k]))
@@ -129,16 +128,14 @@ def observe(seen: Measurement, reference: Reference, action: Array, nominal: Arr
     randomisation drew.
     """
     rows = np.empty((seen.position.shape[1], SIZE + action.shape[0]), dtype=np.float32)
-    _observe(
-        seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, action, nominal, _SCALES, rows
-    )
+    _observe(seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, action, nominal, _SCALES, rows)
     return rows
 
 
 @kernel
 def _assess(
-    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array, impacts: Array,
-    impact_speed: float, steps: float, terms: Array, failed: NDArray[np.bool_],
+    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array,
+    impacts: Array, impact_speed: float, steps: float, terms: Array, failed: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     for i in range(state.shape[1]):
         error_x = motion[0, i] - reference[0, i] - force[0, i] / reference[8, i]
@@ -148,11 +145,11 @@ def _assess(
         for k in range(action.shape[0]):
             change += abs(action[k, i] - last_action[k, i])
         inside = True
-        for k in (PP1, PN1, PP2, PN2):
+        for k in (at.PP1, at.PN1, at.PP2, at.PN2):
             inside = inside and PRESSURE_RANGE[0] < state[k, i] < PRESSURE_RANGE[1]
-        for k in (TP1, TN1, TP2, TN2):
+        for k in (at.TP1, at.TN1, at.TP2, at.TN2):
             inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
-        inside = inside and math.isfinite(state[Y1, i] + state[Y2, i])
+        inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
         failed[i] = not inside or max(impacts[0, i], impacts[1, i]) > impact_speed
         terms[0, i] = -cost * steps if since_jump[i] >= GRACE else 0.0
         terms[1, i] = -ACTION_CHANGE_COST * change
@@ -170,6 +167,17 @@ def assess(
     lanes = state.shape[1]
     terms, failed = np.empty((3, lanes)), np.empty(lanes, dtype=np.bool_)
     _assess(
-        state, motion, reference, force, since_jump, action, last_action, impacts, impact_speed, policy_period / 0.01, terms, failed
+        state,
+        motion,
+        reference,
+        force,
+        since_jump,
+        action,
+        last_action,
+        impacts,
+        impact_speed,
+        policy_period / 0.01,
+        terms,
+        failed,
     )
     return terms, failed

@@ -7,11 +7,9 @@ import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any
 
 import tomli_w
-
-T = TypeVar("T")
 
 
 def quantity(
@@ -63,30 +61,30 @@ def _check_field(owner: str, field: dataclasses.Field[Any], value: Any) -> None:
         raise ValueError(f"{owner}.{field.name} = {value!r} is impossible; allowed: {_allowed(field)}")
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(quantity,))
-def part(cls: type[T]) -> type[T]:
-    """Make ``cls`` a frozen dataclass whose docstring lists its fields and whose values are checked by name."""
-    extra_check = getattr(cls, "__post_init__", None)
+class Part:
+    """A group of quantities: checks every value by name, and lists its fields in the docstring of each subclass."""
 
-    def check(self: Any) -> None:
-        for field in dataclasses.fields(self):
+    def __init_subclass__(cls) -> None:
+        """Append the fields with unit, basis and range to the docstring."""
+        lines = [cls.__doc__ or "", "", "Fields (unit; basis; range of domain randomisation):", ""]
+        for name, field in vars(cls).items():
+            if isinstance(field, dataclasses.Field):
+                m = field.metadata
+                drawn = f"; {m['randomized'][0]:g} to {m['randomized'][1]:g}" if m["randomized"] else ""
+                lines.append(f"- ``{name}`` = {field.default!r} ({m['unit']}; {m['basis']}{drawn})")
+        cls.__doc__ = "\n".join(lines)
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
             _check_field(type(self).__name__, field, getattr(self, field.name))
-        if extra_check is not None:
-            extra_check(self)
+        self._check_together()
 
-    cls.__post_init__ = check  # type: ignore[attr-defined]
-    made = dataclass(frozen=True)(cls)
-    lines = [made.__doc__ or "", "", "Fields (unit; basis; range of domain randomisation):", ""]
-    for field in dataclasses.fields(made):  # type: ignore[arg-type]
-        m = field.metadata
-        drawn = f"; {m['randomized'][0]:g} to {m['randomized'][1]:g}" if m["randomized"] else ""
-        lines.append(f"- ``{field.name}`` = {field.default!r} ({m['unit']}; {m['basis']}{drawn})")
-    made.__doc__ = "\n".join(lines)
-    return made
+    def _check_together(self) -> None:
+        """Refuse values that are possible one by one but not together."""
 
 
-@part
-class Geometry:
+@dataclass(frozen=True)
+class Geometry(Part):
     """Planar linkage of the paper's Fig. 1 and Table II; frame 0 at the pivot of cylinder 2, x forward, y up."""
 
     d3: float = quantity(0.35, "m", "assumed", above=0)
@@ -96,8 +94,8 @@ class Geometry:
     k2: float = quantity(0.500, "m", "assumed; r2 = y2 + k2 (2)", above=0)
 
 
-@part
-class Cylinder:
+@dataclass(frozen=True)
+class Cylinder(Part):
     """One double-acting, single-rod pneumatic cylinder."""
 
     piston_diameter: float = quantity(0.025, "m", "Table I", above=0)
@@ -106,7 +104,7 @@ class Cylinder:
     coulomb_friction: float = quantity(12.0, "N", "assumed, 4-5 % of the rated force", least=0, randomized=(6, 25))
     viscous_friction: float = quantity(35.0, "N s/m", "assumed", least=0, randomized=(10, 60))
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         if self.rod_diameter >= self.piston_diameter:
             raise ValueError(
                 f"Cylinder.rod_diameter = {self.rod_diameter!r} is impossible; "
@@ -124,8 +122,8 @@ class Cylinder:
         return math.pi / 4 * (self.piston_diameter**2 - self.rod_diameter**2)
 
 
-@part
-class Mechanics:
+@dataclass(frozen=True)
+class Mechanics(Part):
     """The point mass at the end effector and the end stops of the cylinders."""
 
     mass: float = quantity(3.0, "kg", "assumed", above=0, randomized=(2, 5))
@@ -135,8 +133,8 @@ class Mechanics:
     impact_speed: float = quantity(0.1, "m/s", "assumed; a faster collision with an end stop is reported", above=0)
 
 
-@part
-class Friction:
+@dataclass(frozen=True)
+class Friction(Part):
     """Friction law of both pistons; the Coulomb and viscous levels belong to each cylinder."""
 
     law: str = quantity("lugre", "-", "LuGre (Canudas de Wit 1995) or the paper's (4)", choices=("lugre", "coulomb"))
@@ -147,8 +145,8 @@ class Friction:
     sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001)
 
 
-@part
-class Chambers:
+@dataclass(frozen=True)
+class Chambers(Part):
     """What all four chambers share: dead volume and heat exchange (the paper's section V)."""
 
     dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", least=2e-6, randomized=(5e-6, 25e-6))
@@ -156,8 +154,8 @@ class Chambers:
     piston_conductance: float = quantity(0.012, "W/K", "assumed; G12, heat between the chambers of a cylinder", least=0)
 
 
-@part
-class Valves:
+@dataclass(frozen=True)
+class Valves(Part):
     """Proportional servovalve: ISO 6358 orifices behind a spool with a first-order lag."""
 
     sonic_conductance: float = quantity(3.9e-9, "m3/(s Pa)", "from 100 l/min nominal, 6 to 5 bar; C", above=0, most=2e-8)
@@ -166,8 +164,8 @@ class Valves:
     time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, randomized=(0.0015, 0.008))
 
 
-@part
-class Air:
+@dataclass(frozen=True)
+class Air(Part):
     """Supply, surroundings and the gas itself; absolute pressures."""
 
     supply_pressure: float = quantity(7.0e5, "Pa", "Table I quotes 6 bar gauge", above=0, most=15e5)
@@ -179,7 +177,7 @@ class Air:
     reference_density: float = quantity(1.185, "kg/m3", "ISO 6358; rho0", above=0)
     reference_temperature: float = quantity(293.15, "K", "ISO 6358; T0", above=0)
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         if self.supply_pressure <= self.atmospheric_pressure:
             raise ValueError(
                 f"Air.supply_pressure = {self.supply_pressure!r} is impossible; "
@@ -187,8 +185,8 @@ class Air:
             )
 
 
-@part
-class Electronics:
+@dataclass(frozen=True)
+class Electronics(Part):
     """Control board and the sensors of a laboratory (sensor model ``lab``)."""
 
     control_period: float = quantity(0.001, "s", "assumed", least=0.00025, most=0.01)
@@ -233,8 +231,8 @@ class Parameters:
         least, most = g.k1 - self.cylinder1.stroke / 2, g.k1 + self.cylinder1.stroke / 2
         if not shortest * 1.05 < least < most < longest * 0.98:
             raise ValueError(
-                f"Geometry.k1 = {g.k1!r} with stroke {self.cylinder1.stroke!r} is impossible; allowed: cylinder 1's length "
-                f"{least:g} to {most:g} m must stay inside {shortest * 1.05:g} to {longest * 0.98:g} m, clear of its singularities"
+                f"Geometry.k1 = {g.k1!r} with stroke {self.cylinder1.stroke!r} is impossible; allowed: cylinder 1's "
+                f"length {least:g} to {most:g} m must stay inside {shortest * 1.05:g} to {longest * 0.98:g} m, off its singularities"
             )
 
     def replace(self, changes: dict[str, Any]) -> Parameters:

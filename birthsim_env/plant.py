@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -37,9 +38,7 @@ class Plant:
     mid stroke, at rest, with pressures that balance the weight.
     """
 
-    def __init__(
-        self, parameters: Parameters | str | Path | Sequence[Parameters] | None = None, num_envs: int = 1
-    ) -> None:
+    def __init__(self, parameters: Parameters | str | Path | Sequence[Parameters] | None = None, num_envs: int = 1) -> None:
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
         several = isinstance(parameters, Sequence) and not isinstance(parameters, str)
@@ -63,13 +62,10 @@ class Plant:
         (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal share of the duration.
         Raises ``ValueError`` for wrong shapes, values that are not finite or not allowed, and a duration that is not positive.
         """
-        if not (math.isfinite(duration) and duration > 0):
+        if not (isinstance(duration, Real) and math.isfinite(duration) and duration > 0):
             raise ValueError(f"duration = {duration!r}; allowed: a positive number (s)")
-        forces = np.asarray(user_force, dtype=np.float64)
-        samples = forces.shape[0] if forces.ndim == 3 else 1
-        forces = checked("user_force", forces.reshape(samples, *forces.shape[-2:]), (samples, 2, self.num_envs), "N")
-        command = self._openings(opening_command)
-        self.advance_unchecked(command, forces, duration)
+        command, forces = self._openings(opening_command), self._force_samples(user_force)
+        self.advance_unchecked(command, forces, float(duration))
         return self.state
 
     def advance_unchecked(self, command: Array, forces: Array, duration: float) -> None:
@@ -115,6 +111,15 @@ class Plant:
         if np.abs(command).max() > 1:
             raise ValueError(f"opening_command reaches {np.abs(command).max():g}; allowed: -1 to 1")
         return command
+
+    def _force_samples(self, user_force: ArrayLike) -> Array:
+        """The user's force as (K, 2, num_envs), from that shape with K >= 1 or from (2, num_envs)."""
+        try:
+            samples = np.shape(user_force)[:-2]
+        except ValueError:  # a ragged list, which ``checked`` refuses by name
+            samples = ()
+        several = samples if len(samples) == 1 and samples[0] > 0 else ()
+        return checked("user_force", user_force, (*several, 2, self.num_envs), "N").reshape(-1, 2, self.num_envs)
 
     def _arguments(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> tuple[Array, Array, Array]:
         return (

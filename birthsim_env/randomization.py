@@ -12,6 +12,10 @@ from birthsim_env.parameters import Parameters, field_of
 
 Ranges = Mapping[str, tuple[float, float]]
 
+SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
+"""Sections and fields in which lanes cannot differ: workspace, clock, sensors and the limit of an episode are those of the
+nominal rig."""
+
 
 def documented_ranges() -> dict[str, tuple[float, float]]:
     """Dotted field name -> (low, high), SI units, of every field that carries a range (design section 4)."""
@@ -23,12 +27,19 @@ def documented_ranges() -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def checked_ranges(ranges: Ranges) -> dict[str, tuple[float, float]]:
-    """``ranges`` if every name is a numeric field and every (low, high) ordered and finite; else ``ValueError``."""
+def checked_ranges(ranges: Ranges, nominal: Parameters) -> dict[str, tuple[float, float]]:
+    """``ranges`` if each names a numeric field that lanes may differ in, with a finite (low, high) possible for ``nominal``.
+
+    Else ``ValueError`` naming the entry.
+    """
     checked = {}
     for name, bounds in ranges.items():
+        if not isinstance(name, str):
+            raise ValueError(f"randomize[{name!r}]; allowed: dotted names of parameters such as 'mechanics.mass'")
         if field_of(name).metadata["choices"]:
             raise ValueError(f"randomize[{name!r}]: allowed: numeric parameters, {name} is a choice")
+        if name.partition(".")[0] in SHARED or name in SHARED:
+            raise ValueError(f"randomize[{name!r}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes")
         try:
             low, high = (float(b) for b in bounds)
         except (TypeError, ValueError):
@@ -36,8 +47,8 @@ def checked_ranges(ranges: Ranges) -> dict[str, tuple[float, float]]:
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
             raise ValueError(f"randomize[{name!r}] = {bounds!r}; allowed: (low, high), finite and ordered")
         checked[name] = (low, high)
-        Parameters().replace({name: low})
-        Parameters().replace({name: high})
+        nominal.replace({name: low})
+        nominal.replace({name: high})
     return checked
 
 

@@ -31,7 +31,9 @@ class Trajectory:
 
     def sample(self, time: Array) -> Array:
         """Target motion, (8, N), at ``time`` (N,), s."""
-        raise NotImplementedError(f"{type(self).__name__}.sample(time) is missing; it returns x, y and three derivatives, (8, N)")
+        raise NotImplementedError(
+            f"{type(self).__name__}.sample(time) is missing; it returns x, y and three derivatives, (8, N)"
+        )
 
 
 @kernel

@@ -72,7 +72,7 @@ class Renderer:
         return self._picture.pixel(point)
 
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
-        """The picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
+        """Draw the picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
         self._picture.draw(scene)
         pixels = self._pygame.image.tobytes(self._picture.surface, "RGB")
         return np.frombuffer(pixels, dtype=np.uint8).reshape(self.height, self.width, 3).copy()

@@ -57,7 +57,7 @@ def _descent() -> Parts:
     # Station -5 to +5 cm is 100 mm of straight descent; the arc is the curve of Carus.
     reference = Path((0.42, -0.04), 0.0, 0.10, 0.07, math.radians(80), begins=1.0, ends=23.0)
     stiffness = StiffnessSchedule((0.0, 8.0, 16.0), (2000.0, 4000.0, 3000.0), (4200.0,) * 3, (2100.0,) * 3)
-    return reference, Contractions(), stiffness
+    return reference, Contractions(pushes=(5, 5)), stiffness
 
 
 def _descent_varied() -> Parts:

@@ -57,8 +57,9 @@ def _normal(key: np.uint64, tick: int, channel: int) -> float:
 
 @kernel
 def _lab(
-    ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float, rate: float,
-    latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array, seen: Array,
+    ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
+    rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
+    seen: Array,
 ) -> None:  # fmt: skip
     """One control instant. ``queue`` (Q, 3, N): x, y and time of the last samples taken; ``shown`` (3, N): the newest that
     has arrived; ``velocity`` (2, N): low-passed differences; ``seen`` (4, N): noisy pressures."""
@@ -93,7 +94,8 @@ def _lab(
 class LabSensors:
     """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period.
 
-    No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal force sensor.
+    No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal
+    force sensor.
     """
 
     sampled = True
@@ -131,9 +133,7 @@ class SensorModel(Protocol):
 
     def begin(self, lane: int, rng: np.random.Generator) -> None: ...
 
-    def measure(
-        self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array
-    ) -> Measurement: ...
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement: ...
 
 
 SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors}

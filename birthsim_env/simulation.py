@@ -76,14 +76,16 @@ class Simulation:
         """User force now, N, (2, N)."""
         return np.asarray(self._forces[0])
 
-    def begin(self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None) -> None:
+    def begin(
+        self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
+    ) -> None:
         """Start new episodes in the lanes of a mask (N,): draw their world and put the pistons on the reference, in balance.
 
         ``position`` (2,), m, starts the end effector there, at rest, instead. Raises ``ValueError`` for a reference that
         leaves the workspace within ``duration`` s or a position outside it.
         """
         chosen = np.flatnonzero(lanes)
-        for lane in chosen:
+        for lane in chosen.tolist():
             world = {name: stream(seeds[lane], int(episodes[lane]), name) for name in STREAMS}
             if self._ranges:
                 drawn = draw_parameters(self.parameters, self._ranges, world["parameters"])
@@ -102,7 +104,8 @@ class Simulation:
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
         piston = inverse_geometry(start, self.parameters)
-        rates = np.linalg.solve(np.moveaxis(jacobian(piston, self.parameters), 2, 0), speed.T[..., None])[..., 0].T
+        inverse = np.linalg.inv(np.moveaxis(jacobian(piston, self.parameters), 2, 0))
+        rates: Array = np.einsum("nij,jn->in", inverse, speed)
         own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
         self.plant.state[:, chosen] = balanced_state(own, piston, rates, rows[10:12])
         self._look()
@@ -124,12 +127,14 @@ class Simulation:
     def _look(self) -> None:
         """Bring every attribute but ``since_jump`` and ``impacts`` to the present instant."""
         plant = self.plant
-        self.time = self.ticks * self.period
+        self.time = self.ticks.astype(np.float64) * self.period
         motion = np.empty_like(self.motion)
         end_effector_motion(plant.state, plant.lane_parameters, motion)
         self.motion = motion
         times = self.time + self.period * np.arange(self._stride)[:, None]
-        self._forces = checked("user_force.force(...)", self.user_force.force(times, motion[:2], motion[2:]), self._forces.shape, "N")
+        self._forces = checked(
+            "user_force.force(...)", self.user_force.force(times, motion[:2], motion[2:]), self._forces.shape, "N"
+        )
         self.reference = Reference(self._sample_reference(self.time))
         self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
 
@@ -146,7 +151,9 @@ class Simulation:
             motion = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")
             setpoints = checked("stiffness.sample(time)", self.stiffness.sample(time), (6, lanes), "SI")
             if not (setpoints[:4, chosen] > 0).all():
-                raise ValueError(f"stiffness.sample(time = {instant:g} s) = {setpoints[:4, chosen].min():g} N/m; allowed: more than 0")
+                raise ValueError(
+                    f"stiffness.sample(time = {instant:g} s) = {setpoints[:4, chosen].min():g} N/m; allowed: more than 0"
+                )
             try:
                 inverse_geometry(motion[:2, chosen], self.parameters)
             except ValueError as error:

@@ -4,6 +4,7 @@ stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class StiffnessSchedule:
         columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
         if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns):
             raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
-        if any(later <= sooner for sooner, later in zip(times, times[1:], strict=False)):
+        if any(later <= sooner for sooner, later in pairwise(times)):
             raise ValueError(f"times = {times!r}; allowed: increasing (s)")
         for setpoint in (number for column in columns for number in column):
             if not np.min(setpoint) > 0:

@@ -33,7 +33,9 @@ def density_factor(temperature: float, rho0: float, t0: float) -> float:
 
 
 @helper
-def orifice_flow(conductance: float, p_from: float, factor_from: float, p_to: float, factor_to: float, critical: float) -> float:
+def orifice_flow(
+    conductance: float, p_from: float, factor_from: float, p_to: float, factor_to: float, critical: float
+) -> float:
     """Mass flow from one side to the other, kg/s; negative where the far side has the higher pressure (roles exchanged)."""
     upstream = max(p_from, p_to)
     size = conductance * upstream * flow_function(min(p_from, p_to) / upstream, critical)
@@ -67,7 +69,15 @@ def opening_for_flow(flow: float, fill: float, drain: float, conductance: float,
 
 @helper
 def opening_for_active_flow(
-    active: float, fill_p: float, drain_p: float, fill_n: float, drain_n: float, share_p: float, share_n: float, conductance: float, leakage: float
+    active: float,
+    fill_p: float,
+    drain_p: float,
+    fill_n: float,
+    drain_n: float,
+    share_p: float,
+    share_n: float,
+    conductance: float,
+    leakage: float,
 ) -> float:
     """Opening of ONE 5/3 valve (chamber N gets the opposite) at which share_p qp - share_n qn is ``active``, kg/s.
 

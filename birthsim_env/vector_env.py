@@ -27,17 +27,26 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     own seed); lane i seeded s runs bit for bit as the single environment seeded s. ``max_episode_steps`` shortens episodes.
     """
 
-    metadata: dict[str, Any] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012  Gymnasium declares it so
         "render_modes": list(RENDER_MODES),
         "render_fps": FRAMES_PER_SECOND,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
     def __init__(
-        self, scenario: str, num_envs: int = 1, render_mode: str | None = None, max_episode_steps: int | None = None, **arguments: Any
+        self,
+        scenario: str,
+        num_envs: int = 1,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        **arguments: Any,
     ) -> None:
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
+        if max_episode_steps == -1:
+            max_episode_steps = None
+        if max_episode_steps is not None and not (isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1):
+            raise ValueError(f"max_episode_steps = {max_episode_steps!r}; allowed: None, -1 (no limit) or a whole number >= 1")
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         setup = assemble(int(num_envs), scenario, **arguments)
         self.num_envs = int(num_envs)
@@ -46,7 +55,8 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_names = setup.observation_names
         self.simulation = setup.simulation
-        self._steps = min(setup.steps, max_episode_steps or setup.steps)
+        self.steps = min(setup.steps, max_episode_steps or setup.steps)
+        """Policy steps of an episode that nothing ends early."""
         self._episodes = Episodes(setup)
 
     @property
@@ -59,7 +69,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         """What is asked for now, over the lanes: the other input of a controller."""
         return self.simulation.reference
 
-    def reset(  # type: ignore[override]
+    def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Start new episodes in all lanes. ``options["position"]`` (x, y), m, starts the end effector there, at rest."""
@@ -68,13 +78,11 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self._episodes.begin(np.ones(self.num_envs, dtype=np.bool_), options)
         return self._episodes.observation(), vector_info(self._episodes.describe())
 
-    def step(
-        self, actions: NDArray[Any]
-    ) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    def step(self, actions: NDArray[Any]) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """One policy step of all lanes; raises ``ValueError`` for actions that are not (num_envs, size) numbers in [-1, 1]."""
         episodes = self._episodes
         rewards, terms, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
-        truncated = (episodes.elapsed >= self._steps) & ~terminated
+        truncated = (episodes.elapsed >= self.steps) & ~terminated
         observation = episodes.observation()
         infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms}
         ended = terminated | truncated

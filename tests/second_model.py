@@ -7,8 +7,6 @@ imported but the data of a rig. End stops are left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ from birthsim_env.parameters import Parameters
 Array = NDArray[np.float64]
 
 SCALES = np.array([0.1, 0.1, 0.1, 0.1, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 4])
-"""Size of each state, for the absolute tolerance."""
+"""Size of each state: the solver sees multiples of it, so that one absolute tolerance serves all."""
 
 
 def constants(rig: Parameters) -> tuple[Array, ...]:
@@ -147,19 +145,12 @@ class SecondModel:
         """Pressures of chambers P1, N1, P2, N2: (gamma - 1) U / V."""
         return (self._rig.air.heat_capacity_ratio - 1) * self.state[8:12] / self._volumes(self.state)
 
-    def advance(self, command: Array, push: Array, seconds: float, method: str = "Radau") -> None:
+    def advance(self, command: Array, push: Array, seconds: float) -> None:
         """Integrate with constant opening commands (4,) and user force (2,)."""
-        scale = SCALES
 
         def scaled(t: float, s: Array) -> Array:
-            return rates(s * scale, command, push, *self.constants) / scale
+            return rates(s * SCALES, command, push, *self.constants) / SCALES
 
-        solution = solve_ivp(scaled, (0, seconds), self.state / scale, method=method, rtol=1e-10, atol=1e-13)
+        solution = solve_ivp(scaled, (0, seconds), self.state / SCALES, method="Radau", rtol=1e-10, atol=1e-13)
         assert solution.success, solution.message
-        self.state = solution.y[:, -1] * scale
-
-    def follow(self, schedule: Sequence[tuple[Array, Array]], seconds: float, seen: Callable[[int], None]) -> None:
-        """Advance through a schedule of (command, push), calling ``seen`` after each."""
-        for k, (command, push) in enumerate(schedule):
-            self.advance(command, push, seconds)
-            seen(k)
+        self.state = solution.y[:, -1] * SCALES

@@ -109,7 +109,8 @@ def test_target_and_compliant_target_are_drawn_at_their_places():
     assert near(picture, (255, 150, 0))[tuple(int(v) for v in renderer.to_pixel((0.55, -0.15))[::-1])]
     column, row = renderer.to_pixel((0.45, -0.12))
     ring = near(picture, (0, 112, 128), 40)[int(row) - 12 : int(row) + 13, int(column) - 12 : int(column) + 13]
-    assert ring.any() and not ring[12, 12], "a ring is hollow"
+    assert ring.any()
+    assert not ring[12, 12], "a ring is hollow"
 
 
 def test_a_millimetre_of_error_is_seen_in_the_magnifier():
@@ -187,7 +188,9 @@ def test_other_rigs_stay_in_the_picture_and_fill_it(changes, size):
         # The view's outermost pixels stay paper: nothing is cut off.
         assert near(picture[:, 0:2], (250, 251, 252), 12)[-size[1] // 2 :].all()
     low, high = np.min(places, axis=0), np.max(places, axis=0)
-    assert low.min() >= 0 and high[0] <= 0.74 * size[0] and high[1] <= size[1]
+    assert low.min() >= 0
+    assert high[0] <= 0.74 * size[0]
+    assert high[1] <= size[1]
     assert max((high[0] - low[0]) / size[0], (high[1] - low[1]) / size[1]) > 0.4
 
 
@@ -203,7 +206,7 @@ def test_the_arrow_points_along_the_force_and_grows_with_it_up_to_a_limit():
     assert not arrow_pixels((0.0, 0.0)).any()
     none_to_strong = [np.count_nonzero(arrow_pixels((0.0, fy))) for fy in (10.0, 60.0, 400.0, 1e9)]
     assert none_to_strong[0] < none_to_strong[1] < none_to_strong[2]
-    assert none_to_strong[3] < 1.5 * none_to_strong[2]
+    assert 0.7 * none_to_strong[2] < none_to_strong[3] < 1.5 * none_to_strong[2]
     row = Renderer(RIG).to_pixel((0.0, linkage((0.0, 0.0))[0].imag))[1]
     for fx, fy, axis, sign in ((0, 60, 0, -1), (0, -60, 0, 1), (60, 0, 1, 1), (-60, 0, 1, -1)):
         counts = np.count_nonzero(arrow_pixels((float(fx), float(fy))), axis=1 - axis)
@@ -234,8 +237,11 @@ def test_the_arrow_points_along_the_force_and_grows_with_it_up_to_a_limit():
         {"title": ""},
     ],
 )
-def test_nothing_strange_raises(values):
-    assert Renderer(RIG, 320, 240).frame(changed(**values)).any()
+def test_nothing_strange_raises_or_takes_long(values):
+    renderer = Renderer(RIG, 320, 240)
+    begin = time.perf_counter()
+    assert renderer.frame(changed(**values)).any()
+    assert time.perf_counter() - begin < 0.5, "SDL takes seconds over coordinates far outside"
 
 
 def test_a_path_is_broken_at_gaps_and_drawn_elsewhere():
@@ -247,7 +253,9 @@ def test_a_path_is_broken_at_gaps_and_drawn_elsewhere():
         column, row = (int(v) for v in renderer.to_pixel(point))
         return picture[row - 2 : row + 3, column - 2 : column + 3].min() < 205
 
-    assert darker((0.5, -0.1)) and darker((0.5, -0.2)) and not darker((0.5, -0.15))
+    assert darker((0.5, -0.1))
+    assert darker((0.5, -0.2))
+    assert not darker((0.5, -0.15))
 
 
 SCRIPT = """

@@ -17,7 +17,7 @@ _WINDOWS = (0.02, 0.04, 0.08, 0.16)  # widths the magnifier may show, m
 
 
 def number(value: float, form: str) -> str:
-    """A number for the screen; a dash where there is none."""
+    """Format a number for the screen; a dash where there is none."""
     return format(value, form) if math.isfinite(value) else "-"
 
 
@@ -75,9 +75,10 @@ class Panel:
         """Words of legend and colour bar."""
         text, left = self._text, self.box.x + self._margin
         words = ("end effector", "effector"), ("compliant target", "compliant"), ("target",), ("path",), ("user force", "force")
-        room = self.box.width - 2 * self._margin - 2.3 * self._row
+        indent = left + 2.2 * self._row
+        room = self.box.right - 2 - indent
         for i, choices in enumerate(words):
-            at = left + 2.3 * self._row, self._legend_top + (i + 0.5) * self._row
+            at = indent, self._legend_top + (i + 0.5) * self._row
             text.write(picture, text.fit(choices, room), at, d.INK, (0, 0.5))
         titles = "chamber pressure, bar abs.", "pressure, bar abs.", "pressure, bar"
         title = text.fit(titles, self.box.width - 2 * self._margin)
@@ -147,11 +148,12 @@ class Panel:
         d.paste(self._sheet, picture, box)
         at = box.x + 0.29 * box.width + 4, box.y + 0.96 * box.height + 2
         self._text.write(picture, f"{1e3 * step:.0f} mm", at, d.INK, (0, 1), halo=True)
-        heading = self._text.fit((f"magnified {scale / main_scale:.0f} times",), self.box.width - self._margin)
+        times = f"{scale / main_scale:.0f} times"
+        heading = self._text.fit((f"magnified {times}", f"{times} larger"), self.box.width - self._margin)
         self._text.write(picture, heading, (box.x, box.y - 2), d.INK, (0, 1))
 
     def _point_out(self, pen: Pen, frame: Axis, place: Point, window: float, colour: Colour) -> None:
-        """A triangle at the magnifier's edge that points to what lies outside it."""
+        """Draw a triangle at the magnifier's edge that points to what lies outside it."""
         dx, dy = place[0] - frame.origin[0], place[1] - frame.origin[1]
         far = max(abs(dx), abs(dy))
         if not 0.5 * window < far < math.inf:

@@ -87,7 +87,7 @@ class Box:
 
 
 def sheet(box: Box) -> pygame.Surface:
-    """A fine surface for one box of the picture."""
+    """Make a fine surface for one box of the picture."""
     return pygame.Surface((box.width * FINE, box.height * FINE), 0, 32)
 
 
@@ -130,7 +130,7 @@ class Pen:
         return self._x + self._scale * point[0], self._y - self._scale * point[1]
 
     def polygon(self, points: Sequence[Point], fill: Colour, edge: Colour | None = None, edge_px: float = 1.0) -> None:
-        """Filled polygon of world points (m), optionally outlined."""
+        """Draw a filled polygon of world points (m), optionally outlined."""
         pixels = [self.pixel(point) for point in points]
         if drawable(pixels):
             pygame.draw.polygon(self.surface, fill, pixels)
@@ -164,7 +164,7 @@ class Pen:
                 pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px))
 
     def shape(self, centre: Point, corners_px: Sequence[Point], fill: Colour, edge: Colour | None = None) -> None:
-        """Filled polygon whose corners are pixel offsets (y down) from a world point (m)."""
+        """Draw a filled polygon whose corners are pixel offsets (y down) from a world point (m)."""
         x, y = self.pixel(centre)
         pixels = [(x + dx * FINE, y + dy * FINE) for dx, dy in corners_px]
         if drawable(pixels):
@@ -177,7 +177,7 @@ class Pen:
 
 
 def target_marker(pen: Pen, at: Point, size: float) -> None:
-    """Hollow ring with four ticks, ``size`` px in radius: it leaves free what lies inside it."""
+    """Draw a hollow ring with four ticks, ``size`` px in radius: it leaves free what lies inside it."""
     pen.disc(at, size + 1, None, PAPER, 0.3 * size + 2)
     inner, outer, half = 0.95 * size, 1.6 * size, max(0.6, 0.13 * size)
     tick = [(inner, half), (outer, half), (outer, -half), (inner, -half)]
@@ -187,18 +187,18 @@ def target_marker(pen: Pen, at: Point, size: float) -> None:
 
 
 def compliant_marker(pen: Pen, at: Point, size: float) -> None:
-    """Filled diamond, ``size`` px from centre to corner."""
+    """Draw a filled diamond, ``size`` px from centre to corner."""
     pen.shape(at, [(size, 0), (0, size), (-size, 0), (0, -size)], COMPLIANT, INK)
 
 
 def end_effector_marker(pen: Pen, at: Point, size: float) -> None:
-    """Black dot with a light rim, ``size`` px in radius."""
+    """Draw a black dot with a light rim, ``size`` px in radius."""
     pen.disc(at, size + 0.8, PAPER)
     pen.disc(at, size, END_EFFECTOR)
 
 
 def arrow(pen: Pen, start: Point, end: Point, px: float) -> None:
-    """Force arrow between two world points (m), shaft ``px`` wide, with a light rim to lift it off what lies below."""
+    """Draw a force arrow between two world points (m), shaft ``px`` wide, with a light rim to lift it off what lies below."""
     length = math.dist(start, end)
     if not (length > 0 and math.isfinite(length)):
         return
@@ -229,7 +229,7 @@ class Lettering:
         return math.ceil(self._font.size(text)[0] / 4)
 
     def fit(self, choices: Sequence[str], width: float) -> str:
-        """The first choice that fits in ``width`` px, else the last one cut short."""
+        """Return the first choice that fits in ``width`` px, else the last one cut short."""
         for text in choices:
             if self.width(text) <= width:
                 return text

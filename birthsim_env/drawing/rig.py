@@ -53,7 +53,7 @@ class Barrel:
 
 
 def _smooth(corners: Sequence[Point], steps: int) -> list[Point]:
-    """Closed Catmull-Rom curve through the corners."""
+    """Lay a closed Catmull-Rom curve through the corners."""
     n, curve = len(corners), []
     for i in range(n):
         p = [corners[(i + k) % n] for k in (-1, 0, 1, 2)]
@@ -211,7 +211,7 @@ class Rig:
             yield f"N{i + 1}", axis.at(barrel.front - 2.2 * barrel.cap, aside)
 
     def note(self, piston: tuple[float, float]) -> str:
-        """What the picture alone does not say; usually nothing."""
+        """Say what the picture alone does not say; usually nothing."""
         if self.pose(piston) is None:
             return "no pose: linkage cannot close"
         ends = [str(i + 1) for i, half in enumerate((self._half1, self._half2)) if abs(piston[i]) > half - _NEAR_STOP]

@@ -1,0 +1,80 @@
+"""Stable-Baselines3's ``VecEnv`` over a native vector environment with same-step autoreset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+
+class SB3VecEnv(VecEnv):
+    """Makes ``gymnasium.make_vec(id, num_envs=N)`` usable by Stable-Baselines3.
+
+    Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
+    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it.
+    """
+
+    def __init__(self, env: Any) -> None:
+        if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
+            raise ValueError(f"env = {env!r}; allowed: a vector environment that resets within the same step")
+        self.env = env
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self._returns = np.zeros(env.num_envs)
+        self._lengths = np.zeros(env.num_envs, dtype=np.int64)
+        self._actions: NDArray[Any] = np.zeros((env.num_envs, *env.single_action_space.shape))
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start all lanes; seeds given by ``seed`` count once."""
+        seeds = list(self._seeds) if any(seed is not None for seed in self._seeds) else None
+        observation, _ = self.env.reset(seed=seeds)
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:] = 0
+        self._lengths[:] = 0
+        return np.asarray(observation)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        self._actions = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """One step of all lanes."""
+        observation, rewards, terminated, truncated, info = self.env.step(self._actions)
+        self._returns += rewards
+        self._lengths += 1
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        ended = terminated | truncated
+        for lane in np.flatnonzero(ended):
+            infos[lane] = {
+                "terminal_observation": info["final_obs"][lane],
+                "TimeLimit.truncated": bool(truncated[lane]),
+                "episode": {"r": float(self._returns[lane]), "l": int(self._lengths[lane])},
+            }
+        self._returns[ended] = 0
+        self._lengths[ended] = 0
+        return observation, rewards.astype(np.float32), ended, infos
+
+    def close(self) -> None:
+        self.env.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """One value for each lane asked for; all lanes share the environment."""
+        return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        raise NotImplementedError(f"set_attr({attr_name!r}): the lanes share one environment; make it with other arguments")
+
+    def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
+        raise NotImplementedError(f"env_method({method_name!r}): the lanes share one environment; call it on .env")
+
+    def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
+        return [False] * len(list(self._get_indices(indices)))
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """Frames of all lanes, in render mode ``rgb_array``."""
+        frames = self.env.render()
+        return list(frames) if frames is not None else [None] * self.num_envs

@@ -1,0 +1,93 @@
+"""birthsim-figure4: the experiment of the paper's Fig. 4 on the full plant, its figures and its picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from tqdm import tqdm
+
+import birthsim_env
+from baselines.commands.shared import make_folder, run, write_json
+from baselines.metrics import SETTLED
+from baselines.registry import CONTROLLERS, make_controller
+from birthsim_env.lanes import Array
+
+FIELDS = (
+    *("time", "since_jump", "user_force", "stiffness_setpoint", "pneumatic_stiffness", "pneumatic_stiffness_setpoint"),
+    *("target", "compliant_target", "position", "tracking_error", "piston_position", "impact_speed"),
+)
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="birthsim-figure4", description="Reproduce Fig. 4 of Herzig et al. (IROS 2015).")
+    parser.add_argument("--controller", default="backstepping", choices=tuple(CONTROLLERS), help="default: the paper's")
+    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
+    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png, figure4.svg and figure4.json")
+    run(parser, _figure4)
+
+
+def record_run(controller: str, sensors: str = "ideal", parameters: Any = None) -> dict[str, Array]:
+    """The nominal Circle under a controller at the control rate: the ``info`` fields over time, SI units."""
+    rig = birthsim_env.parameters.load_parameters(parameters)
+    period = rig.electronics.control_period
+    env = gymnasium.make("BirthSIM/Circle-v0", parameters=rig, sensors=sensors, policy_period=period)
+    law = make_controller(controller, rig)
+    machine: Any = env.unwrapped
+    _, info = env.reset(seed=0)
+    record: dict[str, list[Any]] = {name: [info[name]] for name in FIELDS}
+    ended = False
+    with tqdm(desc="Fig. 4", unit=" steps", leave=False) as bar:
+        while not ended:
+            command = law.command(machine.measurement, machine.reference)
+            _, _, terminated, truncated, info = env.step(command)
+            for name in FIELDS:
+                record[name].append(info[name])
+            ended = terminated or truncated
+            if len(record["time"]) % 500 == 0:
+                bar.update(500)
+    return {name: np.array(values) for name, values in record.items()}
+
+
+def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[str, Any]:
+    """Settled RMS error per axis and half (mm), pneumatic stiffness error (% RMS), clearance from the end stops (mm)."""
+    error, stiffness = 1e3 * record["tracking_error"], record["stiffness_setpoint"][:, 0]
+    settled = record["since_jump"] >= SETTLED
+    result: dict[str, Any] = {}
+    for setpoint in np.unique(stiffness):
+        chosen = settled & (stiffness == setpoint)
+        result[f"settled_rms_mm_at_{setpoint:.0f}"] = np.sqrt((error[chosen] ** 2).mean(axis=0)).tolist()
+        result[f"settled_max_mm_at_{setpoint:.0f}"] = np.abs(error[chosen]).max(axis=0).tolist()
+    relative = record["pneumatic_stiffness"] / record["pneumatic_stiffness_setpoint"] - 1
+    result["pneumatic_rms_percent"] = (100 * np.sqrt((relative**2).mean(axis=0))).tolist()
+    half = np.array([rig.cylinder1.stroke / 2, rig.cylinder2.stroke / 2])
+    result["least_clearance_mm"] = (1e3 * (half - np.abs(record["piston_position"]).max(axis=0))).tolist()
+    result["finite"] = bool(all(np.isfinite(values).all() for values in record.values()))
+    result["duration_s"] = float(record["time"][-1])
+    return result
+
+
+def _figure4(arguments: argparse.Namespace) -> None:
+    rig = birthsim_env.parameters.load_parameters(arguments.parameters)
+    folder = make_folder(arguments.out)
+    record = record_run(arguments.controller, arguments.sensors, rig)
+    result = figures_of(record, rig)
+    from baselines.figures import figure4
+
+    figure4(record, folder)
+    write_json(folder / "figure4.json", result)
+    print(f"Fig. 4 with {arguments.controller}, {arguments.sensors} sensors, {result['duration_s']:g} s\n")
+    print(f"{'':44}{'x or 1':>10}{'y or 2':>10}")
+    for name, values in result.items():
+        if isinstance(values, list):
+            print(f"{name:44}{values[0]:10.3f}{values[1]:10.3f}")
+    print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json")
+
+
+if __name__ == "__main__":
+    main()

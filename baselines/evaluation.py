@@ -1,0 +1,146 @@
+"""Runs a controller over seeded episodes of an environment and measures it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+import birthsim_env
+from baselines.controller import Controller
+from baselines.metrics import UNITS, EpisodeMetrics, summarize
+from birthsim_env.lanes import Array
+
+LANES = 64
+"""Episodes that run side by side."""
+
+TRACE = 0.01
+"""s between the samples of the error kept for the figure."""
+
+
+@dataclass
+class Evaluation:
+    """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m."""
+
+    controller: str
+    seeds: list[int] = field(default_factory=list)
+    metrics: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in UNITS})
+    lost: list[bool] = field(default_factory=list)
+    cost: float = float("nan")
+    traces: list[Array] = field(default_factory=list)
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Metric -> median, mean, 95 % and maximum over the episodes."""
+        return {name: summarize(np.array(values)) for name, values in self.metrics.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """What goes into the JSON file."""
+        return {
+            "controller": self.controller,
+            "seeds": self.seeds,
+            "units": UNITS,
+            "summary": self.summary(),
+            "lost_episodes": int(sum(self.lost)),
+            "cost_us_per_lane_and_call": self.cost,
+            "episodes": self.metrics,
+            "lost": self.lost,
+        }
+
+
+def evaluate(
+    environment: str,
+    controller: Controller,
+    name: str,
+    episodes: int,
+    seed: int,
+    progress: bool = True,
+    **arguments: Any,
+) -> Evaluation:
+    """Run ``episodes`` episodes, seeded seed, seed + 1, ..., of a registered id under a controller at the control rate.
+
+    ``arguments`` go to the environment. An episode that terminates is lost: its figures are those up to that moment.
+    After an interrupt (Ctrl-C) the episodes that are complete are returned.
+    """
+    if episodes < 1:
+        raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
+    result = Evaluation(name)
+    spent: list[float] = []
+    try:
+        for first in range(0, episodes, LANES):
+            seeds = [seed + k for k in range(first, min(first + LANES, episodes))]
+            _run_batch(environment, controller, seeds, arguments, result, spent, progress)
+    except KeyboardInterrupt:
+        if not result.seeds:
+            raise
+        print(f"interrupted: {len(result.seeds)} of {episodes} episodes are complete and kept")
+    result.cost = float(np.median(spent))
+    return result
+
+
+def _run_batch(
+    environment: str,
+    controller: Controller,
+    seeds: list[int],
+    arguments: dict[str, Any],
+    result: Evaluation,
+    spent: list[float],
+    progress: bool,
+) -> None:
+    period = birthsim_env.parameters.load_parameters(arguments.get("parameters")).electronics.control_period
+    env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, **arguments)
+    _, info = env.reset(seed=list(seeds))
+    controller.reset()
+    metrics = EpisodeMetrics(len(seeds), period)
+    alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
+    lost = np.zeros_like(alive)
+    trace: list[Array] = []
+    every = max(1, round(TRACE / period))
+    bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
+    for step in range(env.steps):
+        started = time.perf_counter()
+        command = controller.command(env.measurement, env.reference)
+        spent.append((time.perf_counter() - started) * 1e6 / len(seeds))
+        metrics.add(info, command, alive)
+        if step % every == 0:
+            trace.append(np.where(alive[:, None], info["tracking_error"], np.nan))
+        _, _, terminated, _, info = env.step(command.T)
+        lost |= alive & terminated
+        alive &= ~terminated
+        if step % 250 == 249:
+            bar.update(250)
+    bar.close()
+    env.close()
+    for name, values in metrics.result().items():
+        result.metrics[name] += [float(value) for value in values]
+    result.seeds += seeds
+    result.lost += [bool(value) for value in lost]
+    result.traces.append(np.stack(trace))
+
+
+def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
+    """A Markdown table with a row per metric and, per controller, its ``statistic`` and 95 % and largest values."""
+    head = ["metric", "unit"]
+    for evaluation in evaluations:
+        head += [f"{evaluation.controller}: {statistic}", "95 %", "max"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    summaries = [evaluation.summary() for evaluation in evaluations]
+    for name, unit in UNITS.items():
+        row = [name, unit]
+        for summary in summaries:
+            row += [_number(summary[name][key]) for key in (statistic, "q95", "max")]
+        lines.append("| " + " | ".join(row) + " |")
+    lost = ["lost episodes", ""]
+    cost = ["control cost per lane and call", "us"]
+    for evaluation in evaluations:
+        lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
+        cost += [_number(evaluation.cost), "", ""]
+    return "\n".join([*lines, "| " + " | ".join(lost) + " |", "| " + " | ".join(cost) + " |"])
+
+
+def _number(value: float) -> str:
+    return "-" if not np.isfinite(value) else f"{value:.3g}"

@@ -1,0 +1,128 @@
+"""Figures: PNG and SVG, units on every axis, line styles that survive a grey print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from baselines.evaluation import TRACE, Evaluation
+from birthsim_env.lanes import Array
+
+DARK, MIDDLE, LIGHT, ACCENT = "#1b2a41", "#c1440e", "#7a9cc6", "#2e8b57"
+"""Colours of different luminance; line styles differ too."""
+
+STYLE: Any = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "svg.hashsalt": "birthsim",
+}
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write ``name``.png and ``name``.svg and close the figure."""
+    paths = [folder / f"{name}.{kind}" for kind in ("png", "svg")]
+    for path in paths:
+        figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+    plt.close(figure)
+    return paths
+
+
+def figure4(record: dict[str, Array], folder: Path) -> list[Path]:
+    """The paper's Fig. 4 from a run: ``record`` holds ``info`` fields over time, (T,) or (T, 2), SI units."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(2, 2, figsize=(11, 7.5), layout="constrained")
+        _setpoints(axes[0, 0], record)
+        _pneumatic(axes[0, 1], record)
+        _path(axes[1, 0], record)
+        _coordinates(axes[1, 1], record)
+        return save(figure, folder, "figure4")
+
+
+def _letter(axes: Axes, letter: str, title: str) -> None:
+    axes.set_title(f"({letter}) {title}", loc="left", fontsize=9.5)
+
+
+def _setpoints(axes: Axes, record: dict[str, Array]) -> None:
+    time = record["time"]
+    axes.plot(time, record["user_force"][:, 0], color=DARK, label="$F_{us,x}$")
+    axes.plot(time, record["user_force"][:, 1], color=MIDDLE, ls="--", label="$F_{us,y}$")
+    axes.set(xlabel="time (s)", ylabel="user force (N)")
+    axes.set_ylim(-60, 45)
+    right = axes.twinx()
+    right.plot(time, record["stiffness_setpoint"][:, 0], color=LIGHT, lw=2.5, label="$K_{clx} = K_{cly}$ (right)")
+    right.set(ylabel="closed-loop stiffness setpoint (N/m)", ylim=(0, 9000))
+    right.grid(False)
+    right.spines["right"].set_visible(True)
+    lines = [*axes.get_lines(), *right.get_lines()]
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncol=3, loc="lower center")
+    _letter(axes, "a", "User force and stiffness setpoint")
+
+
+def _pneumatic(axes: Axes, record: dict[str, Array]) -> None:
+    for k, colour in ((0, DARK), (1, MIDDLE)):
+        axes.plot(record["time"], record["pneumatic_stiffness"][:, k], color=colour, label=f"$K_{{pneu{k + 1}}}$")
+        target = record["pneumatic_stiffness_setpoint"][:, k]
+        axes.plot(record["time"], target, color="black", ls=":", lw=1.5, label="setpoints" if k == 0 else None)
+    axes.set(xlabel="time (s)", ylabel="pneumatic stiffness (N/m)", ylim=(0, 6000))
+    axes.legend(ncol=3, loc="upper center")
+    _letter(axes, "b", "Pneumatic stiffness")
+
+
+def _path(axes: Axes, record: dict[str, Array]) -> None:
+    half = record["stiffness_setpoint"][:, 0] <= np.median(np.unique(record["stiffness_setpoint"][:, 0]))
+    target = 1e3 * record["target"]
+    axes.plot(target[:, 0], target[:, 1], color="black", ls=":", lw=1.5, label="target")
+    for chosen, colour, style, name in ((half, LIGHT, "-", "softer half"), (~half, MIDDLE, "--", "stiffer half")):
+        position = 1e3 * record["position"][chosen]
+        axes.plot(position[:, 0], position[:, 1], color=colour, ls=style, label=f"end effector, {name}")
+    axes.set(xlabel="$x_c$ (mm)", ylabel="$y_c$ (mm)")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(loc="center")
+    _letter(axes, "c", "Cartesian path")
+
+
+def _coordinates(axes: Axes, record: dict[str, Array]) -> None:
+    centre = 1e3 * record["target"].mean(axis=0)
+    for k, name, shift in ((0, "x", 75.0), (1, "y", -75.0)):
+        for field, colour, style, width, label in (
+            ("target", "black", ":", 1.2, f"${name}_t$"),
+            ("compliant_target", LIGHT, "-", 3.0, f"${name}_k$ (19)"),
+            ("position", MIDDLE, "-", 1.0, f"${name}_c$"),
+        ):
+            axes.plot(
+                record["time"], 1e3 * record[field][:, k] - centre[k] + shift, color=colour, ls=style, lw=width, label=label
+            )
+    axes.set(xlabel="time (s)", ylabel="coordinate less its mean (mm)", ylim=(-165, 205))
+    axes.set_yticks([-125, -75, -25, 25, 75, 125], ["-50", "$y$ 0", "50", "-50", "$x$ 0", "50"])
+    axes.legend(ncol=6, loc="upper center", columnspacing=0.8, handlelength=1.4)
+    _letter(axes, "d", "Coordinates with target and compliant target")
+
+
+def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path) -> list[Path]:
+    """Size of the tracking error over time: median and 5-95 % band over the episodes, one line per controller."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+        styles: list[tuple[str, Any]] = [(DARK, "-"), (MIDDLE, "--"), (ACCENT, "-."), (LIGHT, ":")]
+        for evaluation, (colour, style) in zip(evaluations, styles, strict=False):
+            size = 1e3 * np.linalg.norm(np.concatenate(evaluation.traces, axis=1), axis=2)
+            time = TRACE * np.arange(len(size))
+            low, middle, high = np.nanquantile(size, (0.05, 0.5, 0.95), axis=1)
+            axes.fill_between(time, low, high, color=colour, alpha=0.15, lw=0)
+            axes.plot(time, middle, color=colour, ls=style, lw=1.2, label=f"{evaluation.controller} (median, 5-95 %)")
+        axes.set(xlabel="time (s)", ylabel="tracking error (mm)", yscale="log", title=title)
+        axes.legend()
+        return save(figure, folder, "error_over_time")

@@ -1,0 +1,66 @@
+"""Controllers by name: the table, other packages' entry points, and a user's own file.
+
+A factory takes the rig as its owner describes it, and keyword options, and returns a ``Controller``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from baselines.backstepping import BacksteppingController
+from baselines.controller import Controller
+from birthsim_env.parameters import Parameters
+
+Factory = Callable[..., Controller]
+
+ENTRY_POINTS = "birthsim.controllers"
+"""Entry point group by which a package that builds on this one adds controllers."""
+
+
+def _backstepping(parameters: Parameters) -> Controller:
+    return BacksteppingController(parameters)
+
+
+def _backstepping_weight(parameters: Parameters) -> Controller:
+    return BacksteppingController(parameters, weight_compensation=True)
+
+
+CONTROLLERS: dict[str, Factory] = {"backstepping": _backstepping, "backstepping-weight": _backstepping_weight}
+
+
+def controller_names() -> list[str]:
+    """Every name that ``make_controller`` knows."""
+    return [*CONTROLLERS, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+
+
+def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
+    """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
+
+    Raises ``ValueError`` naming what is unknown and what there is.
+    """
+    if name in CONTROLLERS:
+        return CONTROLLERS[name](parameters, **options)
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name == name:
+            made: Controller = point.load()(parameters, **options)
+            return made
+    path, _, attribute = name.rpartition(":")
+    if path.endswith(".py"):
+        return _from_file(Path(path), attribute)(parameters, **options)
+    raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+
+
+def _from_file(path: Path, attribute: str) -> Factory:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        raise ValueError(f"controller file {str(path)!r} does not exist; allowed: path/to/file.py:Class")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, attribute):
+        raise ValueError(f"controller file {str(path)!r} has no {attribute!r}; allowed: a class with command() and reset()")
+    factory: Factory = getattr(module, attribute)
+    return factory

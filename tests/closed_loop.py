@@ -1,0 +1,71 @@
+"""A rig under a law, control period by control period, for the tests of the controllers: measurements and references."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from birthsim_env.equilibrium import balanced_state
+from birthsim_env.geometry import inverse_geometry, jacobian
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters
+from birthsim_env.plant import Plant
+from birthsim_env.signals import REFERENCES, Measurement, Reference
+
+FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
+"""Neither Coulomb nor Stribeck friction; the viscous part stays."""
+
+PNEUMATIC_STIFFNESS = np.array([[4000.0], [2000.0]])
+"""N/m, of both cylinders: inside the range of (9) at all poses that the tests use."""
+
+
+def ideal(plant: Plant, time: float, force: Array) -> Measurement:
+    """What exact sensors say of the plant."""
+    motion, clock = plant.end_effector(), np.full(plant.num_envs, time)
+    return Measurement(clock, motion[:2], clock, motion[2:], plant.pressures, force, sampled=False)
+
+
+def holding(position: Array, stiffness: Array | float) -> Reference:
+    """A resting target at ``position`` (2, N) with closed-loop stiffness ``stiffness`` on both axes, or (2, N)."""
+    rows = np.zeros((REFERENCES, position.shape[1]))
+    rows[0:2], rows[8:10], rows[10:12] = position, stiffness, PNEUMATIC_STIFFNESS
+    return Reference(rows)
+
+
+def circling(time: float, radius: float, period: float, stiffness: float, lanes: int = 1) -> Reference:
+    """A target on a circle about (0.5, 0), the same in all lanes."""
+    rate = 2 * np.pi / period
+    position = radius * np.array([[np.cos(rate * time)], [np.sin(rate * time)]])
+    velocity = rate * np.array([-position[1], position[0]])
+    rows = np.zeros((REFERENCES, lanes))
+    rows[0:2] = position + np.array([[0.5], [0.0]])
+    rows[2:4], rows[4:6], rows[6:8] = velocity, -(rate**2) * position, -(rate**2) * velocity
+    rows[8:10], rows[10:12] = stiffness, PNEUMATIC_STIFFNESS
+    return Reference(rows)
+
+
+def resting_at(reference: Reference, parameters: Parameters) -> Plant:
+    """A plant on the target, with the target's velocity and pneumatic stiffness, in balance."""
+    plant = Plant(parameters, reference.rows.shape[1])
+    piston = inverse_geometry(reference.position, parameters)
+    speed = np.stack([np.linalg.solve(jacobian(y, parameters), v) for y, v in zip(piston.T, reference.velocity.T, strict=True)], axis=1)
+    plant.state = balanced_state(plant.lane_parameters, piston, speed, reference.pneumatic_stiffness)
+    return plant
+
+
+def run(
+    plant: Plant,
+    law: Callable[[Measurement, Reference], Array],
+    reference: Callable[[float], Reference],
+    force: Callable[[float], Array],
+    seconds: float,
+    sense: Callable[[Plant, float, Array], Measurement] = ideal,
+) -> Iterator[tuple[float, Reference, Array, Array]]:
+    """Closes the loop at 1 kHz; yields time, reference, user force (2, N) and openings (4, N) before each period."""
+    for tick in range(round(seconds * 1000)):
+        time = tick * 1e-3
+        wanted, push = reference(time), np.ascontiguousarray(force(time))
+        openings = law(sense(plant, time, push), wanted)
+        yield time, wanted, push, openings
+        plant.advance(openings, push, 1e-3)

@@ -1,0 +1,291 @@
+"""The single environment keeps Gymnasium's contract and its own docstring: spaces, ends, observation, reward, info, frames."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check
+from stable_baselines3.common.env_checker import check_env as stable_baselines_check
+
+import birthsim_env
+from birthsim_env import Parameters
+from birthsim_env.control_model import active_flow
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.info import FIELDS
+from birthsim_env.observation import ENTRIES
+from birthsim_env.vector_env import BirthSIMVectorEnv
+
+SECONDS = {"Circle": 16, "Probe": 5, "Descent": 24, "Forceps": 15, "Dystocia": 16}
+IDS = tuple(f"BirthSIM/{name}-v0" for name in SECONDS)
+CIRCLE, PROBE = IDS[0], IDS[1]
+FACES = tuple(itertools.product(("valve", "flow"), ("two_valves", "one_valve"), ("ideal", "lab")))
+EXAMPLES = [(i, face) for k, i in enumerate(IDS) for face in (FACES if k == 0 else (FACES[0], FACES[k], FACES[7]))]
+TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+
+
+def make(name=CIRCLE, **arguments) -> BirthSIMEnv:
+    env = gymnasium.make(name, **arguments).unwrapped
+    assert isinstance(env, BirthSIMEnv)
+    return env
+
+
+def run(env, actions, seed=0):
+    """Observations, rewards and infos of an episode that starts from ``seed``; the first row is that of ``reset``."""
+    observation, info = env.reset(seed=seed)
+    rows = [(observation, 0.0, info)]
+    for action in actions:
+        observation, reward, _, _, info = env.step(action)
+        rows.append((observation, reward, info))
+    observations, rewards, infos = zip(*rows, strict=True)
+    return np.array(observations), np.array(rewards), infos
+
+
+def random_actions(count, size, reach=0.2, seed=0):
+    return np.random.default_rng(seed).uniform(-reach, reach, (count, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize(("name", "face"), EXAMPLES)
+def test_both_checkers_find_nothing_to_say(name, face, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    arguments = dict(zip(("action_mode", "valves", "sensors"), face, strict=True), randomize=face[2] == "lab")
+    gymnasium_check(make(name, **arguments))
+    stable_baselines_check(make(name, **arguments))
+
+
+def test_importing_again_neither_warns_nor_changes_the_registry():
+    before = {name: spec for name, spec in gymnasium.registry.items() if name.startswith("BirthSIM/")}
+    assert set(IDS) <= set(before)
+    importlib.reload(birthsim_env)
+    assert all(gymnasium.registry[name] is spec for name, spec in before.items())
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_a_spec_names_both_classes_and_makes_the_same_world_again(name):
+    env = gymnasium.make(name, sensors="lab", randomize=True, policy_period=0.02)
+    assert (env.spec.entry_point, env.spec.vector_entry_point) == (
+        "birthsim_env.env:BirthSIMEnv",
+        "birthsim_env.vector_env:BirthSIMVectorEnv",
+    )
+    copy = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    action = np.full(4, 0.1, np.float32)
+    env.reset(seed=3), copy.reset(seed=3)
+    np.testing.assert_array_equal(env.step(action)[0], copy.step(action)[0])
+    assert isinstance(gymnasium.make_vec(name, num_envs=2).unwrapped, BirthSIMVectorEnv)
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_spaces_and_names_have_the_size_of_the_valve_layout(face):
+    env = make(action_mode=face[0], valves=face[1], sensors=face[2])
+    size = 4 if face[1] == "two_valves" else 2
+    assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
+    assert env.observation_space == gymnasium.spaces.Box(-10.0, 10.0, (20 + size,), np.float32)
+    assert len(env.observation_names) == 20 + size
+    assert all(name.startswith("last action") for name in env.observation_names[20:])
+
+
+def test_the_table_in_the_docstring_is_the_table_of_entries():
+    text = BirthSIMEnv.__doc__.split("| index | entry")[1].split("## Reward")[0]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if re.match(r"\s*\| \d", line)]
+    assert [int(n) for row in rows[:-1] for n in row[0].split(",")] + [20] == [*range(20), int(rows[-1][0].split()[0])]
+    scales = []
+    for index, _, scale in rows[:-1]:
+        values = [float(v) for v in re.findall(r"[\d.]+(?=[ ,])", scale)] or [1.0]
+        entries = [ENTRIES[int(n)] for n in index.split(",")]
+        unit = "half strokes" if scale == "half a stroke" else re.sub(r"^[\d., ]+", "", scale)
+        assert {entry.unit for entry in entries} == {unit}
+        scales += values * (len(entries) // len(values))
+    assert scales == [entry.scale for entry in ENTRIES]
+    for name, entry in zip(make().observation_names, ENTRIES, strict=False):
+        assert name == f"{entry.name}, {entry.scale:g} {entry.unit}"
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_an_ideal_observation_is_info_over_the_documented_scales(name):
+    env = make(name, randomize=True)
+    actions = random_actions(120, 4)
+    observations, _, infos = run(env, actions, seed=5)
+    rig, reference = env.simulation.plant.lane_parameters, None
+    assert rig.shape[1] == 1
+    for k, (seen, info) in enumerate(zip(observations, infos, strict=True)):
+        external = 1.013e5 * math.pi / 4 * 0.010**2
+        target = env.simulation.trajectory.sample(np.array([info["time"]]))[:, 0]
+        expected = np.concatenate([
+            info["tracking_error"] / 0.01,
+            info["velocity"] / 0.2,
+            info["piston_position"] / (0.1, 0.2),
+            (info["pneumatic_force"] - external) / 200,
+            info["pneumatic_stiffness"] / (5000, 2500),
+            info["pneumatic_stiffness_setpoint"] / (5000, 2500),
+            info["stiffness_setpoint"] / 5000,
+            info["user_force"] / 50,
+            target[2:4] / 0.2,
+            target[4:6] / 0.5,
+        ])  # fmt: skip
+        np.testing.assert_allclose(seen[:20], np.clip(expected, -10, 10), rtol=1e-5, atol=1e-5)
+        np.testing.assert_array_equal(seen[20:], actions[k - 1] if k else np.zeros(4))
+    assert reference is None
+
+
+@pytest.mark.parametrize("period", [0.001, 0.01, 0.02])
+def test_the_reward_is_the_documented_formula_of_info(period):
+    actions = random_actions(round(2.0 / period), 4)
+    env = make(policy_period=period)
+    _, rewards, infos = run(env, actions, seed=1)
+    last, paid = np.zeros(4), 0
+    for action, reward, info in zip(actions, rewards[1:], infos[1:], strict=True):
+        error = np.abs(info["tracking_error"]).sum()
+        tracking = -min(error / 2e-3, 5.0) * period / 0.01 if info["since_jump"] >= 0.3 else 0.0
+        assert info["reward_tracking"] == pytest.approx(tracking, rel=1e-9, abs=1e-12)
+        assert info["reward_action_change"] == pytest.approx(-0.05 * np.abs(action.astype(float) - last).sum(), rel=1e-9)
+        assert info["reward_failure"] == 0.0
+        assert reward == pytest.approx(sum(info[term] for term in TERMS), rel=1e-12)
+        last, paid = action.astype(float), paid + (tracking < 0)
+    # A push of 300 N/s runs from 1.0 to 1.1 s: free until 1.4 s, and for the first 0.3 s of the episode.
+    unpaid = sum(info["since_jump"] < 0.3 - 1e-9 for info in infos[1:]) * period
+    assert unpaid == pytest.approx(0.3 + 0.4, abs=2 * period + 1e-9)
+    assert paid > 0.6 * len(actions)
+
+
+def test_info_has_every_documented_field_and_agrees_with_the_plant():
+    env = make("BirthSIM/Forceps-v0", randomize=True)
+    _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
+    for step, info in enumerate(infos):
+        assert set(info) == set(FIELDS) | (set(TERMS) if step else set())
+        for field, (size, _) in FIELDS.items():
+            assert isinstance(info[field], float) if size == 1 else info[field].shape == (size,), field
+        assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)
+    plant, info = env.simulation.plant, infos[-1]
+    motion, flows = plant.end_effector()[:, 0], plant.mass_flows()[:, 0]
+    np.testing.assert_array_equal(info["position"], motion[:2])
+    np.testing.assert_array_equal(info["velocity"], motion[2:])
+    np.testing.assert_array_equal(info["piston_position"], plant.piston[:, 0])
+    np.testing.assert_array_equal(info["piston_velocity"], plant.piston_speed[:, 0])
+    np.testing.assert_array_equal(info["pressure"], plant.pressures[:, 0])
+    np.testing.assert_array_equal(info["temperature"], plant.temperatures[:, 0])
+    np.testing.assert_array_equal(info["opening"], plant.state[14:, 0])
+    assert info["supply_flow"] == pytest.approx(np.maximum(flows[:4], 0).sum())
+    bore, rod = math.pi / 4 * 0.025**2, math.pi / 4 * 0.010**2
+    pp, pn, length = info["pressure"][0::2] * bore, info["pressure"][1::2] * (bore - rod), np.array([0.1, 0.2])
+    y = info["piston_position"]
+    np.testing.assert_allclose(info["pneumatic_force"], pp - pn)
+    np.testing.assert_allclose(info["pneumatic_stiffness"], 1.2 * (pp / (length + y) + pn / (length - y)))
+    compliant = info["target"] + info["user_force"] / info["stiffness_setpoint"]
+    np.testing.assert_allclose(info["compliant_target"], compliant)
+    np.testing.assert_allclose(info["tracking_error"], info["position"] - compliant)
+
+
+@pytest.mark.parametrize(("name", "seconds"), list(zip(IDS, SECONDS.values(), strict=True)))
+def test_a_full_episode_is_truncated_exactly_at_the_end(name, seconds):
+    # Holding still needs a hand on the valves: keep the episode alive without any force of the user.
+    env = make(name, user_force=birthsim_env.ForceProfile(), reference=birthsim_env.Hold((0.5, 0.0)), policy_period=0.05)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(4))[2:4] for _ in range(20 * seconds)]
+    assert ends == [(False, False)] * (20 * seconds - 1) + [(False, True)]
+
+
+def test_duration_and_policy_period_set_the_number_of_steps():
+    for duration, period, steps in ((0.2, 0.01, 20), (0.2, 0.001, 200), (0.21, 0.03, 7), (0.5, 0.25, 2)):
+        env = make(duration=duration, policy_period=period)
+        env.reset(seed=0)
+        ends = [env.step(np.zeros(4))[3] for _ in range(steps)]
+        assert ends == [False] * (steps - 1) + [True]
+        assert env.simulation.time[0] == pytest.approx(duration)
+
+
+@pytest.mark.parametrize("push", [(0, 0, 1, -1), (0, 0, -1, 1), (1, -1, 0, 0), (-1, 1, 0, 0)])
+def test_running_into_an_end_stop_terminates_and_costs_250(push):
+    env = make(PROBE)
+    env.reset(seed=0)
+    for _ in range(200):
+        _, reward, terminated, truncated, info = env.step(push)
+        if terminated:
+            break
+        assert info["impact_speed"].max() <= 0.1
+    assert (terminated, truncated) == (True, False)
+    cylinder = 0 if push[0] else 1
+    assert info["impact_speed"][cylinder] > 0.1 and info["impact_speed"][1 - cylinder] == 0.0
+    assert abs(info["piston_position"][cylinder]) > 0.98 * (0.1, 0.2)[cylinder]
+    assert info["reward_failure"] == -250.0
+    assert reward == pytest.approx(sum(info[term] for term in TERMS)) and reward <= -250.0
+
+
+def test_termination_and_the_end_of_time_never_coincide():
+    env = make(PROBE)
+    env.reset(seed=0)
+    steps = 0
+    while not env.step((0, 0, 1, -1))[2]:
+        steps += 1
+    short = make(PROBE, duration=0.01 * (steps + 1))
+    short.reset(seed=0)
+    for _ in range(steps):
+        short.step((0, 0, 1, -1))
+    assert short.step((0, 0, 1, -1))[2:4] == (True, False)
+
+
+def test_reset_starts_on_the_target_or_where_it_is_told_to():
+    env = make(randomize=True)
+    _, info = env.reset(seed=4)
+    target = env.reference
+    np.testing.assert_allclose(info["tracking_error"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(info["velocity"], target.velocity, atol=1e-12)
+    _, info = env.reset(seed=4, options={"position": (0.48, 0.03)})
+    np.testing.assert_allclose(info["position"], (0.48, 0.03), atol=1e-12)
+    np.testing.assert_array_equal(info["velocity"], 0.0)
+    np.testing.assert_array_equal(env.reference.rows, target.rows)
+    info = env.step(np.zeros(4))[4]
+    np.testing.assert_allclose(info["position"], (0.48, 0.03), atol=5e-4)
+
+
+def test_a_longer_policy_period_holds_the_action_over_the_same_plant():
+    fine, coarse = make(policy_period=0.001), make(policy_period=0.01)
+    actions = random_actions(30, 4)
+    fine_rows = run(fine, np.repeat(actions, 10, axis=0))[0][::10]
+    coarse_rows = run(coarse, actions)[0]
+    np.testing.assert_array_equal(fine_rows[:, :20], coarse_rows[:, :20])
+
+
+def test_one_valve_is_two_valves_with_opposite_openings():
+    actions = random_actions(300, 2, reach=0.5)
+    both = np.stack([actions[:, 0], -actions[:, 0], actions[:, 1], -actions[:, 1]], axis=1)
+    np.testing.assert_array_equal(run(make(valves="one_valve"), actions)[0][:, :20], run(make(), both)[0][:, :20])
+
+
+@pytest.mark.parametrize("valves", ["two_valves", "one_valve"])
+def test_a_commanded_flow_is_what_the_chambers_get(valves):
+    # A fast spool: pressures move on while it lags, which is the only difference between wish and flow.
+    rig = Parameters().replace({"valves.time_constant": 2e-4, "mechanics.mass": 2.5})
+    unit = 3.9e-9 * 7.0e5 * 1.185
+    env = make(PROBE, action_mode="flow", valves=valves, parameters=rig, duration=1.0)
+    for wish in np.random.default_rng(0).uniform(-0.1, 0.1, (6, env.action_space.shape[0])):
+        env.reset(seed=0)
+        for _ in range(3):
+            info = env.step(wish)[4]
+        assert np.abs(info["opening"]).max() < 0.9
+        flows = env.simulation.plant.mass_flows()[:, 0]
+        net = flows[:4] - flows[4:]
+        if valves == "one_valve":
+            half, y = np.array([0.1, 0.2]), info["piston_position"]
+            net = active_flow(net[0::2], net[1::2], half + y, half - y)
+        np.testing.assert_allclose(net, wish * unit, rtol=0.02, atol=2e-3 * unit)
+
+
+def test_frames_are_pictures_and_a_window_shows_nothing_else(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = make(render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    assert (first.shape, first.dtype) == ((480, 640, 3), np.uint8)
+    for _ in range(60):
+        env.step((0.0, 0.0, 0.1, -0.1))
+    assert not np.array_equal(env.render(), first)
+    window = make(render_mode="human")
+    window.reset(seed=0)
+    assert window.step(np.zeros(4))[0].shape == (24,) and window.render() is None
+    window.close(), window.close(), env.close()
+    assert make().render() is None

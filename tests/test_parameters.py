@@ -1,0 +1,173 @@
+"""Parameters: every figure has unit, basis and limits; impossible rigs are refused by name; TOML files come back equal."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from birthsim_env.lanes import PARAMETER_NAMES, parameter_array, parameter_column
+from birthsim_env.parameters import Cylinder, Parameters, field_of, load_parameters
+
+FIELDS = [
+    (section.name, field)
+    for section in dataclasses.fields(Parameters)
+    for field in dataclasses.fields(type(section.default))
+]
+every_field = pytest.mark.parametrize(("section", "field"), FIELDS, ids=[f"{s}.{f.name}" for s, f in FIELDS])
+
+DESIGN_RANGES = {
+    "mechanics.mass": (2, 5),
+    "cylinder1.coulomb_friction": (6, 25),
+    "cylinder2.coulomb_friction": (6, 25),
+    "cylinder1.viscous_friction": (10, 60),
+    "cylinder2.viscous_friction": (10, 60),
+    "chambers.dead_volume": (5e-6, 25e-6),
+    "chambers.wall_heat_transfer": (20, 100),
+    "valves.time_constant": (0.0015, 0.008),
+}
+"""Design section 4, the figures in brackets."""
+
+UNITS = {"m", "rad", "N", "N s/m", "kg", "m/s2", "N/m", "s/m", "m/s", "-", "m3", "W/(m2 K)", "W/K", "m3/(s Pa)", "s", "Pa", "K"}
+UNITS |= {"J/(kg K)", "kg/m3", "Hz"}
+
+
+@every_field
+def test_every_field_has_unit_basis_and_a_line_in_the_docstring(section: str, field: dataclasses.Field[Any]) -> None:
+    assert field.metadata["unit"] in UNITS
+    assert len(field.metadata["basis"]) >= 5
+    part = type(getattr(Parameters(), section))
+    (line,) = [line for line in (part.__doc__ or "").splitlines() if line.startswith(f"- ``{field.name}``")]
+    assert field.metadata["basis"] in line and f"({field.metadata['unit']};" in line
+    assert field_of(f"{section}.{field.name}").metadata == field.metadata
+
+
+def test_ranges_of_randomisation_are_those_of_the_design_and_possible() -> None:
+    ranges = {f"{s}.{f.name}": f.metadata["randomized"] for s, f in FIELDS if f.metadata["randomized"]}
+    assert ranges == DESIGN_RANGES
+    for name, ends in ranges.items():
+        for end in ends:
+            section, field = name.split(".")
+            assert getattr(getattr(Parameters().replace({name: float(end)}), section), field) == end
+
+
+def test_figures_of_table_1() -> None:
+    """Bore 25 mm and rod 10 mm give the 295 N and 247 N of Table I at 6 bar gauge."""
+    rig = Parameters()
+    for cylinder in (rig.cylinder1, rig.cylinder2):
+        assert 6e5 * cylinder.area_p == pytest.approx(295, abs=0.5)
+        assert 6e5 * cylinder.area_n == pytest.approx(247, abs=0.6)
+    assert (rig.cylinder1.stroke, rig.cylinder2.stroke) == (0.2, 0.4)
+
+
+@every_field
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "wide", None, True, [1.0]], ids=str)
+def test_what_is_no_number_is_refused_by_name(section: str, field: dataclasses.Field[Any], value: Any) -> None:
+    part = type(getattr(Parameters(), section)).__name__
+    with pytest.raises(ValueError) as error:
+        Parameters().replace({f"{section}.{field.name}": value})
+    assert str(error.value).startswith(f"{part}.{field.name} = {value!r} is impossible; allowed: ")
+    if not field.metadata["choices"]:
+        assert f"({field.metadata['unit']})" in str(error.value)
+
+
+IMPOSSIBLE = [
+    ("mechanics.mass", 0, "Mechanics.mass = 0 is impossible; allowed: a finite number > 0 (kg)"),
+    ("mechanics.gravity", -9.81, "Mechanics.gravity = -9.81 is impossible; allowed: a finite number >= 0 (m/s2)"),
+    ("cylinder1.stroke", -0.2, "Cylinder.stroke = -0.2"),
+    ("cylinder2.rod_diameter", 0.025, "Cylinder.rod_diameter = 0.025 is impossible; allowed: less than piston_diameter"),
+    ("friction.law", "viscous", "Friction.law = 'viscous' is impossible; allowed: one of 'lugre', 'coulomb'"),
+    ("friction.static_ratio", 0.9, "Friction.static_ratio = 0.9"),
+    ("valves.critical_ratio", 1.0, "Valves.critical_ratio = 1.0 is impossible; allowed: a finite number >= 0 and <= 0.9"),
+    ("valves.time_constant", 1e-5, "Valves.time_constant = 1e-05"),
+    ("air.supply_pressure", 1e5, "Air.supply_pressure = 100000.0 is impossible; allowed: more than atmospheric_pressure"),
+    ("air.heat_capacity_ratio", 1, "Air.heat_capacity_ratio = 1"),
+    ("geometry.k2", 0.2, "Geometry.k2 = 0.2 is impossible; allowed: more than 0.22 m"),
+    ("geometry.k1", 0.5, "Geometry.k1 = 0.5 with stroke 0.2 is impossible; allowed: cylinder 1's length"),
+    ("geometry.d3", 0.9, "Geometry.k1 = 0.43 with stroke 0.2 is impossible"),
+    ("chambers.dead_volume", 0, "Chambers.dead_volume = 0"),
+    ("electronics.control_period", 0, "Electronics.control_period = 0"),
+    ("mechanics.weight", 3, "unknown parameter 'mechanics.weight'; allowed in mechanics: mass, gravity"),
+    ("motor.mass", 3, "unknown parameter section 'motor'; allowed: geometry, cylinder1"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "message"), IMPOSSIBLE, ids=[f"{n}={v}" for n, v, _ in IMPOSSIBLE])
+def test_impossible_values_are_refused_by_name(name: str, value: Any, message: str) -> None:
+    with pytest.raises(ValueError) as error:
+        Parameters().replace({name: value})
+    assert message in str(error.value)
+
+
+def test_parts_are_frozen_and_typed() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Parameters().mechanics.mass = 4.0  # type: ignore[misc]
+    with pytest.raises(ValueError, match="cylinder1 = 25; allowed: an instance of Cylinder"):
+        Parameters(cylinder1=25)  # type: ignore[arg-type]
+
+
+def test_replace_changes_what_it_names_only() -> None:
+    rig = Parameters().replace({"mechanics.mass": 4.0, "cylinder2.coulomb_friction": 20.0})
+    assert rig == dataclasses.replace(
+        Parameters(),
+        mechanics=dataclasses.replace(Parameters().mechanics, mass=4.0),
+        cylinder2=Cylinder(stroke=0.4, coulomb_friction=20.0),
+    )
+
+
+@given(mass=st.floats(2, 5), gamma3=st.floats(-3, 3), volume=st.floats(5e-6, 25e-6), law=st.sampled_from(["lugre", "coulomb"]))
+def test_toml_file_gives_the_same_rig_back(tmp_path_factory: Any, mass: float, gamma3: float, volume: float, law: str) -> None:
+    changes = {"mechanics.mass": mass, "geometry.gamma3": gamma3, "chambers.dead_volume": volume, "friction.law": law}
+    rig, path = Parameters().replace(changes), tmp_path_factory.mktemp("rig") / "rig.toml"
+    rig.to_toml(path)
+    assert Parameters.from_toml(path) == load_parameters(str(path)) == rig
+    assert Parameters.from_dict(rig.to_dict()) == rig
+
+
+def test_toml_file_names_only_what_differs(tmp_path: Path) -> None:
+    path = tmp_path / "laboratory.toml"
+    path.write_text("[mechanics]\nmass = 4\n[friction]\nlaw = 'coulomb'\n")
+    assert load_parameters(path) == Parameters().replace({"mechanics.mass": 4.0, "friction.law": "coulomb"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[mechanics]\nmass = -1\n", r"Mechanics\.mass = -1 is impossible"),
+        ("[mechanics]\nmas = 3\n", r"unknown parameter 'mechanics\.mas'; allowed in mechanics: mass"),
+        ("mass = 3\n", r"mass = 3; allowed: a section"),
+        ("[mechanics\n", r"line 1"),
+        ("[mechanics]\nmass = '3'\n", r"Mechanics\.mass = '3' is impossible"),
+    ],
+)
+def test_wrong_toml_file_is_refused_with_its_name(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as error:
+        load_parameters(path)
+    assert "wrong.toml" in str(error.value)
+
+
+def test_unreadable_files_are_refused_with_their_name(tmp_path: Path) -> None:
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    for name in ("absent.toml", "binary.toml", "."):
+        with pytest.raises(ValueError, match="parameters = ") as error:
+            load_parameters(tmp_path / name)
+        assert str(tmp_path) in str(error.value)
+
+
+def test_columns_of_the_kernels_follow_their_names() -> None:
+    rig = Parameters().replace({"mechanics.mass": 4.5, "cylinder1.coulomb_friction": 10.0, "friction.static_ratio": 1.5})
+    column = dict(zip(PARAMETER_NAMES, parameter_column(rig), strict=True))
+    expected = {"mass": 4.5, "fc1": 10, "fs1": 15, "fc2": 15, "fs2": 22.5, "k1": 0.43, "half_l2": 0.2, "leakage": 0.005 * 3.9e-9}
+    expected |= {"d_squares": 0.35**2 + 0.25**2, "d_product": 2 * 0.35 * 0.25, "perimeter1": math.pi * 0.025, "index": 1.2, "gamma": 1.4}
+    assert {name: column[name] for name in expected} == pytest.approx(expected, rel=1e-14)
+    both = parameter_array([Parameters(), rig], 2)
+    np.testing.assert_array_equal(both, np.stack([parameter_column(Parameters()), parameter_column(rig)], axis=1))
+    np.testing.assert_array_equal(parameter_array(rig, 3), np.repeat(both[:, 1:], 3, axis=1))

@@ -1,0 +1,230 @@
+"""Random streams: each random part has its own, draws fill their documented ranges, and ranges that cannot be are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from birthsim_env import Parameters
+from birthsim_env.lanes import PARAMETER_NAMES, parameter_column
+from birthsim_env.randomization import documented_ranges, draw_parameters
+from birthsim_env.seeding import STREAMS, draw, lane_seeds, stream
+
+DESIGN = {
+    "mechanics.mass": (2.0, 5.0),
+    "chambers.dead_volume": (5e-6, 25e-6),
+    "chambers.wall_heat_transfer": (20.0, 100.0),
+    "valves.time_constant": (1.5e-3, 8e-3),
+    "cylinder1.coulomb_friction": (6.0, 25.0),
+    "cylinder2.coulomb_friction": (6.0, 25.0),
+    "cylinder1.viscous_friction": (10.0, 60.0),
+    "cylinder2.viscous_friction": (10.0, 60.0),
+}
+"""Design section 4: the ranges in brackets."""
+
+COLUMNS = {
+    "mechanics.mass": "mass",
+    "chambers.dead_volume": "dead_volume",
+    "chambers.wall_heat_transfer": "h_wall",
+    "valves.time_constant": "tau",
+    "cylinder1.coulomb_friction": "fc1",
+    "cylinder2.coulomb_friction": "fc2",
+    "cylinder1.viscous_friction": "fv1",
+    "cylinder2.viscous_friction": "fv2",
+}
+
+
+def world(name="BirthSIM/Descent-v0", seed=11, lanes=4, **arguments):
+    """Target motion, stiffness setpoints, user force (over the whole episode) and the rigs that a seed draws."""
+    env = gymnasium.make_vec(name, num_envs=lanes, **arguments).unwrapped
+    env.reset(seed=seed)
+    parts, instants = env.simulation, np.linspace(0, 24, 60)
+    rows = [np.stack([part.sample(np.full(lanes, t)) for t in instants]) for part in (parts.trajectory, parts.stiffness)]
+    zero = np.zeros((2, lanes))
+    force = parts.user_force.force(np.repeat(instants[:, None], lanes, axis=1), zero, zero)
+    return *rows, force, parts.plant.lane_parameters
+
+
+def rigs(lanes=1500, seed=0, **arguments):
+    """Parameter name -> (lanes,) as drawn."""
+    env = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=lanes, **arguments).unwrapped
+    env.reset(seed=seed)
+    return dict(zip(PARAMETER_NAMES, env.simulation.plant.lane_parameters, strict=True))
+
+
+def first_draw(*arguments):
+    return stream(*arguments).random()
+
+
+@given(st.integers(0, 2**63), st.integers(0, 10**6))
+def test_every_stream_of_every_episode_is_its_own_and_repeatable(seed, episode):
+    draws = {(s, e, name): first_draw(s, e, name) for s in (seed, seed + 1) for e in (episode, episode + 1) for name in STREAMS}
+    assert len(set(draws.values())) == 4 * len(STREAMS)
+    assert all(first_draw(*key) == value for key, value in draws.items())
+
+
+def test_neighbouring_seeds_and_episodes_are_uncorrelated():
+    table = np.array([[[first_draw(s, e, name) for name in STREAMS] for e in range(20)] for s in range(60)]) - 0.5
+    bound = 4.5 / 12 / np.sqrt(table[1:].size)
+    for axis in range(3):
+        ahead, behind = (np.take(table, range(k, table.shape[axis] - 1 + k), axis) for k in (0, 1))
+        assert abs((ahead * behind).mean()) < 1.2 * bound
+    assert abs(table.mean()) < 4.5 / np.sqrt(12 * table.size)
+
+
+@pytest.mark.parametrize("change", [{"sensors": "lab"}, {"randomize": True}, {"randomize": True, "sensors": "lab"}])
+def test_other_random_parts_do_not_move_reference_stiffness_and_force(change):
+    base = world(**({"randomize": "scenario"} | {"sensors": "ideal"}))
+    changed = world(**({"randomize": "scenario"} | change))
+    for part in range(3):
+        np.testing.assert_array_equal(base[part], changed[part])
+        assert np.ptp(base[part], axis=-1).max() > 0
+    rig_moved = not np.array_equal(base[3], changed[3])
+    assert rig_moved == (change.get("randomize") is True)
+
+
+def test_randomizing_the_plant_alone_leaves_the_nominal_experiment():
+    nominal, varied = world(randomize=False), world(randomize="plant")
+    for part in range(3):
+        np.testing.assert_array_equal(nominal[part], varied[part])
+    np.testing.assert_array_equal(world(randomize=True)[3], varied[3])
+
+
+@pytest.mark.parametrize("name", ["Circle", "Probe", "Descent", "Forceps", "Dystocia"])
+def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
+    one, other = (world(f"BirthSIM/{name}-v0", seed=seed, lanes=6) for seed in (0, 100))
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert np.ptp(a, axis=-1).max() == 0.0
+
+
+def test_the_documented_ranges_are_those_of_the_design():
+    assert documented_ranges() == {name: pytest.approx(bounds) for name, bounds in DESIGN.items()}
+
+
+def test_draws_stay_inside_their_ranges_and_fill_them_independently():
+    drawn = rigs(randomize="plant")
+    for name, (low, high) in DESIGN.items():
+        values = (drawn[COLUMNS[name]] - low) / (high - low)
+        assert 0 <= values.min() < 0.01, name
+        assert 0.99 < values.max() <= 1, name
+        # Uniform: no decile is off by more than 4.5 standard deviations.
+        counts = np.histogram(values, 10, (0, 1))[0]
+        assert np.abs(counts - 150).max() < 4.5 * np.sqrt(150 * 0.9), name
+    for one, other in itertools.combinations(DESIGN, 2):
+        correlation = np.corrcoef(drawn[COLUMNS[one]], drawn[COLUMNS[other]])[0, 1]
+        assert abs(correlation) < 4.5 / np.sqrt(1500), (one, other)
+    nominal = dict(zip(PARAMETER_NAMES, parameter_column(Parameters()), strict=True))
+    # Static friction follows the Coulomb level by a fixed ratio; all else keeps its nominal value.
+    np.testing.assert_allclose(drawn["fs1"], 1.33 * drawn["fc1"])
+    np.testing.assert_allclose(drawn["fs2"], 1.33 * drawn["fc2"])
+    for name in set(PARAMETER_NAMES) - set(COLUMNS.values()) - {"fs1", "fs2"}:
+        np.testing.assert_array_equal(drawn[name], nominal[name], err_msg=name)
+
+
+def test_a_mapping_draws_just_its_parameters_and_a_new_value_each_episode():
+    drawn = rigs(lanes=300, randomize={"mechanics.mass": (3.5, 4.0), "air.supply_pressure": (6e5, 8e5)})
+    assert 3.5 <= drawn["mass"].min() < 3.51
+    assert 3.99 < drawn["mass"].max() <= 4.0
+    assert 6e5 <= drawn["supply"].min() < 6.05e5
+    assert 7.95e5 < drawn["supply"].max() <= 8e5
+    assert all(np.ptp(values) == 0 for name, values in drawn.items() if name not in ("mass", "supply"))
+    env = gymnasium.make("BirthSIM/Probe-v0", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
+    masses = []
+    for seed in (0, None, None, 0):
+        env.reset(seed=seed)
+        masses.append(env.simulation.plant.lane_parameters[PARAMETER_NAMES.index("mass"), 0])
+    assert len(set(masses[:3])) == 3
+    assert masses[3] == masses[0]
+
+
+def test_a_draw_does_not_depend_on_the_order_of_the_names():
+    ranges = {"mechanics.mass": (2.0, 5.0), "chambers.dead_volume": (5e-6, 2e-5)}
+    one = draw_parameters(Parameters(), ranges, stream(1, 0, "parameters"))
+    other = draw_parameters(Parameters(), dict(reversed(ranges.items())), stream(1, 0, "parameters"))
+    assert one == other != Parameters()
+    assert dataclasses.replace(one, mechanics=Parameters().mechanics, chambers=Parameters().chambers) == Parameters()
+
+
+def test_a_drawn_rig_moves_otherwise_but_starts_on_the_same_target():
+    runs = []
+    for randomize in (False, {"mechanics.mass": (4.9, 5.0)}):
+        env = gymnasium.make("BirthSIM/Circle-v0", randomize=randomize).unwrapped
+        start = env.reset(seed=0)[1]["position"]
+        for _ in range(30):
+            info = env.step(np.full(4, 0.2))[4]
+        runs.append((start, info["position"]))
+    np.testing.assert_array_equal(runs[0][0], runs[1][0])
+    assert np.abs(runs[0][1] - runs[1][1]).max() > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("ranges", "words"),
+    [
+        ({"mechanics.mas": (2, 5)}, ("mechanics.mas", "allowed", "mass")),
+        ({"motor.mass": (2, 5)}, ("motor", "allowed", "mechanics")),
+        ({"mass": (2, 5)}, ("mass", "allowed", "mechanics")),
+        ({3: (2, 5)}, ("3", "allowed")),
+        ({"mechanics.mass": (5, 2)}, ("randomize['mechanics.mass']", "(5, 2)", "ordered")),
+        ({"mechanics.mass": 4.0}, ("randomize['mechanics.mass']", "4.0", "(low, high)")),
+        ({"mechanics.mass": (2, float("nan"))}, ("randomize['mechanics.mass']", "nan", "finite")),
+        ({"mechanics.mass": ("a", "b")}, ("randomize['mechanics.mass']", "'a'", "(low, high)")),
+        ({"mechanics.mass": (0.0, 3.0)}, ("Mechanics.mass", "0.0", "> 0")),
+        ({"valves.critical_ratio": (0.2, 0.95)}, ("critical_ratio", "0.95", "0.9")),
+        ({"friction.law": ("coulomb", "lugre")}, ("friction.law", "numeric")),
+    ],
+)
+def test_bad_ranges_are_refused_by_name_before_the_first_episode(ranges, words):
+    with pytest.raises(ValueError) as refusal:
+        gymnasium.make("BirthSIM/Circle-v0", randomize=ranges)
+    assert all(word in str(refusal.value) for word in words), refusal.value
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["geometry.k2", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed", "electronics.position_noise"],
+)
+def test_what_all_lanes_share_cannot_be_randomized(name):
+    # Drawing them would change nothing, or put the end effector beside its target.
+    with pytest.raises(ValueError, match=rf"randomize\['{name}'\].*allowed"):
+        gymnasium.make("BirthSIM/Circle-v0", randomize={name: (0.1, 0.4)})
+
+
+def test_ranges_are_judged_on_the_users_rig():
+    rig = Parameters().replace({"air.supply_pressure": 1.5e5})
+    with pytest.raises(ValueError, match="supply_pressure"):
+        gymnasium.make("BirthSIM/Circle-v0", parameters=rig, randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)})
+    wide = Parameters().replace({"cylinder1.rod_diameter": 0.02, "cylinder1.piston_diameter": 0.05})
+    env = gymnasium.make("BirthSIM/Circle-v0", parameters=wide, randomize={"cylinder1.rod_diameter": (0.02, 0.03)})
+    assert env.reset(seed=0)[0].shape == (24,)
+
+
+def test_lane_seeds_count_up_or_are_as_given():
+    rng = np.random.default_rng(0)
+    assert lane_seeds(7, 3, rng) == lane_seeds(np.int64(7), 3, rng) == [7, 8, 9]
+    assert lane_seeds([4, 4, 1], 3, rng) == [4, 4, 1]
+    missing = lane_seeds([4, None, None], 3, rng)
+    assert missing[0] == 4
+    assert len({*missing, *lane_seeds(None, 3, rng)}) == 6
+
+
+@pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc", -1])
+def test_bad_seeds_are_refused_by_name(seed):
+    env = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=3)
+    with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed") as refusal:
+        env.reset(seed=seed)
+    assert "allowed" in str(refusal.value) or "greater or equal to zero" in str(refusal.value)
+
+
+@pytest.mark.parametrize("bad", [(2.0, 1.0), (1.0, 2.0, 3.0), (0.0, float("nan")), ("a", "b")])
+def test_a_drawn_number_needs_an_ordered_pair(bad):
+    with pytest.raises(ValueError, match=r"range .* allowed: a number or \(low, high\)"):
+        draw(bad, np.random.default_rng(0))
+    assert draw(3, np.random.default_rng(0)) == 3.0
+    assert 1.0 <= draw((1.0, 2.0), np.random.default_rng(0)) <= 2.0

@@ -1,0 +1,252 @@
+"""The native vector environment: every lane is the single environment of its seed, through all of its episodes."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
+
+from birthsim_env.info import FIELDS
+from birthsim_env.vector_env import BirthSIMVectorEnv
+
+CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v0", "BirthSIM/Probe-v0", "BirthSIM/Forceps-v0"
+TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+
+
+def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
+    env = gymnasium.make_vec(name, num_envs=lanes, **arguments)
+    assert type(env) is BirthSIMVectorEnv
+    return env
+
+
+def single(name=CIRCLE, **arguments):
+    return gymnasium.make(name, **arguments).unwrapped
+
+
+def random_actions(steps, lanes, size=4, reach=0.3, seed=0):
+    return np.random.default_rng(seed).uniform(-reach, reach, (steps, lanes, size)).astype(np.float32)
+
+
+def assert_same(expected, actual, where=""):
+    """Equal to the last bit, NaN included."""
+    assert set(expected) == set(actual), where
+    for name, value in expected.items():
+        np.testing.assert_array_equal(np.asarray(actual[name]), np.asarray(value), err_msg=f"{where} {name}", strict=True)
+
+
+def lane_of(infos, lane):
+    return {name: infos[name][lane] for name in (*FIELDS, *TERMS) if name in infos}
+
+
+def follow(env, actions, seed):
+    """What one environment returns from reset and, step by step, through autoresets made by hand."""
+    yield env.reset(seed=seed)
+    for action in actions:
+        observation, reward, terminated, truncated, info = env.step(action)
+        after = env.reset() if terminated or truncated else None
+        yield observation, reward, terminated, truncated, info, after
+
+
+def test_make_vec_gives_the_native_class_with_batched_spaces():
+    env = make(lanes=5, valves="one_valve")
+    assert env.num_envs == 5 and env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert env.single_action_space.shape == (2,) and env.action_space.shape == (5, 2)
+    assert env.single_observation_space.shape == (22,) and env.observation_space.shape == (5, 22)
+    assert len(env.observation_names) == 22
+    observation, infos = env.reset(seed=0)
+    assert observation in env.observation_space and observation.dtype == np.float32
+    for name, (size, _) in FIELDS.items():
+        assert infos[name].shape == ((5,) if size == 1 else (5, size)), name
+    for array in env.step(env.action_space.sample())[1:4]:
+        assert array.shape == (5,)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        (CIRCLE, {}),
+        (CIRCLE, {"randomize": True, "sensors": "lab"}),
+        (FORCEPS, {"randomize": True, "sensors": "lab", "action_mode": "flow", "valves": "one_valve"}),
+        ("BirthSIM/Descent-v0", {"randomize": True, "action_mode": "flow", "policy_period": 0.02}),
+    ],
+)
+def test_a_lane_of_a_thousand_is_the_single_environment(name, arguments):
+    env = make(name, 1000, **arguments)
+    actions = random_actions(220, 1000, env.single_action_space.shape[0], reach=0.5)
+    lanes = (0, 1, 31, 32, 517, 999)
+    alone = {lane: follow(single(name, **arguments), actions[:, lane], 70 + lane) for lane in lanes}
+    observation, infos = env.reset(seed=70)
+    for lane, walk in alone.items():
+        first, info = next(walk)
+        np.testing.assert_array_equal(observation[lane], first)
+        assert_same(info, lane_of(infos, lane))
+    for step, action in enumerate(actions):
+        observation, rewards, terminated, truncated, infos = env.step(action)
+        for lane, walk in alone.items():
+            where = f"lane {lane}, step {step}"
+            last, reward, ended, cut, info, after = next(walk)
+            assert (rewards[lane], terminated[lane], truncated[lane]) == (reward, ended, cut), where
+            if after is None:
+                np.testing.assert_array_equal(observation[lane], last, err_msg=where)
+                assert_same(info, lane_of(infos, lane), where)
+            else:
+                np.testing.assert_array_equal(infos["final_obs"][lane], last, err_msg=where)
+                assert_same(info, lane_of(infos["final_info"], lane), where)
+                np.testing.assert_array_equal(observation[lane], after[0], err_msg=where)
+
+
+def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
+    arguments = {"randomize": True, "sensors": "lab", "duration": 0.6}
+    env, lanes = make(PROBE, 6, **arguments), range(6)
+    # Lanes 0-3 slam their pistons into the end stops, early and again; 4 and 5 last until the end of time.
+    slam = np.array([[0, 0, 1, -1], [0, 0, -1, 1], [1, -1, 0, 0], [-1, 1, 0, 0], [0, 0, 0, 0], [0.02, 0, 0, 0]], np.float32)
+    walks = [follow(single(PROBE, **arguments), [slam[lane]] * 200, 5 + lane) for lane in lanes]
+    env.reset(seed=5)
+    for walk in walks:
+        next(walk)
+    instants, episodes = [[] for _ in lanes], np.zeros(6, dtype=int)
+    for step in range(200):
+        observation, rewards, terminated, truncated, infos = env.step(slam)
+        ended = terminated | truncated
+        assert ("final_obs" in infos) == ("final_info" in infos) == ended.any()
+        for lane, walk in enumerate(walks):
+            last, reward, dead, cut, info, after = next(walk)
+            assert (rewards[lane], terminated[lane], truncated[lane]) == (reward, dead, cut)
+            if not ended[lane]:
+                np.testing.assert_array_equal(observation[lane], last)
+                assert_same(info, lane_of(infos, lane))
+                continue
+            assert infos["_final_obs"][lane] and infos["_final_info"][lane] and infos["final_info"]["_time"][lane]
+            np.testing.assert_array_equal(infos["final_obs"][lane], last)
+            assert_same(info, lane_of(infos["final_info"], lane))
+            np.testing.assert_array_equal(observation[lane], after[0])
+            assert_same(after[1], {name: infos[name][lane] for name in FIELDS})
+            assert infos["time"][lane] == 0.0 and infos[TERMS[2]][lane] == (-250.0 if dead else 0.0)
+            instants[lane].append(step)
+        if ended.any():
+            np.testing.assert_array_equal(infos["_final_obs"], ended)
+            assert all(infos["final_obs"][lane] is None for lane in np.flatnonzero(~ended))
+        episodes += ended
+    assert instants[4] == instants[5] == [59, 119, 179]
+    assert min(episodes[:4]) >= 3 and len({tuple(one) for one in instants[:4]}) == 4
+
+
+def test_a_list_of_seeds_gives_each_lane_its_own_and_none_a_fresh_one():
+    env, action = make(lanes=4, randomize=True), np.full((4, 4), 0.1)
+    env.reset(seed=[9, 2, 9, None])
+    observation = env.step(action)[0]
+    for lane, seed in enumerate((9, 2, 9)):
+        alone = single(randomize=True)
+        alone.reset(seed=seed)
+        np.testing.assert_array_equal(observation[lane], alone.step(action[lane])[0])
+    assert not np.array_equal(observation[0], observation[1])
+    env.reset(seed=[9, 2, 9, None])
+    again = env.step(action)[0]
+    np.testing.assert_array_equal(again[:3], observation[:3])
+    assert not np.array_equal(again[3], observation[3])
+
+
+def test_a_reset_without_a_seed_is_the_next_episode_and_never_the_same():
+    env = make(lanes=2, randomize=True)
+    rows = [env.reset(seed=1)[0], env.reset()[0], env.reset()[0]]
+    assert len({row.tobytes() for row in rows}) == 3
+    again = [env.reset(seed=1)[0], env.reset()[0], env.reset()[0]]
+    np.testing.assert_array_equal(again, rows)
+    unseeded = [make(lanes=2, randomize=True).reset()[0] for _ in range(2)]
+    assert not np.array_equal(*unseeded)
+
+
+def test_the_world_of_an_episode_depends_on_seed_and_number_alone():
+    arguments = {"randomize": True, "sensors": "lab", "max_episode_steps": 30}
+    worlds = []
+    for reach in (0.0, 0.6):
+        env = make(FORCEPS, 5, **arguments)
+        env.reset(seed=3)
+        for action in random_actions(75, 5, reach=reach, seed=8):
+            infos = env.step(action)[4]
+        rows = env.simulation.reference.rows
+        force = env.simulation.user_force.force(np.linspace(0, 15, 40)[:, None] * np.ones(5), None, None)
+        noise = env.simulation.sensors._keys
+        worlds.append([env.simulation.plant.lane_parameters.copy(), rows, force, noise.copy(), infos["position"]])
+    calm, wild = worlds
+    for part in range(4):
+        np.testing.assert_array_equal(calm[part], wild[part])
+        assert len(np.unique(calm[part][..., :], axis=-1).T) == 5
+    assert np.abs(calm[4] - wild[4]).min() > 0
+
+
+def test_every_step_returns_arrays_that_later_steps_leave_alone():
+    env = make(lanes=3, sensors="lab", max_episode_steps=4)
+    observation, infos = env.reset(seed=0)
+    kept = [(observation, observation.copy())] + [(value, value.copy()) for value in infos.values()]
+    for action in random_actions(9, 3):
+        observation, rewards, _, _, infos = env.step(action)
+        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *TERMS)), env.measurement.pressures)
+        kept += [(value, value.copy()) for value in values]
+    for value, copy in kept:
+        np.testing.assert_array_equal(value, copy)
+    assert not any(np.shares_memory(one, other) for (one, _), (other, _) in zip(kept[1:40], kept[60:99], strict=True))
+
+
+@pytest.mark.parametrize("lanes", [1, 2])
+def test_the_callers_action_array_is_neither_kept_nor_written(lanes):
+    env, action = make(lanes=lanes, max_episode_steps=2), np.full((lanes, 4), 0.1)
+    env.reset(seed=0)
+    env.step(action)
+    action[:] = -0.1
+    # The change of an action counts, though the caller uses one array again and again.
+    np.testing.assert_allclose(env.step(action)[4]["reward_action_change"], -0.05 * 4 * 0.2)
+    np.testing.assert_array_equal(action, -0.1)
+
+
+@pytest.mark.parametrize(("limit", "steps"), [(7, 7), (10**6, 20), (None, 20), (-1, 20)])
+def test_max_episode_steps_shortens_episodes_and_minus_one_does_not(limit, steps):
+    env = make(PROBE, 2, max_episode_steps=limit, duration=0.2)
+    env.reset(seed=0)
+    truncations = [env.step(np.zeros((2, 4)))[3].all() for _ in range(2 * steps)]
+    assert truncations == ([False] * (steps - 1) + [True]) * 2
+
+
+@pytest.mark.parametrize("limit", [0, -2, 2.5, "3"])
+def test_other_episode_lengths_are_refused(limit):
+    with pytest.raises(ValueError, match=r"max_episode_steps = .*; allowed: None, -1 \(no limit\) or a whole number >= 1"):
+        make(max_episode_steps=limit)
+
+
+def test_gymnasiums_vector_wrappers_work():
+    env = RecordEpisodeStatistics(make(PROBE, 3, duration=0.5))
+    env.reset(seed=0)
+    slam = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0, 0, 0, 0]], np.float32)
+    paid, lengths = np.zeros(3), [[], [], []]
+    for _ in range(50):
+        _, rewards, terminated, truncated, infos = env.step(slam)
+        paid += rewards
+        for lane in np.flatnonzero(terminated | truncated):
+            lengths[lane].append(infos["episode"]["l"][lane])
+            assert infos["episode"]["r"][lane] == pytest.approx(paid[lane])
+            paid[lane] = 0.0
+    assert lengths[1] == lengths[2] == [50] and len(lengths[0]) >= 1 and env.episode_count == 2 + len(lengths[0])
+    listed = DictInfoToList(make(PROBE, 2, max_episode_steps=1))
+    listed.reset(seed=0)
+    infos = listed.step(np.zeros((2, 4)))[4]
+    assert [info["time"] for info in infos] == [0.0, 0.0]
+    assert [info["final_info"]["time"] for info in infos] == [0.01, 0.01]
+    assert all(info["final_obs"].shape == (24,) for info in infos)
+
+
+def test_the_generic_vectorization_gives_the_same_numbers():
+    generic = gymnasium.make_vec(CIRCLE, num_envs=2, vectorization_mode="sync", randomize=True)
+    native, action = make(lanes=2, randomize=True), np.full((2, 4), 0.1, np.float32)
+    np.testing.assert_array_equal(generic.reset(seed=3)[0], native.reset(seed=3)[0])
+    np.testing.assert_array_equal(generic.step(action)[0], native.step(action)[0])
+
+
+def test_frames_of_every_lane_and_closing_twice():
+    env = make(lanes=2, render_mode="rgb_array")
+    env.reset(seed=0)
+    frames = env.render()
+    assert len(frames) == 2 and all(frame.shape == (480, 640, 3) and frame.dtype == np.uint8 for frame in frames)
+    env.close(), env.close()
+    assert make().render() is None
