@@ -12,7 +12,7 @@ from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import Mask, Measurement, Reference
+from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -68,16 +68,28 @@ class BacksteppingController:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
         ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons.
+        Raises ``ValueError`` for signals over different numbers of lanes.
         """
         if measurement.position.ndim == 1:
             return self._command_one(measurement, reference, believed_force)
         lanes = measurement.position.shape[1]
+        believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
+        for name, signal, rows in (
+            ("measurement.position", measurement.position, 2),
+            ("measurement.velocity", measurement.velocity, 2),
+            ("measurement.pressures", measurement.pressures, 4),
+            ("reference.rows", reference.rows, REFERENCES),
+            ("believed_force", believed, 2),
+        ):
+            if signal.shape != (rows, lanes):
+                raise ValueError(
+                    f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
+                )
         if measurement.sampled:
             joints = np.ascontiguousarray(self._observer.update(measurement))
         else:
             joints = np.empty((4, lanes))
             _measured_joints(measurement.position, measurement.velocity, self._p, joints)
-        believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
         openings = np.empty((4, lanes))
         backstepping_law.command(joints, measurement.pressures, reference.rows, believed, self._p, *self._options, openings)
         return openings

@@ -65,6 +65,7 @@ def _setpoints(axes: Axes, record: dict[str, Array]) -> None:
     right = axes.twinx()
     right.plot(time, record["stiffness_setpoint"][:, 0], color=LIGHT, lw=2.5, label="$K_{clx} = K_{cly}$ (right)")
     right.set(ylabel="closed-loop stiffness setpoint (N/m)", ylim=(0, 9000))
+    right.set_yticks(range(0, 9000, 2000))
     right.grid(False)
     right.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *right.get_lines()]
@@ -85,13 +86,14 @@ def _pneumatic(axes: Axes, record: dict[str, Array]) -> None:
 def _path(axes: Axes, record: dict[str, Array]) -> None:
     half = record["stiffness_setpoint"][:, 0] <= np.median(np.unique(record["stiffness_setpoint"][:, 0]))
     target = 1e3 * record["target"]
-    axes.plot(target[:, 0], target[:, 1], color="black", ls=":", lw=1.5, label="target")
+    axes.plot(target[:, 0], target[:, 1], color="black", lw=0.8, label="target")
     for chosen, colour, style, name in ((half, LIGHT, "-", "softer half"), (~half, MIDDLE, "--", "stiffer half")):
         position = 1e3 * record["position"][chosen]
         axes.plot(position[:, 0], position[:, 1], color=colour, ls=style, label=f"end effector, {name}")
-    axes.set(xlabel="$x_c$ (mm)", ylabel="$y_c$ (mm)")
+    # Room for the legend beside the circle.
+    axes.set(xlabel="$x_c$ (mm)", ylabel="$y_c$ (mm)", xlim=(425, 645))
     axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="center")
+    axes.legend(loc="center right")
     _letter(axes, "c", "Cartesian path")
 
 

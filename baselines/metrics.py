@@ -67,6 +67,7 @@ class EpisodeMetrics:
         self._still = np.ones(num_lanes, dtype=np.bool_)
         self._rest: Array = np.zeros((2, num_lanes))
         self._pushed: Array = np.zeros((2, num_lanes))
+        self._held: Array = np.zeros((2, 2, num_lanes))
 
     def add(self, info: dict[str, Any], command: Array, alive: NDArray[np.bool_]) -> None:
         """Take the ``info`` of a vector environment and the openings (4, N) commanded at the same instant.
@@ -96,7 +97,7 @@ class EpisodeMetrics:
                 same &= (now == before).all(axis=0)
             self._still &= (asked[0] == self._last[0]).all(axis=0) & (asked[2] == self._last[2]).all(axis=0) | ~alive
         self._last = tuple(values.copy() for values in asked)
-        self._quiet = np.where(same, self._quiet + self._period, 0.0)
+        self._quiet = np.where(alive, np.where(same, self._quiet + self._period, 0.0), self._quiet)
         counts = alive & (self._quiet >= QUIET)
         # A window that ends gives its span to the worst one seen; a new one starts from nothing.
         self._low = np.where(counts, np.minimum(self._low, position), np.inf)
@@ -108,10 +109,10 @@ class EpisodeMetrics:
         self._stuck = np.where(speed < STUCK, True, np.where(speed > RUNNING, False, self._stuck))
         unpushed = alive & (force == 0).all(axis=0)
         self._rest = np.where(unpushed, position, self._rest)
-        # Half a second of averaging takes the hunting out of the displacement.
-        share = self._period / 0.5
-        self._pushed = np.where(counts, self._pushed + share * (position - self._rest - self._pushed), 0.0)
-        self._held = info["user_force"].T, info["stiffness_setpoint"].T, self._quiet
+        # Half a second of averaging, from the displacement at the window's start, takes the hunting out.
+        share = np.where(counts, self._period / 0.5, 1.0)
+        self._pushed += alive * share * (position - self._rest - self._pushed)
+        self._held = np.where(alive, np.stack([force, info["stiffness_setpoint"].T]), self._held)
 
     def result(self) -> dict[str, Array]:
         """Every metric of ``UNITS`` per lane, (N,); NaN where an episode says nothing about it."""
@@ -141,14 +142,14 @@ class EpisodeMetrics:
         return {name: values[name] for name in UNITS}
 
     def _rendered(self) -> tuple[Array, Array]:
-        force, setpoint, quiet = self._held
+        force, setpoint = self._held
         size = np.hypot(*force)
         direction = force / size
         along = np.einsum("in,in->n", self._pushed, direction)
         across = direction[0] * self._pushed[1] - direction[1] * self._pushed[0]
         # Compliance along the push of a spring with the stiffnesses asked for on x and y.
         asked = 1 / np.einsum("in,in->n", direction**2, 1 / setpoint)
-        says = self._still & (size > 0) & (quiet >= QUIET + 1.0)
+        says = self._still & (size > 0) & (self._quiet >= QUIET + 1.0)
         return np.where(says, 100 * (size / along / asked - 1), np.nan), np.where(says, 1e3 * np.abs(across), np.nan)
 
 

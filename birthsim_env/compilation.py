@@ -32,7 +32,7 @@ _PACKAGES = ("birthsim_env", "baselines", "agents")
 
 @cache
 def _source_stamp() -> str:
-    """One hash of every module with kernels and of the row numbers they share: Numba itself only looks at the file of the outermost function."""
+    """One hash of all kernels and the row numbers they share: Numba itself looks at the outermost function's file only."""
     digest = hashlib.sha256(numba.__version__.encode())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).glob("*.py")):

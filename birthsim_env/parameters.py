@@ -232,7 +232,7 @@ class Parameters:
         if not shortest * 1.05 < least < most < longest * 0.98:
             raise ValueError(
                 f"Geometry.k1 = {g.k1!r} with stroke {self.cylinder1.stroke!r} is impossible; allowed: cylinder 1's "
-                f"length {least:g} to {most:g} m must stay inside {shortest * 1.05:g} to {longest * 0.98:g} m, off its singularities"
+                f"length {least:g} to {most:g} m must lie in {shortest * 1.05:g} to {longest * 0.98:g} m"
             )
 
     def replace(self, changes: dict[str, Any]) -> Parameters:

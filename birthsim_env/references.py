@@ -128,6 +128,10 @@ class Path(Trajectory):
     ) -> None:
         if not ends > begins:
             raise ValueError(f"ends = {ends!r}; allowed: later than begins = {begins!r} (s)")
+        if not np.min(length) >= 0:
+            raise ValueError(f"length = {length!r}; allowed: >= 0 (m)")
+        if not np.min(radius) > 0:
+            raise ValueError(f"radius = {radius!r}; allowed: > 0 (m)")
         self.start, self.heading, self.length, self.radius, self.angle = start, heading, length, radius, angle
         self.begins, self.ends = begins, ends
 

@@ -132,9 +132,9 @@ class Simulation:
         end_effector_motion(plant.state, plant.lane_parameters, motion)
         self.motion = motion
         times = self.time + self.period * np.arange(self._stride)[:, None]
-        self._forces = checked(
-            "user_force.force(...)", self.user_force.force(times, motion[:2], motion[2:]), self._forces.shape, "N"
-        )
+        force = self.user_force.force(times, motion[:2], motion[2:])
+        # A copy: the hand may fill one array anew each time, and jumps are told from the old samples and the new.
+        self._forces = checked("user_force.force(...)", force, self._forces.shape, "N").copy()
         self.reference = Reference(self._sample_reference(self.time))
         self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
 

@@ -37,11 +37,13 @@ class StiffnessSchedule:
         columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
         if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns):
             raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
-        if any(later <= sooner for sooner, later in pairwise(times)):
+        if not all(sooner < later for sooner, later in pairwise(times)):
             raise ValueError(f"times = {times!r}; allowed: increasing (s)")
         for setpoint in (number for column in columns for number in column):
             if not np.min(setpoint) > 0:
                 raise ValueError(f"stiffness setpoint {setpoint!r}; allowed: more than 0 (N/m)")
+        if not transition > 0:
+            raise ValueError(f"transition = {transition!r}; allowed: more than 0 (s)")
         self.times, self.transition = times, transition
         self.closed_loop, self.closed_loop_y = closed_loop, closed_loop_y
         self.pneumatic1, self.pneumatic2 = pneumatic1, pneumatic2

@@ -57,14 +57,24 @@ def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> Non
             forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
 
 
+def _checked_knots(name: str, knots: list[tuple[float, float, float]]) -> Array:
+    """Knots as an array (M, 3), or a ``ValueError`` that names them."""
+    try:
+        array = np.array(knots, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    shaped = array.ndim == 2 and array.shape[1] == 3
+    if not shaped or not np.isfinite(array).all() or (np.diff(array[:, 0]) < 0).any():
+        raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
+    return array
+
+
 class ForceProfile(UserForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         self._fixed = knots or [(0.0, 0.0, 0.0)]
-        times = [knot[0] for knot in self._fixed]
-        if times != sorted(times) or not np.isfinite(self._fixed).all():
-            raise ValueError(f"knots = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
+        _checked_knots("knots", self._fixed)
 
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         """(time, Fx, Fy) of one episode, s and N, with increasing times."""
@@ -75,7 +85,7 @@ class ForceProfile(UserForce):
         self._counts = np.ones(num_envs)
 
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        knots = np.array(self.knots(rng), dtype=np.float64)
+        knots = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(rng))
         missing = len(knots) - len(self._knots)
         if missing > 0:
             self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
@@ -118,6 +128,8 @@ class Ramp(ForceProfile):
 
     def __init__(self, amplitude: Range = 20.0, angle: Range | str = 0.0, begins: float = 1.0, rise: float = 1.0) -> None:
         super().__init__()
+        if isinstance(angle, str) and angle != "axes":
+            raise ValueError(f"angle = {angle!r}; allowed: a number or (low, high) in rad, or 'axes'")
         self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
 
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
@@ -144,6 +156,8 @@ class Pulls(ForceProfile):
         pause: float = 1.2,
     ) -> None:
         super().__init__()
+        if not np.min(rate) > 0:
+            raise ValueError(f"rate = {rate!r}; allowed: > 0 (N/s)")
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 

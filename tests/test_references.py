@@ -201,7 +201,7 @@ def test_a_users_own_trajectory_serves_one_lane_and_many():
         (lambda time: np.full((2, len(time)), 0.5), ("reference.sample(time)", "(2, 1)", "(8, 1)")),
         (lambda time: np.zeros(8), ("reference.sample(time)", "(8,)", "(8, 1)")),
         (lambda time: np.full((8, len(time)), np.nan), ("reference.sample(time)[0, 0] = nan", "finite")),
-        (lambda time: None, ("reference.sample(time)", "nan|None")),
+        (lambda time: None, ("reference.sample(time)", "(8, 1)")),
         (lambda time: [["a"]] * 8, ("reference.sample(time)", "'a'", "numbers of shape (8, 1)")),
     ],
 )
@@ -212,8 +212,7 @@ def test_answers_of_a_wrong_shape_are_refused_by_name(answer, words):
 
     with pytest.raises(ValueError) as refusal:
         gymnasium.make("BirthSIM/Probe-v0", reference=Wrong()).reset(seed=0)
-    for word in words:
-        assert any(option in str(refusal.value) for option in word.split("|")), refusal.value
+    assert all(word in str(refusal.value) for word in words), refusal.value
 
 
 def test_a_trajectory_without_sample_says_what_is_missing():

@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from PIL import Image
 from tqdm import tqdm
 
 import birthsim_env
@@ -15,6 +16,9 @@ from baselines.commands.shared import make_folder, run, write_json
 from baselines.metrics import SETTLED
 from baselines.registry import CONTROLLERS, make_controller
 from birthsim_env.lanes import Array
+
+PICTURE_TIME = 1.8
+"""s: in the middle of the first push."""
 
 FIELDS = (
     *("time", "since_jump", "user_force", "stiffness_setpoint", "pneumatic_stiffness", "pneumatic_stiffness_setpoint"),
@@ -28,15 +32,20 @@ def main() -> None:
     parser.add_argument("--controller", default="backstepping", choices=tuple(CONTROLLERS), help="default: the paper's")
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png, figure4.svg and figure4.json")
+    parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png and .svg, figure4.json, rig.png")
     run(parser, _figure4)
 
 
-def record_run(controller: str, sensors: str = "ideal", parameters: Any = None) -> dict[str, Array]:
-    """The nominal Circle under a controller at the control rate: the ``info`` fields over time, SI units."""
+def record_run(
+    controller: str, sensors: str = "ideal", parameters: Any = None, picture: Path | None = None
+) -> dict[str, Array]:
+    """The nominal Circle under a controller at the control rate: the ``info`` fields over time, SI units.
+
+    ``picture`` is where to save what the rig looks like during the first push.
+    """
     rig = birthsim_env.parameters.load_parameters(parameters)
     period = rig.electronics.control_period
-    env = gymnasium.make("BirthSIM/Circle-v0", parameters=rig, sensors=sensors, policy_period=period)
+    env = gymnasium.make("BirthSIM/Circle-v0", parameters=rig, sensors=sensors, policy_period=period, render_mode="rgb_array")
     law = make_controller(controller, rig)
     machine: Any = env.unwrapped
     _, info = env.reset(seed=0)
@@ -51,6 +60,9 @@ def record_run(controller: str, sensors: str = "ideal", parameters: Any = None) 
             ended = terminated or truncated
             if len(record["time"]) % 500 == 0:
                 bar.update(500)
+            if picture is not None and len(record["time"]) == round(PICTURE_TIME / period):
+                Image.fromarray(np.asarray(env.render())).save(picture)
+    env.close()
     return {name: np.array(values) for name, values in record.items()}
 
 
@@ -75,7 +87,7 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
 def _figure4(arguments: argparse.Namespace) -> None:
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
     folder = make_folder(arguments.out)
-    record = record_run(arguments.controller, arguments.sensors, rig)
+    record = record_run(arguments.controller, arguments.sensors, rig, folder / "rig.png")
     result = figures_of(record, rig)
     from baselines.figures import figure4
 
@@ -86,7 +98,7 @@ def _figure4(arguments: argparse.Namespace) -> None:
     for name, values in result.items():
         if isinstance(values, list):
             print(f"{name:44}{values[0]:10.3f}{values[1]:10.3f}")
-    print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json")
+    print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json, rig.png")
 
 
 if __name__ == "__main__":

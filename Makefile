@@ -1,0 +1,49 @@
+# make run    installs, reproduces Fig. 4, trains a residual policy for about two minutes and evaluates it
+# make test   installs and runs the tests; make test-slow runs those marked slow
+# make lint   ruff and mypy; make bench prints speeds; make pictures redraws the README's pictures
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+OUT := out
+# pip's first copy of a package decides; a build that finds none on disk must not wait for a prompt.
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
+
+.PHONY: run test test-slow lint bench pictures golden clean
+
+$(READY): pyproject.toml constraints.txt
+	test -x $(BIN)/python || python3 -m venv $(VENV)
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,dev]'
+	touch $(READY)
+
+run: $(READY)
+	@echo "== 1 of 3: the experiment of Fig. 4"
+	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+	@echo "== 2 of 3: a residual policy on top of the law, about two minutes"
+	$(BIN)/birthsim-train --env BirthSIM/CircleResidual-v0 --seed 0 --out $(OUT)/policy
+	@echo "== 3 of 3: law and residual on 64 episodes that training never saw"
+	$(BIN)/birthsim-evaluate --env BirthSIM/Circle-v0 --controller residual --policy $(OUT)/policy --episodes 64 --seed 10000 --out $(OUT)/evaluation
+
+test: $(READY)
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+test-slow: $(READY)
+	$(BIN)/python -m pytest -n 2 -m slow
+
+lint: $(READY)
+	$(BIN)/ruff check birthsim_env baselines agents tests
+	$(BIN)/ruff format --check birthsim_env baselines agents tests
+	$(BIN)/mypy
+
+bench: $(READY)
+	$(BIN)/birthsim-bench --out $(OUT)/bench
+
+pictures: $(READY)
+	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
+
+golden: $(READY)
+	$(BIN)/python -m tests.golden.make
+
+clean:
+	rm -rf $(VENV) $(OUT)

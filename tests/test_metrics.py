@@ -1,0 +1,265 @@
+"""The figures of an episode on made-up signals whose answers are known by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.metrics import NORMAL_DENSITY, UNITS, EpisodeMetrics, summarize
+
+PERIOD = 1e-3
+SIZES = {"since_jump": 0, "supply_flow": 0}
+RESTING = {
+    "since_jump": 10.0,
+    "supply_flow": 0.0,
+    "tracking_error": (0.0, 0.0),
+    "position": (0.5, 0.0),
+    "velocity": (0.0, 0.0),
+    "target": (0.5, 0.0),
+    "user_force": (0.0, 0.0),
+    "stiffness_setpoint": (2000.0, 2000.0),
+    "pneumatic_stiffness": (4000.0, 2000.0),
+    "pneumatic_stiffness_setpoint": (4000.0, 2000.0),
+}
+
+
+def measure(steps, lanes=1, period=PERIOD, command=0.0, alive=True, **signals):
+    """Metrics after ``steps`` samples. A signal is (), (T,), (T, lanes) or with a last axis of 2 where it has x and y."""
+    metrics = EpisodeMetrics(lanes, period)
+    shapes = {name: (steps, lanes) if name in SIZES else (steps, lanes, 2) for name in RESTING}
+    given = {**RESTING, **signals}
+    full = {name: np.broadcast_to(np.asarray(given[name], dtype=float), shape) for name, shape in shapes.items()}
+    commands = np.broadcast_to(np.asarray(command, dtype=float), (steps, 4, lanes))
+    living = np.broadcast_to(np.asarray(alive, dtype=bool), (steps, lanes))
+    for k in range(steps):
+        metrics.add({name: values[k] for name, values in full.items()}, commands[k], living[k])
+    return metrics.result()
+
+
+def over_time(values):
+    """(T,) as (T, 1, 1), or (T, 2) as (T, 1, 2)."""
+    values = np.asarray(values, dtype=float)
+    return values[:, None, None] if values.ndim == 1 else values[:, None, :]
+
+
+def test_every_metric_has_a_unit_and_one_value_per_lane():
+    result = measure(10, lanes=3)
+    assert list(result) == list(UNITS)
+    assert all(values.shape == (3,) for values in result.values())
+
+
+def test_errors_whole_and_settled_are_rms_and_largest_size_in_millimetres():
+    # 4 samples before the error counts as settled, then 6.
+    error = 1e-3 * np.array([[9, -9]] * 4 + [[3, -4], [-3, 4], [3, 0], [-3, 0], [0, -4], [0, 0]])
+    since = np.array([0.1, 0.2, 0.499, 0.4999] + [0.5, 0.5001, 0.6, 1, 2, 3])
+    result = measure(10, tracking_error=over_time(error), since_jump=since[:, None])
+    assert result["error_rms_x"] == pytest.approx(math.sqrt((4 * 81 + 4 * 9) / 10))
+    assert result["error_rms_y"] == pytest.approx(math.sqrt((4 * 81 + 3 * 16) / 10))
+    assert (result["error_max_x"], result["error_max_y"]) == (pytest.approx(9), pytest.approx(9))
+    assert result["settled_rms_x"] == pytest.approx(math.sqrt(4 * 9 / 6))
+    assert result["settled_rms_y"] == pytest.approx(math.sqrt(3 * 16 / 6))
+    assert result["settled_rms"] == pytest.approx(math.sqrt((4 * 9 + 3 * 16) / 6))
+    assert (result["settled_max_x"], result["settled_max_y"]) == (pytest.approx(3), pytest.approx(4))
+
+
+def test_pneumatic_stiffness_error_is_relative_to_its_setpoint():
+    stiffness = over_time([[4400, 2000], [3600, 1900], [4000, 2000], [4000, 2000]])
+    result = measure(4, pneumatic_stiffness=stiffness)
+    assert result["pneumatic_rms_1"] == pytest.approx(100 * math.sqrt(2 * 0.01 / 4))
+    assert result["pneumatic_rms_2"] == pytest.approx(100 * math.sqrt(0.0025 / 4))
+
+
+@pytest.mark.parametrize("period", [0.001, 0.004])
+def test_air_is_in_normal_litres_per_minute_whatever_the_period(period):
+    # One gram per second for half of the time.
+    flow = np.where(np.arange(500) < 250, 1e-3, 0.0)[:, None]
+    expected = 0.5 * 1e-3 / NORMAL_DENSITY * 1000 * 60
+    assert measure(500, period=period, supply_flow=flow)["air"] == pytest.approx(expected)
+    assert expected == pytest.approx(23.2, abs=0.05)
+
+
+def test_saturation_is_the_share_of_time_with_any_valve_at_its_limit():
+    command = np.zeros((8, 4, 1))
+    command[0, 3], command[1, 0], command[2, 1:3], command[3] = 1.0, -1.0, 1.0, 0.9999
+    assert measure(8, command=command)["saturation"] == pytest.approx(100 * 3 / 8)
+
+
+def test_a_lane_that_is_not_alive_is_left_as_it_is():
+    rng = np.random.default_rng(0)
+    signals = {
+        "tracking_error": rng.normal(size=(900, 2, 2)),
+        "since_jump": rng.uniform(0, 1, (900, 2)),
+        "supply_flow": rng.uniform(0, 1, (900, 2)),
+        "pneumatic_stiffness": rng.uniform(3000, 5000, (900, 2, 2)),
+        "command": rng.uniform(-1.2, 1.2, (900, 4, 2)).clip(-1, 1),
+    }
+    # Lane 1 dies after 300 samples, lane 0 lives.
+    alive = np.stack([np.ones(900, bool), np.arange(900) < 300], axis=1)
+    both = measure(900, lanes=2, alive=alive, **signals)
+    whole = measure(900, **{name: values[..., :1, :] if values.shape[2:] == (2,) and name != "command" else values[..., :1] for name, values in signals.items()})
+    short = measure(300, **{name: values[:300, 1:, :] if name in RESTING and name not in SIZES else values[:300, ..., 1:] for name, values in signals.items()})
+    for name in UNITS:
+        np.testing.assert_array_equal(both[name], [whole[name][0], short[name][0]], err_msg=name)
+    assert both["error_rms_x"][1] > 100
+
+
+def hold(seconds, wobble, quiet_from=0.0):
+    """Positions that leave 0.5 by ``wobble``(time) on x and by half of it on y, and the instants."""
+    time = PERIOD * np.arange(round(seconds / PERIOD))
+    x = wobble(time)
+    return time, over_time(np.stack([0.5 + x, 0.5 * x], axis=1))
+
+
+def test_hunting_is_peak_to_peak_where_all_has_been_constant_for_a_second():
+    # Wild for the first 0.9 s, then +-0.4 mm.
+    time, position = hold(3, lambda t: np.where(t < 0.9, 0.05, 0.4e-3) * np.sin(2 * np.pi * 5 * t))
+    result = measure(len(time), position=position)
+    assert result["hunting_x"] == pytest.approx(0.8, rel=1e-3)
+    assert result["hunting_y"] == pytest.approx(0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["target", "user_force", "stiffness_setpoint", "pneumatic_stiffness_setpoint"])
+def test_a_change_of_anything_asked_for_starts_the_second_anew(name):
+    # The signal steps at 1.5 s, the end effector jumps by 10 mm at 2.3 s: within the second after, so not hunting.
+    time, position = hold(3.2, lambda t: np.where(t < 2.3, 0.0, 10e-3))
+    later = np.array(RESTING[name]) * np.array([1, 1.5]) + np.array([0, 1.0])
+    stepped = over_time(np.where(time[:, None] < 1.5, RESTING[name], later))
+    quiet, calm = measure(len(time), position=position, **{name: stepped}), measure(len(time), position=position)
+    assert quiet["hunting_x"] == 0
+    assert calm["hunting_x"] == pytest.approx(10)
+
+
+def test_hunting_takes_the_worst_window_and_never_spans_two():
+    # Two quiet windows 5 mm apart, 0.2 mm and 0.6 mm wide; the push between them does not count.
+    def wobble(t):
+        return np.where(t < 2.5, 0.1e-3, 5e-3 + 0.3e-3) * np.where(t < 2.5, np.sin(40 * t), 1) + np.where(t < 2.5, 0, 0.3e-3 * np.sin(40 * t))
+
+    time, position = hold(5, wobble)
+    force = over_time(np.where((time > 2.2)[:, None], (10.0, 0.0), (0.0, 0.0)))
+    result = measure(len(time), position=position, user_force=force)
+    assert result["hunting_x"] == pytest.approx(0.6, rel=1e-2)
+
+
+def test_hunting_and_restarts_say_nothing_where_no_window_is_quiet():
+    time, position = hold(3, lambda t: 1e-3 * np.sin(40 * t))
+    moving = over_time(np.stack([0.5 + 0.01 * time, 0 * time], axis=1))
+    result = measure(len(time), position=position, target=moving)
+    for name in ("hunting_x", "hunting_y", "restarts", "stiffness_error", "cross_motion"):
+        assert np.isnan(result[name]).all(), name
+    short = measure(900)
+    assert np.isnan(short["hunting_x"]).all() and np.isnan(short["restarts"]).all()
+
+
+def test_restarts_per_second_count_breaks_from_rest_with_a_dead_band():
+    # From 1 s on, four bursts above 2 mm/s from below 0.5 mm/s; the dips to 1 mm/s within a burst are none.
+    time = PERIOD * np.arange(5000)
+    speed = np.zeros(5000)
+    for start in (0.2, 1.5, 2.3, 3.1, 3.9):
+        speed[round(1000 * start) : round(1000 * start) + 300] = 3e-3
+        speed[round(1000 * start) + 100 : round(1000 * start) + 200] = 1e-3
+    velocity = over_time(np.stack([0.6 * speed, -0.8 * speed], axis=1))
+    result = measure(len(time), velocity=velocity)
+    # The burst at 0.2 s lies before the window of 4 s.
+    assert result["restarts"] == pytest.approx(4 / 4, rel=2e-3)
+    assert measure(len(time), velocity=1.9e-3)["restarts"] == 0
+
+
+def spring(angle, push=20.0, rendered=(2000.0, 2000.0), asked=(2000.0, 2000.0), seconds=5.0, offset=(0.0, 0.0), wobble=0.0):
+    """The stiffness test on a spring: nothing for a second, a ramp of a second, then held."""
+    time = PERIOD * np.arange(round(seconds / PERIOD))
+    force = push * np.clip(time - 1, 0, 1)[:, None] * [math.cos(angle), math.sin(angle)]
+    shift = np.array(offset) * (time >= 1)[:, None] + wobble * np.sin(2 * np.pi * 10 * time)[:, None]
+    position = (0.45, 0.02) + force / rendered + shift
+    return measure(len(time), target=(0.452, 0.02), position=over_time(position), user_force=over_time(force), stiffness_setpoint=asked)
+
+
+@pytest.mark.parametrize("angle", [0, math.pi / 2, math.pi, -math.pi / 2, 0.7])
+@pytest.mark.parametrize("seconds", [4.05, 5.0, 9.0])
+def test_an_exact_spring_has_no_stiffness_error_and_no_cross_motion(angle, seconds):
+    result = spring(angle, seconds=seconds)
+    assert result["stiffness_error"] == pytest.approx(0, abs=0.01)
+    assert result["cross_motion"] == pytest.approx(0, abs=1e-3)
+
+
+def test_stiffness_error_is_rendered_over_asked_less_one():
+    assert spring(0, rendered=(2500, 1000))["stiffness_error"] == pytest.approx(25, abs=0.02)
+    assert spring(math.pi / 2, rendered=(2500, 1000))["stiffness_error"] == pytest.approx(-50, abs=0.02)
+    assert spring(0, rendered=(2500, 1000), asked=(4000, 1000))["stiffness_error"] == pytest.approx(-37.5, abs=0.02)
+    # Along a slanted push the springs asked for on x and y both give way.
+    unequal = spring(math.pi / 4, rendered=(1000, 4000), asked=(1000, 4000))
+    assert unequal["stiffness_error"] == pytest.approx(0, abs=0.02)
+    # 20 N: 14.142 mm and 3.536 mm on the axes, so 7.5 mm across the push.
+    assert unequal["cross_motion"] == pytest.approx(1e3 * 20 / 2 * (1 / 1000 - 1 / 4000), rel=1e-3)
+
+
+def test_stiffness_is_measured_from_the_place_before_the_push_and_cross_motion_across_it():
+    result = spring(0, offset=(0.0, 1.5e-3))
+    assert result["stiffness_error"] == pytest.approx(0, abs=0.02)
+    assert result["cross_motion"] == pytest.approx(1.5, rel=1e-3)
+
+
+def test_hunting_is_averaged_out_of_the_displacement():
+    assert spring(0, wobble=0.5e-3)["stiffness_error"] == pytest.approx(0, abs=2)
+
+
+def test_rendered_stiffness_needs_a_push_held_for_two_seconds_and_a_resting_reference():
+    assert np.isnan(spring(0, push=0)["stiffness_error"]).all()
+    assert np.isnan(spring(0, seconds=3.9)["stiffness_error"]).all()
+    assert not np.isnan(spring(0, seconds=4.1)["stiffness_error"]).any()
+    time = PERIOD * np.arange(5000)
+    force = over_time(np.stack([20 * np.clip(time - 1, 0, 1), 0 * time], axis=1))
+    moved = over_time(np.where((time < 0.5)[:, None], (0.5, 0.0), (0.501, 0.0)))
+    changed = over_time(np.where((time < 0.5)[:, None], (2000.0, 2000.0), (2000.0, 3000.0)))
+    for name, values in (("target", moved), ("stiffness_setpoint", changed)):
+        result = measure(len(time), user_force=force, **{name: values})
+        assert np.isnan(result["stiffness_error"]).all() and np.isnan(result["cross_motion"]).all()
+
+
+def test_a_lane_that_died_before_its_push_says_nothing_about_stiffness():
+    time = PERIOD * np.arange(5000)
+    # After 0.4 s the lane is lost and a new episode runs in it, pushed in its turn.
+    force = np.zeros((5000, 1, 2))
+    force[:, 0, 0] = 20 * np.clip(time - 1.4, 0, 1)
+    result = measure(5000, position=(0.5, 0.0) + force / 2000, user_force=force, alive=(time < 0.4)[:, None])
+    assert np.isnan(result["stiffness_error"]).all() and np.isnan(result["cross_motion"]).all()
+
+
+def test_a_lane_that_died_after_its_push_was_measured_keeps_the_figure():
+    time = PERIOD * np.arange(8000)
+    force = np.zeros((8000, 1, 2))
+    force[:, 0, 0] = np.where(time < 5, 20 * np.clip(time - 1, 0, 1), 0.0)
+    alive = (time < 4.5)[:, None]
+    result = measure(8000, position=(0.5, 0.0) + force / 2500, user_force=force, alive=alive)
+    assert result["stiffness_error"] == pytest.approx(25, abs=0.05)
+    assert result["hunting_x"] == pytest.approx(0, abs=1e-9)
+
+
+def test_without_a_settled_sample_the_settled_figures_are_nan_and_the_others_are_not():
+    result = measure(100, since_jump=0.1, tracking_error=(2e-3, 1e-3))
+    for name in ("settled_rms_x", "settled_rms_y", "settled_rms", "settled_max_x", "settled_max_y"):
+        assert np.isnan(result[name]).all(), name
+    assert result["error_rms_x"] == pytest.approx(2) and result["error_max_y"] == pytest.approx(1)
+
+
+def test_the_caller_may_reuse_its_arrays():
+    fresh = measure(50, target=over_time(0.5 + 0.01 * np.arange(50)))
+    metrics, info = EpisodeMetrics(1, PERIOD), {name: np.full((1,) if name in SIZES else (1, 2), 0.0) for name in RESTING}
+    for k in range(50):
+        for name, value in RESTING.items():
+            info[name][:] = value
+        info["target"][:] = 0.5 + 0.01 * k
+        metrics.add(info, np.zeros((4, 1)), np.ones(1, bool))
+    for name, value in metrics.result().items():
+        np.testing.assert_array_equal(value, fresh[name], err_msg=name)
+
+
+def test_summarize_takes_tails_by_size_and_ignores_what_says_nothing():
+    values = np.array([1.0, -10.0, 3.0, np.nan, 2.0])
+    result = summarize(values)
+    assert result["median"] == 1.5 and result["mean"] == -1.0 and result["max"] == 10.0
+    assert result["q95"] == pytest.approx(np.quantile([1, 10, 3, 2], 0.95))
+    nothing = summarize(np.array([np.nan, np.nan]))
+    assert set(nothing) == {"median", "mean", "q95", "max"} and all(math.isnan(value) for value in nothing.values())
+    assert summarize(np.array([]))["median"] != summarize(np.array([]))["median"]

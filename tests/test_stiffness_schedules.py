@@ -1,0 +1,178 @@
+"""Stiffness setpoints: closed-loop steps at the very instant, smooth pneumatic transitions, and refusals by name."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from birthsim_env import StiffnessSchedule
+from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.seeding import stream
+
+CIRCLE = "BirthSIM/Circle-v0"
+TWO = ((0.0, 0.8), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
+
+
+def course(schedule, times, seed=0):
+    """(6, len(times)) of one lane, one instant per call."""
+    schedule.prepare(1)
+    schedule.begin(0, stream(seed, 0, "stiffness"))
+    return np.stack([schedule.sample(np.array([t]))[:, 0] for t in times], axis=1)
+
+
+def minimum_jerk(u):
+    u = np.clip(u, 0.0, 1.0)
+    return 10 * u**3 - 15 * u**4 + 6 * u**5
+
+
+@given(st.integers(1, 20_000), st.sampled_from([1e-3, 2.5e-4, 1e-2, 5e-3]))
+def test_a_phase_starts_on_its_control_instant_whatever_the_rounding(tick, period):
+    # Clock and schedule may round the same instant differently: tick * period against the number a user writes.
+    for start in (tick * period, math.nextafter(tick * period, 0), math.nextafter(tick * period, math.inf)):
+        rows = course(StiffnessSchedule((0.0, start), *TWO[1:]), [(tick - 1) * period, tick * period, (tick + 1) * period])
+        np.testing.assert_array_equal(rows[0], (2000.0, 4000.0, 4000.0))
+        np.testing.assert_array_equal(rows[1], rows[0])
+        assert rows[2, 1] == pytest.approx(4600.0)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_an_environment_changes_the_setpoint_at_the_phase_time(sensors):
+    env = gymnasium.make(CIRCLE, sensors=sensors, stiffness=StiffnessSchedule(*TWO))
+    infos = [env.reset(seed=0)[1]] + [env.step(np.zeros(4))[4] for _ in range(100)]
+    for info in infos:
+        late = info["time"] > 0.7995
+        np.testing.assert_array_equal(info["stiffness_setpoint"], 4000.0 if late else 2000.0)
+        assert info["since_jump"] == pytest.approx(info["time"] - 0.8 * late, abs=1e-9)
+    for _ in range(40):
+        info = env.step(np.zeros(4))[4]
+    np.testing.assert_allclose(info["pneumatic_stiffness_setpoint"], (3600.0, 1800.0))
+
+
+@pytest.mark.parametrize("transition", [0.05, 0.5, 2.0])
+def test_transitions_are_minimum_jerk_with_rates_that_fit(transition):
+    times = np.linspace(0.0, 3.0, 601)
+    schedule = StiffnessSchedule(*TWO, transition=transition)
+    rows = course(schedule, times)
+    share = minimum_jerk((times - 0.8) / transition)
+    np.testing.assert_allclose(rows[2], 4600.0 - 1000.0 * share, atol=1e-6)
+    np.testing.assert_allclose(rows[3], 2300.0 - 500.0 * share, atol=1e-6)
+    step = 1e-6 * transition
+    slope = (course(schedule, times + step)[2:4] - course(schedule, times - step)[2:4]) / (2 * step)
+    np.testing.assert_allclose(rows[4:6], slope, atol=2e-5 * np.abs(slope).max())
+    # Smooth at both ends: no rate there, and none outside.
+    np.testing.assert_array_equal(rows[4:6, (times < 0.8) | (times > 0.8 + transition + 1e-9)], 0.0)
+    assert rows[4].min() == pytest.approx(-1000.0 * 1.875 / transition, rel=1e-2)
+
+
+def test_the_axes_may_differ_and_the_first_phase_starts_without_a_transition():
+    rows = course(StiffnessSchedule((0.0, 1.0), (1000.0, 2000.0), TWO[2], TWO[3], closed_loop_y=(3000.0, 4000.0)), [0.0, 0.2, 1.0])
+    np.testing.assert_array_equal(rows[:2], [[1000, 1000, 2000], [3000, 3000, 4000]])
+    np.testing.assert_array_equal(rows[2:, 0], (4600, 2300, 0, 0))
+    np.testing.assert_array_equal(rows[2:, 1], (4600, 2300, 0, 0))
+
+
+def test_three_phases_each_go_on_from_the_one_before():
+    schedule = StiffnessSchedule((0.0, 1.0, 2.0), (1e3, 2e3, 3e3), (3000.0, 4000.0, 3500.0), (1500.0, 2000.0, 1800.0))
+    rows = course(schedule, [0.5, 1.25, 1.5, 2.25, 2.5, 9.0])
+    np.testing.assert_allclose(rows[2], (3000, 3500, 4000, 3750, 3500, 3500))
+    np.testing.assert_allclose(rows[0], (1e3, 2e3, 2e3, 3e3, 3e3, 3e3))
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_varied_schedules_draw_inside_the_feasible_range(name):
+    # Design section 7: feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
+    schedule, lanes = SCENARIOS[name].varied()[2], 300
+    schedule.prepare(lanes)
+    for lane in range(lanes):
+        schedule.begin(lane, stream(lane, 0, "stiffness"))
+    rows = np.stack([schedule.sample(np.full(lanes, t)) for t in np.linspace(0, SCENARIOS[name].duration, 200)])
+    for row, low, high in ((0, 1000, 5000), (1, 1000, 5000), (2, 2400, 5500), (3, 1200, 2800)):
+        assert low <= rows[:, row].min() <= rows[:, row].max() <= high
+    assert np.ptp(rows[-1, 2]) > 0
+    np.testing.assert_array_equal(rows[:, 0], rows[:, 1])
+
+
+def test_scenarios_ask_for_what_the_paper_and_the_design_say():
+    expected = {
+        "circle": ((2000, 4000), (4600, 3600), (2300, 1800)),
+        "forceps": ((4000, 4000), (4200, 4200), (2000, 2000)),
+        "dystocia": ((2000, 4000), (4200, 4200), (2000, 2000)),
+    }
+    for name, (closed, first, second) in expected.items():
+        rows = course(SCENARIOS[name].nominal()[2], [0.0, SCENARIOS[name].duration])
+        np.testing.assert_allclose(rows[:4], [closed, closed, first, second])
+    rows = course(SCENARIOS["circle"].nominal()[2], [7.999, 8.0])
+    np.testing.assert_array_equal(rows[0], (2000, 4000))
+
+
+def test_lanes_draw_setpoints_of_their_own():
+    env = gymnasium.make_vec(CIRCLE, num_envs=4, stiffness=StiffnessSchedule((0.0,), ((1000.0, 3000.0),)))
+    setpoints = env.reset(seed=1)[1]["stiffness_setpoint"]
+    expected = [stream(1 + lane, 0, "stiffness").uniform(1000, 3000) for lane in range(4)]
+    np.testing.assert_array_equal(setpoints, np.stack([expected, expected], axis=1))
+
+
+class Doubling(StiffnessSchedule):
+    """A user's own: Kcl rises without steps."""
+
+    def sample(self, time):
+        rows = super().sample(time)
+        rows[:2] *= 1 + time
+        return rows
+
+
+def test_a_users_own_schedule_is_asked_for_every_instant():
+    env = gymnasium.make(CIRCLE, stiffness=Doubling())
+    env.reset(seed=0)
+    for _ in range(10):
+        info = env.step(np.zeros(4))[4]
+    np.testing.assert_allclose(info["stiffness_setpoint"], 2000 * 1.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"times": ()}, ("times = ()", "starting at 0")),
+        ({"times": (1.0,)}, ("times = (1.0,)", "starting at 0")),
+        ({"times": (0.0, 1.0)}, ("times = (0.0, 1.0)", "as many setpoints as times")),
+        ({"closed_loop": (2000.0, 4000.0)}, ("times = (0.0,)", "as many setpoints as times")),
+        ({"closed_loop_y": (2000.0, 4000.0)}, ("times = (0.0,)", "as many setpoints as times")),
+        ({"times": (0.0, 1.0, 1.0), "closed_loop": (1.0,) * 3, "pneumatic1": (1.0,) * 3, "pneumatic2": (1.0,) * 3}, ("increasing",)),
+        ({"times": (0.0, math.nan), "closed_loop": (1.0,) * 2, "pneumatic1": (1.0,) * 2, "pneumatic2": (1.0,) * 2}, ("nan", "increasing")),
+        ({"closed_loop": (0.0,)}, ("stiffness setpoint 0.0", "more than 0")),
+        ({"closed_loop": ((-1.0, 2000.0),)}, ("stiffness setpoint (-1.0, 2000.0)", "more than 0")),
+        ({"pneumatic2": (math.nan,)}, ("stiffness setpoint nan", "more than 0")),
+        ({"transition": 0.0}, ("transition = 0.0", "more than 0")),
+        ({"transition": -0.5}, ("transition = -0.5", "more than 0")),
+        ({"transition": math.nan}, ("transition = nan", "more than 0")),
+    ],
+)  # fmt: skip
+def test_impossible_schedules_are_refused_by_name(arguments, words):
+    with pytest.raises(ValueError) as refusal:
+        StiffnessSchedule(**arguments)
+    assert all(word in str(refusal.value) for word in ("allowed", *words)), refusal.value
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (np.ones((4, 1)), ("stiffness.sample(time)", "(4, 1)", "(6, 1)")),
+        (np.full((6, 1), np.inf), ("stiffness.sample(time)[0, 0] = inf", "finite")),
+        (np.array([[2e3], [0.0], [4e3], [2e3], [0.0], [0.0]]), ("stiffness.sample(time = 0 s) = 0 N/m", "more than 0")),
+    ],
+)
+def test_wrong_answers_of_a_users_own_schedule_are_refused_by_name(rows, words):
+    class Wrong(StiffnessSchedule):
+        def sample(self, time):
+            return rows
+
+    with pytest.raises(ValueError) as refusal:
+        gymnasium.make(CIRCLE, stiffness=Wrong()).reset(seed=0)
+    assert all(word in str(refusal.value) for word in ("allowed", *words)), refusal.value
+    with pytest.raises(ValueError, match=r"stiffness = 4000; allowed: None or a birthsim_env.stiffness_schedules.StiffnessSchedule"):
+        gymnasium.make(CIRCLE, stiffness=4000)
