@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
@@ -35,7 +36,7 @@ class Policy:
 def save_policy(policy: Policy, folder: Path) -> None:
     """Write both files; each appears whole or not at all."""
     folder.mkdir(parents=True, exist_ok=True)
-    arrays = {"mean": policy.network.mean, "variance": policy.network.variance}
+    arrays: dict[str, NDArray[Any]] = {"mean": policy.network.mean, "variance": policy.network.variance}
     for k, (weight, bias) in enumerate(policy.network.layers):
         arrays[f"{k}.weight"], arrays[f"{k}.bias"] = weight, bias
     content = save(arrays)

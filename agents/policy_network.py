@@ -4,11 +4,14 @@ neither PyTorch nor Stable-Baselines3."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Weights = NDArray[np.float32]
+Statistics = NDArray[np.float64]
+"""Double precision: an input that hardly varies is divided by 1e-4, and rounding its mean to singles would show."""
 
 CLIP = 10.0
 """Bound of a normalised observation entry, as in Stable-Baselines3's VecNormalize."""
@@ -24,8 +27,8 @@ class PolicyNetwork:
     them and none after the last. Raises ``ValueError`` where shapes do not fit together or a number is not finite.
     """
 
-    mean: Weights
-    variance: Weights
+    mean: Statistics
+    variance: Statistics
     layers: tuple[tuple[Weights, Weights], ...]
 
     def __post_init__(self) -> None:
@@ -38,7 +41,7 @@ class PolicyNetwork:
                     f"policy: layer {k} has weight {weight.shape} and bias {bias.shape}; allowed: (n, {width}) and (n,)"
                 )
             width = weight.shape[0]
-        arrays = [self.mean, self.variance, *(array for layer in self.layers for array in layer)]
+        arrays: list[NDArray[Any]] = [self.mean, self.variance, *(array for layer in self.layers for array in layer)]
         if not all(np.isfinite(array).all() for array in arrays) or (self.variance < 0).any():
             raise ValueError("policy: some numbers are not finite or a variance is negative; allowed: finite numbers")
 

@@ -12,7 +12,7 @@ from birthsim_env import observation
 from birthsim_env.assembly import policy_periods
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import Mask, Measurement, Reference
+from birthsim_env.signals import Mask, Measurement, Reference, one_lane
 
 
 class ResidualController:
@@ -43,7 +43,9 @@ class ResidualController:
             self._action[:, lanes] = 0.0
 
     def command(self, measurement: Measurement, reference: Reference) -> Array:
-        """Spool openings (4, N) of one control period, for signals over N lanes."""
+        """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
+        if measurement.position.ndim == 1:
+            return self.command(*one_lane(measurement, reference))[:, 0]
         lanes = measurement.position.shape[1]
         if self._action.shape[1] != lanes:
             self._action = np.zeros((2, lanes))

@@ -10,21 +10,32 @@ from birthsim_env.parameters import load_parameters
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 
-def _with_law(arguments: dict[str, Any], authority: float, smoothing: float, weight_compensation: bool) -> dict[str, Any]:
-    for name in ("action_mode", "valves", "actuation"):
-        if name in arguments:
-            raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
-    rig = load_parameters(arguments.pop("parameters", None))
-    period = arguments.get("policy_period", ResidualSettings.policy_period)
-    settings = ResidualSettings(authority, smoothing, period, weight_compensation)
-    return {**arguments, "parameters": rig, "actuation": ResidualActuation(rig, settings)}
+class _LawInside:
+    """Puts the law between the policy and the valves of the environment that it is mixed into."""
+
+    def __init__(
+        self,
+        scenario: str,
+        authority: float = ResidualSettings.authority,
+        smoothing: float = ResidualSettings.smoothing,
+        weight_compensation: bool = False,
+        **arguments: Any,
+    ) -> None:
+        for name in ("action_mode", "valves", "actuation"):
+            if name in arguments:
+                raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
+        rig = load_parameters(arguments.pop("parameters", None))
+        period = arguments.get("policy_period", ResidualSettings.policy_period)
+        settings = ResidualSettings(authority, smoothing, period, weight_compensation)
+        law = ResidualActuation(rig, settings)
+        super().__init__(scenario, parameters=rig, actuation=law, **arguments)  # type: ignore[call-arg]
 
 
-class ResidualEnv(BirthSIMEnv):
+class ResidualEnv(_LawInside, BirthSIMEnv):
     """A scenario of ``BirthSIMEnv`` with the paper's backstepping law running inside at 1 kHz.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`, held for one policy period: a force along cylinders 1 and 2, in units of `authority` (40 N),
+    `Box(-1, 1, (2,), float32)`, held for one policy period: a force along cylinders 1 and 2, in units of `authority` (100 N),
     that is added to what the law believes acts on the piston, after a low-pass (`smoothing` = 0.3 per step, about 28 ms).
     A zero action is exactly the law.
 
@@ -39,26 +50,6 @@ class ResidualEnv(BirthSIMEnv):
     - v0: first version.
     """
 
-    def __init__(
-        self,
-        scenario: str,
-        authority: float = ResidualSettings.authority,
-        smoothing: float = ResidualSettings.smoothing,
-        weight_compensation: bool = False,
-        **arguments: Any,
-    ) -> None:
-        super().__init__(scenario, **_with_law(arguments, authority, smoothing, weight_compensation))
 
-
-class ResidualVectorEnv(BirthSIMVectorEnv):
+class ResidualVectorEnv(_LawInside, BirthSIMVectorEnv):
     """``ResidualEnv`` over N lanes in one kernel call per control period; see ``BirthSIMVectorEnv``."""
-
-    def __init__(
-        self,
-        scenario: str,
-        authority: float = ResidualSettings.authority,
-        smoothing: float = ResidualSettings.smoothing,
-        weight_compensation: bool = False,
-        **arguments: Any,
-    ) -> None:
-        super().__init__(scenario, **_with_law(arguments, authority, smoothing, weight_compensation))

@@ -29,7 +29,7 @@ assert agents  # importing it registers the residual environments
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """PPO's settings (see findings: learning) and the experiment around it."""
+    """PPO's settings and the experiment around it; the learning rate falls linearly to a tenth."""
 
     environment: str = "BirthSIM/CircleResidual-v0"
     steps: int = 2_000_000
@@ -75,7 +75,7 @@ def train(settings: TrainingSettings, residual: ResidualSettings, folder: Path, 
         n_steps=settings.rollout,
         batch_size=settings.batch,
         n_epochs=settings.epochs,
-        learning_rate=settings.learning_rate,
+        learning_rate=lambda remaining: settings.learning_rate * (0.1 + 0.9 * remaining),
         gamma=settings.discount,
         gae_lambda=settings.gae_lambda,
         policy_kwargs={
@@ -110,13 +110,14 @@ def network_of(model: PPO, normalized: VecNormalize) -> PolicyNetwork:
     """The deterministic part of a PPO policy with its normalisation, as plain arrays."""
 
     def array(tensor: torch.Tensor) -> NDArray[np.float32]:
-        return np.ascontiguousarray(tensor.detach().cpu().numpy(), dtype=np.float32)
+        # A copy: the model goes on training in its own memory.
+        return np.array(tensor.detach().cpu().numpy(), dtype=np.float32, order="C")
 
     hidden: Any = model.policy.mlp_extractor
     linear = [layer for layer in hidden.policy_net if isinstance(layer, torch.nn.Linear)]
     layers = tuple((array(layer.weight), array(layer.bias)) for layer in [*linear, _output_layer(model)])
     statistics: Any = normalized.obs_rms
-    return PolicyNetwork(statistics.mean.astype(np.float32), statistics.var.astype(np.float32), layers)
+    return PolicyNetwork(statistics.mean.copy(), statistics.var.copy(), layers)
 
 
 class _KeepBest(BaseCallback):

@@ -12,7 +12,7 @@ from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -71,7 +71,8 @@ class BacksteppingController:
         Raises ``ValueError`` for signals over different numbers of lanes.
         """
         if measurement.position.ndim == 1:
-            return self._command_one(measurement, reference, believed_force)
+            told = None if believed_force is None else np.asarray(believed_force, dtype=np.float64)[..., None]
+            return self.command(*one_lane(measurement, reference), told)[:, 0]
         lanes = measurement.position.shape[1]
         believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
         for name, signal, rows in (
@@ -93,19 +94,3 @@ class BacksteppingController:
         openings = np.empty((4, lanes))
         backstepping_law.command(joints, measurement.pressures, reference.rows, believed, self._p, *self._options, openings)
         return openings
-
-    def _command_one(self, measurement: Measurement, reference: Reference, believed_force: Array | None) -> Array:
-        def column(values: Array) -> Array:
-            return np.asarray(values, dtype=np.float64)[..., None]
-
-        lanes = Measurement(
-            column(measurement.time),
-            column(measurement.position),
-            column(measurement.position_time),
-            column(measurement.velocity),
-            column(measurement.pressures),
-            column(measurement.user_force),
-            measurement.sampled,
-        )
-        believed = None if believed_force is None else column(believed_force)
-        return self.command(lanes, Reference(column(reference.rows)), believed)[:, 0]

@@ -118,9 +118,12 @@ def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path)
     """Size of the tracking error over time: median and 5-95 % band over the episodes, one line per controller."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
-        styles: list[tuple[str, Any]] = [(DARK, "-"), (MIDDLE, "--"), (ACCENT, "-."), (LIGHT, ":")]
-        for evaluation, (colour, style) in zip(evaluations, styles, strict=False):
+        colours, styles = (DARK, MIDDLE, ACCENT, LIGHT), ("-", "--", "-.", ":")
+        for k, evaluation in enumerate(evaluations):
+            # The fifth controller has the first one's colour and another style.
+            colour, style = colours[k % 4], styles[(k + k // 4) % 4]
             size = 1e3 * np.linalg.norm(np.concatenate(evaluation.traces, axis=1), axis=2)
+            size = size[np.isfinite(size).any(axis=1)]  # up to where the last episode was lost
             time = TRACE * np.arange(len(size))
             low, middle, high = np.nanquantile(size, (0.05, 0.5, 0.95), axis=1)
             axes.fill_between(time, low, high, color=colour, alpha=0.15, lw=0)

@@ -6,6 +6,7 @@ A factory takes the rig as its owner describes it, and keyword options, and retu
 from __future__ import annotations
 
 import importlib.util
+import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -50,15 +51,21 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             return made
     path, _, attribute = name.rpartition(":")
     if path.endswith(".py"):
-        return _from_file(Path(path), attribute)(parameters, **options)
+        factory = _from_file(Path(path), attribute)
+        own = factory(parameters, **options) if callable(factory) else None
+        if not (callable(getattr(own, "command", None)) and callable(getattr(own, "reset", None))):
+            raise ValueError(f"controller = {name!r}; allowed: a class with command() and reset()")
+        return own
     raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
 
 
 def _from_file(path: Path, attribute: str) -> Factory:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    # No package has a path for a name, whatever the file is called.
+    spec = importlib.util.spec_from_file_location(str(path.resolve()), path)
     if not path.is_file() or spec is None or spec.loader is None:
         raise ValueError(f"controller file {str(path)!r} does not exist; allowed: path/to/file.py:Class")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where dataclasses look their annotations up
     spec.loader.exec_module(module)
     if not hasattr(module, attribute):
         raise ValueError(f"controller file {str(path)!r} has no {attribute!r}; allowed: a class with command() and reset()")

@@ -7,7 +7,7 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -15,10 +15,8 @@ from birthsim_env import lanes as at
 from birthsim_env import valves
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
-from birthsim_env.signals import Mask
-
-if TYPE_CHECKING:
-    from birthsim_env.simulation import Simulation
+from birthsim_env.plant import Plant
+from birthsim_env.signals import Mask, Measurement, Reference
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")
 
@@ -28,7 +26,7 @@ class Actuation(Protocol):
 
     ``size`` is the length of an action and ``names`` describes its entries. ``begin(lanes)`` starts new episodes in the
     lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
-    ``openings(simulation)`` returns the spool openings (4, N) from now on.
+    ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on.
     """
 
     size: int
@@ -39,7 +37,7 @@ class Actuation(Protocol):
 
     def accept(self, actions: Array) -> None: ...
 
-    def openings(self, simulation: Simulation) -> Array: ...
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array: ...
 
 
 class ValveActuation:
@@ -59,7 +57,7 @@ class ValveActuation:
     def accept(self, actions: Array) -> None:
         self._openings = np.stack([actions[0], -actions[0], actions[1], -actions[1]]) if self._one_valve else actions
 
-    def openings(self, simulation: Simulation) -> Array:
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         return self._openings
 
 
@@ -116,8 +114,7 @@ class FlowActuation:
     def accept(self, actions: Array) -> None:
         self._wanted = actions
 
-    def openings(self, simulation: Simulation) -> Array:
-        plant = simulation.plant
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         openings = np.empty((4, plant.num_envs))
         _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
         return openings

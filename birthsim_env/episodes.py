@@ -125,7 +125,10 @@ def _start(options: dict[str, Any] | None) -> Array | None:
         raise ValueError(f"options has {', '.join(map(repr, sorted(unknown)))}; allowed: 'position', (x, y) in m")
     if not options:
         return None
-    position = np.asarray(options["position"], dtype=np.float64)
+    try:
+        position = np.asarray(options["position"], dtype=np.float64)
+    except (TypeError, ValueError):
+        position = np.empty(0)
     if position.shape != (2,) or not np.isfinite(position).all():
         raise ValueError(f"options['position'] = {options['position']!r}; allowed: (x, y), finite, in m")
     return position

@@ -8,40 +8,18 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.parameters import Parameters
 
 if TYPE_CHECKING:
     import pygame
 
-
-@dataclass(frozen=True)
-class Scene:
-    """What one frame shows; one lane, SI units, pressures absolute. What is not finite is left out of the picture."""
-
-    time: float
-    """s"""
-    piston: tuple[float, float]
-    """Piston positions y1, y2, m from mid stroke."""
-    target: tuple[float, float]
-    """Target of the end effector (x, y), m."""
-    compliant_target: tuple[float, float]
-    """Target moved by the user's force (19), (xk, yk), m."""
-    user_force: tuple[float, float]
-    """(Fx, Fy), N."""
-    pressures: tuple[float, float, float, float]
-    """Pp1, Pn1, Pp2, Pn2, Pa."""
-    stiffness: tuple[float, float]
-    """Closed-loop stiffness setpoints Kclx, Kcly, N/m."""
-    path: NDArray[np.float64]
-    """Reference path (M, 2), m; M may be 0."""
-    title: str = ""
-    """First line of the picture."""
+__all__ = ["Renderer", "Scene"]
 
 
 class Renderer:

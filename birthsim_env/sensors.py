@@ -102,11 +102,13 @@ class LabSensors:
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         board = electronics
+        # A tracker faster than the control board is read once a period; the queue's slots count samples, one a period at most.
+        rate = min(board.position_rate, 1 / board.control_period)
         self._numbers = (
-            board.control_period, board.position_rate, board.position_latency, board.position_noise, board.pressure_noise,
+            board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
         )  # fmt: skip
         # Two samples can be under way beyond those that the latency holds back.
-        depth = int(board.position_latency * board.position_rate) + 3
+        depth = int(board.position_latency * rate) + 3
         self._queue: Array = np.zeros((depth, 3, num_envs))
         self._shown: Array = np.zeros((3, num_envs))
         self._keys = np.zeros(num_envs, dtype=np.uint64)

@@ -87,3 +87,21 @@ class Measurement:
 
 
 Mask = NDArray[np.bool_]
+
+
+def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
+    """Signals of one rig, which have no lane axis, as signals over one lane."""
+
+    def column(values: Array) -> Array:
+        return np.asarray(values, dtype=np.float64)[..., None]
+
+    seen = Measurement(
+        column(measurement.time),
+        column(measurement.position),
+        column(measurement.position_time),
+        column(measurement.velocity),
+        column(measurement.pressures),
+        column(measurement.user_force),
+        measurement.sampled,
+    )
+    return seen, Reference(column(reference.rows))

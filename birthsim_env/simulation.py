@@ -115,7 +115,7 @@ class Simulation:
         self.actuation.accept(actions)
         impacts = np.zeros_like(self.impacts)
         for _ in range(self._strides):
-            openings = self.actuation.openings(self)
+            openings = self.actuation.openings(self.plant, self.measurement, self.reference)
             self.plant.advance_unchecked(openings, self._forces, self._stride * self.period)
             np.maximum(impacts, self.plant.impacts, out=impacts)
             self.ticks += self._stride

@@ -49,7 +49,9 @@ def resting_at(reference: Reference, parameters: Parameters) -> Plant:
     """A plant on the target, with the target's velocity and pneumatic stiffness, in balance."""
     plant = Plant(parameters, reference.rows.shape[1])
     piston = inverse_geometry(reference.position, parameters)
-    speed = np.stack([np.linalg.solve(jacobian(y, parameters), v) for y, v in zip(piston.T, reference.velocity.T, strict=True)], axis=1)
+    speed = np.stack(
+        [np.linalg.solve(jacobian(y, parameters), v) for y, v in zip(piston.T, reference.velocity.T, strict=True)], axis=1
+    )
     plant.state = balanced_state(plant.lane_parameters, piston, speed, reference.pneumatic_stiffness)
     return plant
 

@@ -26,16 +26,15 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     cylinders = (rig.cylinder1, rig.cylinder2)
     pivot = g.d3 * np.exp(1j * g.gamma3)
     linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity])
-    pistons = np.array([[c.piston_diameter, c.rod_diameter, c.stroke, c.coulomb_friction, c.viscous_friction] for c in cylinders])
-    law = np.array(
-        [f.law == "lugre", f.static_ratio, f.stribeck_speed, f.bristle_stiffness, f.bristle_damping, f.sign_speed], dtype=float
-    )
+    sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
+    pistons = np.array([(*size, c.coulomb_friction, c.viscous_friction) for size, c in zip(sizes, cylinders, strict=True)])
+    bristle = f.bristle_stiffness, f.bristle_damping
+    law = np.array([f.law == "lugre", f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
-    gas = np.array(
-        [air.supply_pressure, air.atmospheric_pressure, air.temperature, air.gas_constant, air.heat_capacity_ratio]
-        + [air.reference_density, air.reference_temperature]
-    )
+    around = air.supply_pressure, air.atmospheric_pressure, air.temperature
+    reference = air.reference_density, air.reference_temperature
+    gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
     return linkage, pistons, law, heat, valve, gas
 
 

@@ -48,7 +48,10 @@ def test_equal_setpoints_do_not_couple_the_cylinders() -> None:
 def test_equal_setpoints_are_rendered_in_every_direction() -> None:
     """A force F moves the joints by J^T F / Kcl, and so the end effector by F / Kcl, without a component across."""
     force, equal = sp.Matrix([FX, FY]), {KY: KX}
-    joint = [joint_stiffness1.py_func(KX, KX, KAPPA, sp.sin(THETA), sp.cos(THETA)), joint_stiffness2.py_func(KX, KX, sp.sin(THETA), sp.cos(THETA))]
+    joint = [
+        joint_stiffness1.py_func(KX, KX, KAPPA, sp.sin(THETA), sp.cos(THETA)),
+        joint_stiffness2.py_func(KX, KX, sp.sin(THETA), sp.cos(THETA)),
+    ]
     given_way = jacobian() * sp.diag(*(1 / k for k in joint)) * jacobian().T * force
     assert all(vanishes(moved - pushed / KX) for moved, pushed in zip(given_way.subs(equal), force, strict=True))
 

@@ -104,11 +104,11 @@ def test_least_stiffness_is_the_minimum_over_the_gain() -> None:
             # Falls towards m_e 2/3 as the gain vanishes.
             assert least == pytest.approx(kcl_of_equal_gains()(1e-6, mass, 0), rel=1e-9)
             continue
-        pole = viscous / mass / 3
-        found = minimize_scalar(
-            lambda log, pole=pole, rig=(mass, viscous): kcl_of_equal_gains()(pole + np.exp(log), *rig), bounds=(-12, 8), method="bounded",
-            options={"xatol": 1e-9},
-        )  # fmt: skip
+
+        def stiffness(above_pole: float, rig: tuple[float, float] = (mass, viscous)) -> float:
+            return float(kcl_of_equal_gains()(rig[1] / rig[0] / 3 + np.exp(above_pole), *rig))
+
+        found = minimize_scalar(stiffness, bounds=(-12, 8), method="bounded", options={"xatol": 1e-9})
         assert least == pytest.approx(found.fun, rel=1e-9)
 
 

@@ -39,7 +39,7 @@ def pose(piston: np.ndarray, rig: Parameters) -> by_points.Pose:
 def rigs(draw: st.DrawFn) -> Parameters:
     """Any linkage that ``Parameters`` accepts, up to the edges of its limits."""
     d3, d6 = draw(st.floats(0.28, 0.5)), draw(st.floats(0.2, 0.3))
-    low, high = 1.05 * abs(d3 - d6) + 0.1, 0.98 * (d3 + d6) - 0.1
+    low, high = max(1.05 * abs(d3 - d6) + 0.1, 0.11), 0.98 * (d3 + d6) - 0.1
     k1 = low + (high - low) * draw(st.floats(0.001, 0.999))
     gamma3, k2 = draw(st.floats(-math.pi, math.pi)), draw(st.floats(0.23, 0.8))
     return Parameters(geometry=Geometry(d3=d3, d6=d6, gamma3=gamma3, k1=k1, k2=k2))

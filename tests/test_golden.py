@@ -28,4 +28,3 @@ def test_law_on_circle(stored):
     run = make.circle_run()
     np.testing.assert_allclose(run[:, :2], stored["circle"][:, :2], atol=1e-6)
     np.testing.assert_allclose(run[:, 2:], stored["circle"][:, 2:], rtol=1e-4)
-

@@ -15,7 +15,9 @@ from tests import linkage_by_points as by_points
 
 RIGS = {
     "default": Parameters(),
-    "tilted pivot": Parameters().replace({"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45}),
+    "tilted pivot": Parameters().replace(
+        {"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45}
+    ),
     "pivot below": Parameters().replace({"geometry.gamma3": -2.0, "geometry.k2": 0.6}),
 }
 each_rig = pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS.keys())

@@ -9,8 +9,9 @@ import pytest
 
 from baselines.metrics import NORMAL_DENSITY, UNITS, EpisodeMetrics, summarize
 
-PERIOD = 1e-3
-SIZES = {"since_jump": 0, "supply_flow": 0}
+PERIOD = 4e-3
+"""s; four control periods at a time keep the tests short."""
+SINGLE = ("since_jump", "supply_flow")
 RESTING = {
     "since_jump": 10.0,
     "supply_flow": 0.0,
@@ -28,7 +29,7 @@ RESTING = {
 def measure(steps, lanes=1, period=PERIOD, command=0.0, alive=True, **signals):
     """Metrics after ``steps`` samples. A signal is (), (T,), (T, lanes) or with a last axis of 2 where it has x and y."""
     metrics = EpisodeMetrics(lanes, period)
-    shapes = {name: (steps, lanes) if name in SIZES else (steps, lanes, 2) for name in RESTING}
+    shapes = {name: (steps, lanes) if name in SINGLE else (steps, lanes, 2) for name in RESTING}
     given = {**RESTING, **signals}
     full = {name: np.broadcast_to(np.asarray(given[name], dtype=float), shape) for name, shape in shapes.items()}
     commands = np.broadcast_to(np.asarray(command, dtype=float), (steps, 4, lanes))
@@ -53,7 +54,7 @@ def test_every_metric_has_a_unit_and_one_value_per_lane():
 def test_errors_whole_and_settled_are_rms_and_largest_size_in_millimetres():
     # 4 samples before the error counts as settled, then 6.
     error = 1e-3 * np.array([[9, -9]] * 4 + [[3, -4], [-3, 4], [3, 0], [-3, 0], [0, -4], [0, 0]])
-    since = np.array([0.1, 0.2, 0.499, 0.4999] + [0.5, 0.5001, 0.6, 1, 2, 3])
+    since = np.array([0.1, 0.2, 0.499, 0.4999, 0.5, 0.5001, 0.6, 1, 2, 3])
     result = measure(10, tracking_error=over_time(error), since_jump=since[:, None])
     assert result["error_rms_x"] == pytest.approx(math.sqrt((4 * 81 + 4 * 9) / 10))
     assert result["error_rms_y"] == pytest.approx(math.sqrt((4 * 81 + 3 * 16) / 10))
@@ -98,14 +99,15 @@ def test_a_lane_that_is_not_alive_is_left_as_it_is():
     # Lane 1 dies after 300 samples, lane 0 lives.
     alive = np.stack([np.ones(900, bool), np.arange(900) < 300], axis=1)
     both = measure(900, lanes=2, alive=alive, **signals)
-    whole = measure(900, **{name: values[..., :1, :] if values.shape[2:] == (2,) and name != "command" else values[..., :1] for name, values in signals.items()})
-    short = measure(300, **{name: values[:300, 1:, :] if name in RESTING and name not in SIZES else values[:300, ..., 1:] for name, values in signals.items()})
+    axis = {name: 2 if name == "command" else 1 for name in signals}
+    whole = measure(900, **{name: values.take([0], axis[name]) for name, values in signals.items()})
+    short = measure(300, **{name: values[:300].take([1], axis[name]) for name, values in signals.items()})
     for name in UNITS:
         np.testing.assert_array_equal(both[name], [whole[name][0], short[name][0]], err_msg=name)
     assert both["error_rms_x"][1] > 100
 
 
-def hold(seconds, wobble, quiet_from=0.0):
+def hold(seconds, wobble):
     """Positions that leave 0.5 by ``wobble``(time) on x and by half of it on y, and the instants."""
     time = PERIOD * np.arange(round(seconds / PERIOD))
     x = wobble(time)
@@ -116,8 +118,8 @@ def test_hunting_is_peak_to_peak_where_all_has_been_constant_for_a_second():
     # Wild for the first 0.9 s, then +-0.4 mm.
     time, position = hold(3, lambda t: np.where(t < 0.9, 0.05, 0.4e-3) * np.sin(2 * np.pi * 5 * t))
     result = measure(len(time), position=position)
-    assert result["hunting_x"] == pytest.approx(0.8, rel=1e-3)
-    assert result["hunting_y"] == pytest.approx(0.4, rel=1e-3)
+    assert result["hunting_x"] == pytest.approx(0.8, rel=5e-3)
+    assert result["hunting_y"] == pytest.approx(0.4, rel=5e-3)
 
 
 @pytest.mark.parametrize("name", ["target", "user_force", "stiffness_setpoint", "pneumatic_stiffness_setpoint"])
@@ -133,10 +135,7 @@ def test_a_change_of_anything_asked_for_starts_the_second_anew(name):
 
 def test_hunting_takes_the_worst_window_and_never_spans_two():
     # Two quiet windows 5 mm apart, 0.2 mm and 0.6 mm wide; the push between them does not count.
-    def wobble(t):
-        return np.where(t < 2.5, 0.1e-3, 5e-3 + 0.3e-3) * np.where(t < 2.5, np.sin(40 * t), 1) + np.where(t < 2.5, 0, 0.3e-3 * np.sin(40 * t))
-
-    time, position = hold(5, wobble)
+    time, position = hold(5, lambda t: np.where(t < 2.5, 0.1e-3 * np.sin(40 * t), 5e-3 + 0.3e-3 * np.sin(40 * t)))
     force = over_time(np.where((time > 2.2)[:, None], (10.0, 0.0), (0.0, 0.0)))
     result = measure(len(time), position=position, user_force=force)
     assert result["hunting_x"] == pytest.approx(0.6, rel=1e-2)
@@ -148,17 +147,17 @@ def test_hunting_and_restarts_say_nothing_where_no_window_is_quiet():
     result = measure(len(time), position=position, target=moving)
     for name in ("hunting_x", "hunting_y", "restarts", "stiffness_error", "cross_motion"):
         assert np.isnan(result[name]).all(), name
-    short = measure(900)
+    short = measure(round(0.9 / PERIOD))
     assert np.isnan(short["hunting_x"]).all() and np.isnan(short["restarts"]).all()
 
 
 def test_restarts_per_second_count_breaks_from_rest_with_a_dead_band():
     # From 1 s on, four bursts above 2 mm/s from below 0.5 mm/s; the dips to 1 mm/s within a burst are none.
-    time = PERIOD * np.arange(5000)
-    speed = np.zeros(5000)
+    time = PERIOD * np.arange(round(5 / PERIOD))
+    speed = np.zeros(len(time))
     for start in (0.2, 1.5, 2.3, 3.1, 3.9):
-        speed[round(1000 * start) : round(1000 * start) + 300] = 3e-3
-        speed[round(1000 * start) + 100 : round(1000 * start) + 200] = 1e-3
+        speed[(time >= start) & (time < start + 0.3)] = 3e-3
+        speed[(time >= start + 0.1) & (time < start + 0.2)] = 1e-3
     velocity = over_time(np.stack([0.6 * speed, -0.8 * speed], axis=1))
     result = measure(len(time), velocity=velocity)
     # The burst at 0.2 s lies before the window of 4 s.
@@ -170,9 +169,11 @@ def spring(angle, push=20.0, rendered=(2000.0, 2000.0), asked=(2000.0, 2000.0), 
     """The stiffness test on a spring: nothing for a second, a ramp of a second, then held."""
     time = PERIOD * np.arange(round(seconds / PERIOD))
     force = push * np.clip(time - 1, 0, 1)[:, None] * [math.cos(angle), math.sin(angle)]
-    shift = np.array(offset) * (time >= 1)[:, None] + wobble * np.sin(2 * np.pi * 10 * time)[:, None]
+    shift = np.array(offset) * (time > 1)[:, None] + wobble * np.sin(2 * np.pi * 10 * time)[:, None]
     position = (0.45, 0.02) + force / rendered + shift
-    return measure(len(time), target=(0.452, 0.02), position=over_time(position), user_force=over_time(force), stiffness_setpoint=asked)
+    return measure(
+        len(time), target=(0.452, 0.02), position=over_time(position), user_force=over_time(force), stiffness_setpoint=asked
+    )
 
 
 @pytest.mark.parametrize("angle", [0, math.pi / 2, math.pi, -math.pi / 2, 0.7])
@@ -208,7 +209,7 @@ def test_rendered_stiffness_needs_a_push_held_for_two_seconds_and_a_resting_refe
     assert np.isnan(spring(0, push=0)["stiffness_error"]).all()
     assert np.isnan(spring(0, seconds=3.9)["stiffness_error"]).all()
     assert not np.isnan(spring(0, seconds=4.1)["stiffness_error"]).any()
-    time = PERIOD * np.arange(5000)
+    time = PERIOD * np.arange(round(5 / PERIOD))
     force = over_time(np.stack([20 * np.clip(time - 1, 0, 1), 0 * time], axis=1))
     moved = over_time(np.where((time < 0.5)[:, None], (0.5, 0.0), (0.501, 0.0)))
     changed = over_time(np.where((time < 0.5)[:, None], (2000.0, 2000.0), (2000.0, 3000.0)))
@@ -218,20 +219,20 @@ def test_rendered_stiffness_needs_a_push_held_for_two_seconds_and_a_resting_refe
 
 
 def test_a_lane_that_died_before_its_push_says_nothing_about_stiffness():
-    time = PERIOD * np.arange(5000)
+    time = PERIOD * np.arange(round(5 / PERIOD))
     # After 0.4 s the lane is lost and a new episode runs in it, pushed in its turn.
-    force = np.zeros((5000, 1, 2))
+    force = np.zeros((len(time), 1, 2))
     force[:, 0, 0] = 20 * np.clip(time - 1.4, 0, 1)
-    result = measure(5000, position=(0.5, 0.0) + force / 2000, user_force=force, alive=(time < 0.4)[:, None])
+    result = measure(len(time), position=(0.5, 0.0) + force / 2000, user_force=force, alive=(time < 0.4)[:, None])
     assert np.isnan(result["stiffness_error"]).all() and np.isnan(result["cross_motion"]).all()
 
 
 def test_a_lane_that_died_after_its_push_was_measured_keeps_the_figure():
-    time = PERIOD * np.arange(8000)
-    force = np.zeros((8000, 1, 2))
+    time = PERIOD * np.arange(round(8 / PERIOD))
+    force = np.zeros((len(time), 1, 2))
     force[:, 0, 0] = np.where(time < 5, 20 * np.clip(time - 1, 0, 1), 0.0)
     alive = (time < 4.5)[:, None]
-    result = measure(8000, position=(0.5, 0.0) + force / 2500, user_force=force, alive=alive)
+    result = measure(len(time), position=(0.5, 0.0) + force / 2500, user_force=force, alive=alive)
     assert result["stiffness_error"] == pytest.approx(25, abs=0.05)
     assert result["hunting_x"] == pytest.approx(0, abs=1e-9)
 
@@ -245,7 +246,7 @@ def test_without_a_settled_sample_the_settled_figures_are_nan_and_the_others_are
 
 def test_the_caller_may_reuse_its_arrays():
     fresh = measure(50, target=over_time(0.5 + 0.01 * np.arange(50)))
-    metrics, info = EpisodeMetrics(1, PERIOD), {name: np.full((1,) if name in SIZES else (1, 2), 0.0) for name in RESTING}
+    metrics, info = EpisodeMetrics(1, PERIOD), {name: np.full((1,) if name in SINGLE else (1, 2), 0.0) for name in RESTING}
     for k in range(50):
         for name, value in RESTING.items():
             info[name][:] = value
@@ -262,4 +263,4 @@ def test_summarize_takes_tails_by_size_and_ignores_what_says_nothing():
     assert result["q95"] == pytest.approx(np.quantile([1, 10, 3, 2], 0.95))
     nothing = summarize(np.array([np.nan, np.nan]))
     assert set(nothing) == {"median", "mean", "q95", "max"} and all(math.isnan(value) for value in nothing.values())
-    assert summarize(np.array([]))["median"] != summarize(np.array([]))["median"]
+    assert math.isnan(summarize(np.array([]))["max"])

@@ -14,7 +14,7 @@ import pytest
 
 from birthsim_env import dynamics
 from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array, parameter_array
+from birthsim_env.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 
@@ -42,12 +42,13 @@ def test_shapes_names_and_units_of_what_the_plant_shows() -> None:
     plant = Plant(num_envs=3)
     assert plant.state.shape == (18, 3) == (len(STATE_NAMES), 3)
     assert plant.lane_parameters.shape == (len(PARAMETER_NAMES), 3)
-    shown = (plant.piston, plant.piston_speed, plant.pressures, plant.temperatures, plant.end_effector(), plant.mass_flows(), plant.impacts)
-    assert [array.shape for array in shown] == [(2, 3), (2, 3), (4, 3), (4, 3), (4, 3), (8, 3), (2, 3)]
+    computed = plant.end_effector(), plant.mass_flows(), plant.impacts
+    assert [array.shape for array in computed] == [(4, 3), (8, 3), (2, 3)]
     plant.state[:] = np.arange(18)[:, None]
     rows = {name: float(row) for row, name in enumerate(STATE_NAMES)}
-    for array, names in ((plant.piston, "y1 y2"), (plant.piston_speed, "v1 v2"), (plant.pressures, "Pp1 Pn1 Pp2 Pn2"), (plant.temperatures, "Tp1 Tn1 Tp2 Tn2")):
-        assert array[:, 1].tolist() == [rows[name] for name in names.split()]
+    views = plant.piston, plant.piston_speed, plant.pressures, plant.temperatures
+    for array, names in zip(views, ("y1 y2", "v1 v2", "Pp1 Pn1 Pp2 Pn2", "Tp1 Tn1 Tp2 Tn2"), strict=True):
+        assert array.tolist() == [[rows[name]] * 3 for name in names.split()]
     assert plant.derivatives(Plant(num_envs=3).state, *idle(3)).shape == (18, 3)
 
 
@@ -61,9 +62,11 @@ def test_advance_changes_the_state_in_place_and_returns_it() -> None:
 
 def test_state_starts_at_mid_stroke_at_rest() -> None:
     plant = Plant()
-    assert not plant.piston.any() and not plant.piston_speed.any()
+    assert not plant.piston.any()
+    assert not plant.piston_speed.any()
     x, y, vx, vy = plant.end_effector()[:, 0]
-    assert (x, y) == pytest.approx((0.5, 0.0), abs=0.02) and vx == vy == 0
+    assert (x, y) == pytest.approx((0.5, 0.0), abs=0.02)
+    assert vx == vy == 0
     assert np.all(plant.temperatures == 293.15)
 
 
@@ -112,7 +115,10 @@ def test_plant_refuses_by_name(arguments: dict[str, Any], message: str) -> None:
         Plant(**arguments)
 
 
-@pytest.mark.parametrize(("rows", "value", "message"), [(17, 1.0, r"state has shape \(17, 2\); allowed: \(18, 2\)"), (18, math.nan, r"state\[0, 0\] = nan")])
+@pytest.mark.parametrize(
+    ("rows", "value", "message"),
+    [(17, 1.0, r"state has shape \(17, 2\); allowed: \(18, 2\)"), (18, math.nan, r"state\[0, 0\] = nan")],
+)
 def test_derivatives_refuse_by_name(rows: int, value: float, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Plant(num_envs=2).derivatives(np.full((rows, 2), value), *idle(2))
@@ -185,19 +191,23 @@ def test_balance_has_the_pneumatic_stiffness_asked_for() -> None:
     for cylinder, (pp, pn, half) in enumerate(((6, 8, 0.1), (10, 12, 0.2))):
         stiffness = 1.2 * (state[pp] * bore / (half + 0.01) + state[pn] * ring / (half - 0.01))
         np.testing.assert_allclose(stiffness[:3], wanted[cylinder, :3], rtol=1e-12)
-        assert stiffness[3] < 0.75 * wanted[cylinder, 0] and stiffness[4] > wanted[cylinder, 2]
+        assert stiffness[3] < 0.75 * wanted[cylinder, 0]
+        assert stiffness[4] > wanted[cylinder, 2]
     pressures = state[[6, 8, 10, 12]]
     assert np.all((pressures >= 1.013e5 * (1 - 1e-12)) & (pressures <= 7e5 * (1 + 1e-12)))
     at_limit = np.minimum(np.abs(pressures / 1.013e5 - 1), np.abs(pressures / 7e5 - 1))[:, 3:] < 1e-12
-    assert at_limit[:2].any(axis=0).all() and at_limit[2:].any(axis=0).all()
+    assert at_limit[:2].any(axis=0).all()
+    assert at_limit[2:].any(axis=0).all()
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instruction names")
 def test_kernel_is_vectorised() -> None:
-    """Every division and square root stands twice in the machine code, packed and for leftover lanes; scalar code has no packed one."""
-    kernel = numba.njit(error_model="numpy", nogil=True)(dynamics.advance.py_func)  # not from the cache, which keeps no assembly
-    kernel.compile(tuple(numba.typeof(a) for a in (np.zeros((18, 1)), np.zeros((4, 1)), np.zeros((1, 2, 1)), parameter_array(Parameters(), 1), 1, 0.1, np.zeros((2, 1)))))
+    """Each division and root stands there twice, packed and for leftover lanes; scalar code would have no packed ones."""
+    kernel = numba.njit(error_model="numpy", nogil=True)(dynamics.advance.py_func)  # a kernel from the cache shows no assembly
+    rows, samples = np.zeros((1, 1)), np.zeros((1, 2, 1))
+    kernel.compile(tuple(numba.typeof(a) for a in (rows, rows, samples, rows, 1, 0.1, rows)))
     (assembly,) = kernel.inspect_asm().values()
     found = Counter(re.findall(r"^\s+v?(divpd|divsd|sqrtpd|sqrtsd)\b", assembly, re.MULTILINE))
-    assert found["divpd"] >= 100 and found["sqrtpd"] >= 40, found
-    assert found["divpd"] > 0.75 * found["divsd"] and found["sqrtpd"] > 0.75 * found["sqrtsd"], found
+    for operation, least in (("div", 100), ("sqrt", 40)):
+        packed, scalar = found[operation + "pd"], found[operation + "sd"]
+        assert packed >= max(least, 0.75 * scalar), found

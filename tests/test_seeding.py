@@ -181,7 +181,7 @@ def test_a_drawn_rig_moves_otherwise_but_starts_on_the_same_target():
     ],
 )
 def test_bad_ranges_are_refused_by_name_before_the_first_episode(ranges, words):
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match="allowed") as refusal:
         gymnasium.make("BirthSIM/Circle-v0", randomize=ranges)
     assert all(word in str(refusal.value) for word in words), refusal.value
 

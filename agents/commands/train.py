@@ -8,10 +8,8 @@ from pathlib import Path
 import gymnasium
 
 import agents
-from baselines.commands.shared import make_folder, run, whole, write_json
+from baselines.commands.shared import RANDOMIZE, make_folder, run, whole, write_json
 from birthsim_env.parameters import load_parameters
-
-RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 
 
 def main() -> None:
@@ -26,7 +24,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
     parser.add_argument("--randomize", default="all", choices=tuple(RANDOMIZE), help="what training varies (default: all)")
-    parser.add_argument("--authority", type=float, default=40.0, help="bound of the residual force, N (default: %(default)s)")
+    parser.add_argument("--authority", type=float, help="bound of the residual force, N (default: 100)")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--out", type=Path, required=True, help="folder for policy.safetensors, policy.json, training.json")
     run(parser, _train)
@@ -51,8 +49,9 @@ def _train(arguments: argparse.Namespace) -> None:
         sensors=arguments.sensors,
         randomize=RANDOMIZE[arguments.randomize],
     )
+    residual = ResidualSettings() if arguments.authority is None else ResidualSettings(authority=arguments.authority)
     folder = make_folder(arguments.out)
-    reached = train(settings, ResidualSettings(authority=arguments.authority), folder, rig)
+    reached = train(settings, residual, folder, rig)
     write_json(folder / "training.json", reached)
     law, policy = reached["law"], reached["policy"]
     print(f"\n{settings.environment}, {settings.validation_lanes} validation episodes, settled RMS error:")

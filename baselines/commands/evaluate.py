@@ -9,11 +9,9 @@ from typing import Any
 import gymnasium
 
 import birthsim_env
-from baselines.commands.shared import make_folder, run, whole, write_json
+from baselines.commands.shared import RANDOMIZE, make_folder, run, whole, write_json
 from baselines.evaluation import evaluate, table
 from baselines.registry import controller_names, make_controller
-
-RANDOMIZE = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 
 
 def main() -> None:

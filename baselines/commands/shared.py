@@ -9,6 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
+"""The option --randomize -> the environments' argument ``randomize``."""
+
 
 def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], None]) -> None:
     """Parse, act, and turn what a user can mend into one line and exit status 2; an interrupt into 130."""

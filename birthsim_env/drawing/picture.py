@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
@@ -12,10 +11,8 @@ from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.panel import Panel, number
 from birthsim_env.drawing.pen import FINE, Axis, Box, Lettering, Pen, Point
 from birthsim_env.drawing.rig import Pose, Rig
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.parameters import Parameters
-
-if TYPE_CHECKING:
-    from birthsim_env.rendering import Scene
 
 _LEAST_FORCE = 0.05  # N; below it an arrow would only flicker
 

@@ -1,0 +1,228 @@
+"""Bad input is refused with a message that names argument, value and what is allowed, and leaves the environment as it was."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_env import Parameters
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.vector_env import BirthSIMVectorEnv
+
+CIRCLE = "BirthSIM/Circle-v0"
+NAN, INF = math.nan, math.inf
+
+
+def refusal(call, kind=ValueError):
+    with pytest.raises(kind) as caught:
+        call()
+    return str(caught.value)
+
+
+def names_all(message, words):
+    assert "allowed" in message, message
+    assert all(word in message for word in words), message
+
+
+SINGLE_ACTIONS = [
+    ((0, 0, 0, NAN), ("action[3] = nan", "-1 to 1")),
+    ((0, -INF, 0, 0), ("action[1] = -inf", "-1 to 1")),
+    ((0, 0, 1.001, 0), ("action[2] = 1.001", "-1 to 1")),
+    ((-3, 0, 0, 0), ("action[0] = -3.0", "-1 to 1")),
+    ((0, 0), ("action has shape (2,)", "(4,)")),
+    ((0, 0, 0, 0, 0), ("action has shape (5,)", "(4,)")),
+    (np.zeros((1, 4)), ("action has shape (1, 4)", "(4,)")),
+    (0.5, ("action has shape ()", "(4,)")),
+    (None, ("action has shape ()", "(4,)")),
+    ("open", ("action = ", "'open'", "4 numbers")),
+    (("a", "b", "c", "d"), ("action = ", "'a'", "4 numbers")),
+    ({"P1": 1.0}, ("action = ", "'P1'", "4 numbers")),
+    ((0, 0, (0, 0), 0), ("action = ", "4 numbers")),
+    ((1j, 0, 0, 0), ("action = ", "1j", "4 numbers")),
+]
+
+
+@pytest.mark.parametrize(("action", "words"), SINGLE_ACTIONS)
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_a_refused_action_leaves_the_single_environment_as_it_was(action, words, sensors):
+    env, calm = (gymnasium.make(CIRCLE, sensors=sensors).unwrapped for _ in range(2))
+    for one in (env, calm):
+        one.reset(seed=2)
+        one.step((0.1, 0.2, 0.0, -0.1))
+    before = env.simulation.plant.state.copy(), env.simulation.time.copy(), env.measurement.position.copy()
+    names_all(refusal(lambda: env.step(action)), words)
+    after = env.simulation.plant.state, env.simulation.time, env.measurement.position
+    for old, new in zip(before, after, strict=True):
+        np.testing.assert_array_equal(old, new)
+    for _ in range(5):
+        (observation, reward, *_), (expected, paid, *_) = (one.step((0.0, 0.1, 0.2, 0.0)) for one in (env, calm))
+        np.testing.assert_array_equal(observation, expected)
+        assert reward == paid
+
+
+VECTOR_ACTIONS = [
+    (np.zeros(4), ("action has shape (4,)", "(3, 4)")),
+    (np.zeros((2, 4)), ("action has shape (2, 4)", "(3, 4)")),
+    (np.zeros((4, 3)), ("action has shape (4, 3)", "(3, 4)")),
+    (np.array([[0.0] * 4, [0, 0, NAN, 0], [0.0] * 4]), ("action[2] = nan in lane 1", "-1 to 1")),
+    (np.array([[0.0] * 4, [0.0] * 4, [0, 1.5, 0, 0]]), ("action[1] = 1.5 in lane 2", "-1 to 1")),
+    (np.full((3, 4), "x"), ("action = ", "'x'", "numbers in [-1, 1]")),
+    ([[0.0] * 4, [0.0] * 3, [0.0] * 4], ("action = ", "numbers in [-1, 1]")),
+]
+
+
+@pytest.mark.parametrize(("action", "words"), VECTOR_ACTIONS)
+def test_a_refused_action_leaves_the_vector_environment_as_it_was(action, words):
+    env, calm = (gymnasium.make_vec(CIRCLE, num_envs=3) for _ in range(2))
+    good = np.full((3, 4), 0.1)
+    env.reset(seed=2), calm.reset(seed=2)
+    state = env.unwrapped.simulation.plant.state.copy()
+    names_all(refusal(lambda: env.step(action)), words)
+    np.testing.assert_array_equal(env.unwrapped.simulation.plant.state, state)
+    for one, other in zip(env.step(good)[:4], calm.step(good)[:4], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+ARGUMENTS = [
+    ({"action_mode": "voltage"}, ("action_mode = 'voltage'", "'valve'", "'flow'")),
+    ({"action_mode": None}, ("action_mode = None", "'valve'", "'flow'")),
+    ({"valves": "three"}, ("valves = 'three'", "'two_valves'", "'one_valve'")),
+    ({"sensors": "magnetic"}, ("sensors = 'magnetic'", "'ideal'", "'lab'")),
+    ({"sensors": ["lab"]}, ("sensors = ['lab']", "'ideal'", "'lab'")),
+    ({"randomize": "all"}, ("randomize = 'all'", "False", "True", "'plant'", "'scenario'")),
+    ({"randomize": None}, ("randomize = None", "'plant'")),
+    ({"randomize": 1}, ("randomize = 1", "'plant'")),
+    ({"scenario": "birth"}, ("scenario = 'birth'", "'circle'", "'dystocia'")),
+    ({"reference": "circle"}, ("reference = 'circle'", "Trajectory")),
+    ({"user_force": 30.0}, ("user_force = 30.0", "UserForce")),
+    ({"stiffness": 4000.0}, ("stiffness = 4000.0", "StiffnessSchedule")),
+    ({"parameters": 3}, ("parameters = 3", "Parameters", "TOML")),
+    ({"policy_period": 0.0015}, ("policy_period = 0.0015", "multiple of the control period 0.001 s")),
+    ({"policy_period": 0.0004}, ("policy_period = 0.0004", "multiple")),
+    ({"policy_period": 0}, ("policy_period = 0;", "multiple")),
+    ({"policy_period": -0.01}, ("policy_period = -0.01", "multiple")),
+    ({"policy_period": INF}, ("policy_period = inf", "multiple")),
+    ({"policy_period": NAN}, ("policy_period = nan", "multiple")),
+    ({"policy_period": "10 ms"}, ("policy_period = '10 ms'", "multiple")),
+    ({"duration": 0.0}, ("duration = 0.0", "positive")),
+    ({"duration": -1}, ("duration = -1", "positive")),
+    ({"duration": INF}, ("duration = inf", "positive")),
+    ({"duration": "long"}, ("duration = 'long'", "positive")),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS)
+def test_impossible_arguments_are_refused_by_both_environments(arguments, words):
+    names_all(refusal(lambda: gymnasium.make(CIRCLE, **arguments)), words)
+    names_all(refusal(lambda: gymnasium.make_vec(CIRCLE, num_envs=2, **arguments)), words)
+
+
+@pytest.mark.parametrize("mode", ["ascii", "RGB_ARRAY", 1])
+def test_an_unknown_render_mode_is_refused(mode):
+    # gymnasium.make itself warns about it first, so the classes are asked directly.
+    for cls in (BirthSIMEnv, BirthSIMVectorEnv):
+        message = refusal(lambda cls=cls: cls("circle", render_mode=mode))
+        names_all(message, (f"render_mode = {mode!r}", "'human'", "'rgb_array'"))
+
+
+@pytest.mark.parametrize("lanes", [0, -1, 1.5, "2", None])
+def test_an_impossible_number_of_lanes_is_refused(lanes):
+    names_all(refusal(lambda: BirthSIMVectorEnv("circle", num_envs=lanes)), (f"num_envs = {lanes!r}", ">= 1"))
+
+
+def test_unknown_ids_and_arguments_name_themselves():
+    message = refusal(lambda: gymnasium.make("BirthSIM/Square-v0"), gymnasium.error.NameNotFound)
+    assert "Square" in message
+    assert "v0" in refusal(lambda: gymnasium.make("BirthSIM/Circle-v9"), gymnasium.error.VersionNotFound)
+    assert "'sensor'" in refusal(lambda: gymnasium.make(CIRCLE, sensor="lab"), TypeError)
+
+
+def test_the_policy_period_follows_the_rigs_own_control_period():
+    slow = Parameters().replace({"electronics.control_period": 0.004})
+    message = refusal(lambda: gymnasium.make(CIRCLE, parameters=slow))
+    names_all(message, ("policy_period = 0.01", "multiple of the control period 0.004 s"))
+    env = gymnasium.make(CIRCLE, parameters=slow, policy_period=0.012)
+    env.reset(seed=0)
+    assert env.step(np.zeros(4))[4]["time"] == pytest.approx(0.012)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[mechanics\n", ("line 1",)),
+        ("[mechanics]\nmass 3.0\n", ("line 2",)),
+        ("[mechanics]\nmass = ", ("end of document",)),
+        ("[mechanics]\nmas = 3.0\n", ("mechanics.mas", "allowed in mechanics", "mass", "gravity")),
+        ("[motor]\nmass = 3.0\n", ("'motor'", "allowed", "mechanics")),
+        ("[mechanics]\nmass = -3.0\n", ("Mechanics.mass = -3.0", "allowed", "> 0 (kg)")),
+        ("[mechanics]\nmass = 'heavy'\n", ("Mechanics.mass = 'heavy'", "allowed", "> 0 (kg)")),
+        ("[mechanics]\nmass = nan\n", ("Mechanics.mass = nan", "finite")),
+        ("[mechanics]\nmass = true\n", ("Mechanics.mass = True", "allowed")),
+        ("[friction]\nlaw = 'stribeck'\n", ("Friction.law = 'stribeck'", "'lugre'", "'coulomb'")),
+        ("[cylinder1]\nrod_diameter = 0.03\n", ("rod_diameter = 0.03", "less than piston_diameter = 0.025")),
+        ("[air]\nsupply_pressure = 1e5\n", ("supply_pressure = 100000.0", "more than atmospheric_pressure")),
+        ("[geometry]\nk1 = 0.2\n", ("Geometry.k1 = 0.2", "allowed")),
+        ("mechanics = 3\n", ("mechanics = 3", "allowed", "section")),
+    ],
+)
+def test_a_bad_rig_file_names_itself_and_what_is_wrong_in_it(tmp_path, text, words):
+    path = tmp_path / "our_rig.toml"
+    path.write_text(text, encoding="utf-8")
+    for given in (path, str(path)):
+        message = refusal(lambda given=given: gymnasium.make(CIRCLE, parameters=given))
+        assert all(word in message for word in ("our_rig.toml", *words)), message
+
+
+def test_a_rig_file_that_cannot_be_read_names_itself(tmp_path):
+    for path, words in ((tmp_path / "none.toml", "No such file"), (tmp_path, "directory")):
+        message = refusal(lambda path=path: gymnasium.make(CIRCLE, parameters=path))
+        assert f"parameters = {str(path)!r} cannot be read" in message
+        assert words in message
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    assert "binary.toml" in refusal(lambda: gymnasium.make(CIRCLE, parameters=binary))
+
+
+def test_a_good_rig_file_gives_the_same_world_as_its_parameters(tmp_path):
+    rig = Parameters().replace({"mechanics.mass": 4.0, "cylinder2.coulomb_friction": 9.0})
+    rig.to_toml(tmp_path / "rig.toml")
+    runs = []
+    for given in (rig, tmp_path / "rig.toml", None):
+        env = gymnasium.make(CIRCLE, parameters=given)
+        env.reset(seed=0)
+        runs.append([env.step((0.2, 0.0, 0.2, 0.0))[0] for _ in range(10)])
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert not np.array_equal(runs[0], runs[2])
+
+
+def test_a_step_before_reset_is_refused():
+    for env, action in (
+        (gymnasium.make(CIRCLE).unwrapped, np.zeros(4)),
+        (gymnasium.make_vec(CIRCLE, num_envs=2).unwrapped, np.zeros((2, 4))),
+    ):
+        message = refusal(lambda env=env, action=action: env.step(action), RuntimeError)
+        assert "reset(seed=...) first" in message
+        env.reset(seed=0)
+        assert np.isfinite(env.step(action)[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"positon": (0.5, 0.0)}, ("'positon'", "'position'")),
+        ({"position": (0.5,)}, ("options['position'] = (0.5,)", "(x, y)")),
+        ({"position": (0.5, NAN)}, ("options['position'] = (0.5, nan)", "finite")),
+        ({"position": "centre"}, ("options['position'] = 'centre'", "(x, y)")),
+        ({"position": None}, ("options['position'] = None", "(x, y)")),
+        ({"position": (0.9, 0.0)}, ("(0.9, 0)", "unreachable", "0.3 to 0.7 m")),
+    ],
+)
+def test_impossible_starts_are_refused_and_the_next_reset_works(options, words):
+    for env in (gymnasium.make(CIRCLE), gymnasium.make_vec(CIRCLE, num_envs=2)):
+        names_all(refusal(lambda env=env: env.reset(seed=0, options=options)), words)
+        observation = env.reset(seed=0)[0]
+        fresh = gymnasium.make(CIRCLE).reset(seed=0)[0]
+        np.testing.assert_array_equal(observation.reshape(-1, 24)[0], fresh)

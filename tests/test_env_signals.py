@@ -1,0 +1,124 @@
+"""What an environment tells: observation, reward and info agree with the docstring, with each other and with the plant."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.info import FIELDS
+from birthsim_env.observation import ENTRIES
+
+IDS = tuple(f"BirthSIM/{name}-v0" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))
+TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+
+
+def make(name=IDS[0], **arguments) -> BirthSIMEnv:
+    return gymnasium.make(name, **arguments).unwrapped
+
+
+def run(env, actions, seed=0):
+    """Observations, rewards and infos of an episode that starts from ``seed``; the first row is that of ``reset``."""
+    observation, info = env.reset(seed=seed)
+    rows = [(observation, 0.0, info)]
+    for action in actions:
+        observation, reward, _, _, info = env.step(action)
+        rows.append((observation, reward, info))
+    observations, rewards, infos = zip(*rows, strict=True)
+    return np.array(observations), np.array(rewards), infos
+
+
+def random_actions(count, size, reach=0.2, seed=0):
+    return np.random.default_rng(seed).uniform(-reach, reach, (count, size)).astype(np.float32)
+
+
+def test_the_table_in_the_docstring_is_the_table_of_entries():
+    text = BirthSIMEnv.__doc__.split("| index | entry")[1].split("## Reward")[0]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if re.match(r"\s*\| \d", line)]
+    assert [int(n) for row in rows[:-1] for n in row[0].split(",")] + [20] == [*range(20), int(rows[-1][0].split()[0])]
+    scales = []
+    for index, _, scale in rows[:-1]:
+        values = [float(v) for v in re.findall(r"[\d.]+(?=[ ,])", scale)] or [1.0]
+        entries = [ENTRIES[int(n)] for n in index.split(",")]
+        unit = "half strokes" if scale == "half a stroke" else re.sub(r"^[\d., ]+", "", scale)
+        assert {entry.unit for entry in entries} == {unit}
+        scales += values * (len(entries) // len(values))
+    assert scales == [entry.scale for entry in ENTRIES]
+    for name, entry in zip(make().observation_names, ENTRIES, strict=False):
+        assert name == f"{entry.name}, {entry.scale:g} {entry.unit}"
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_an_ideal_observation_is_info_over_the_documented_scales(name):
+    env = make(name, randomize=True)
+    actions = random_actions(120, 4)
+    observations, _, infos = run(env, actions, seed=5)
+    for k, (seen, info) in enumerate(zip(observations, infos, strict=True)):
+        external = 1.013e5 * math.pi / 4 * 0.010**2
+        target = env.simulation.trajectory.sample(np.array([info["time"]]))[:, 0]
+        expected = np.concatenate([
+            info["tracking_error"] / 0.01,
+            info["velocity"] / 0.2,
+            info["piston_position"] / (0.1, 0.2),
+            (info["pneumatic_force"] - external) / 200,
+            info["pneumatic_stiffness"] / (5000, 2500),
+            info["pneumatic_stiffness_setpoint"] / (5000, 2500),
+            info["stiffness_setpoint"] / 5000,
+            info["user_force"] / 50,
+            target[2:4] / 0.2,
+            target[4:6] / 0.5,
+        ])  # fmt: skip
+        np.testing.assert_allclose(seen[:20], np.clip(expected, -10, 10), rtol=1e-5, atol=1e-5)
+        np.testing.assert_array_equal(seen[20:], actions[k - 1] if k else np.zeros(4))
+
+
+@pytest.mark.parametrize("period", [0.001, 0.01, 0.02])
+def test_the_reward_is_the_documented_formula_of_info(period):
+    actions = random_actions(round(2.0 / period), 4)
+    env = make(policy_period=period)
+    _, rewards, infos = run(env, actions, seed=1)
+    last, paid = np.zeros(4), 0
+    for action, reward, info in zip(actions, rewards[1:], infos[1:], strict=True):
+        error = np.abs(info["tracking_error"]).sum()
+        tracking = -min(error / 2e-3, 5.0) * period / 0.01 if info["since_jump"] >= 0.3 else 0.0
+        assert info["reward_tracking"] == pytest.approx(tracking, rel=1e-9, abs=1e-12)
+        assert info["reward_action_change"] == pytest.approx(-0.05 * np.abs(action.astype(float) - last).sum(), rel=1e-9)
+        assert info["reward_failure"] == 0.0
+        assert reward == pytest.approx(sum(info[term] for term in TERMS), rel=1e-12)
+        last, paid = action.astype(float), paid + (tracking < 0)
+    # A push of 300 N/s runs from 1.0 to 1.1 s: free until 1.4 s, and for the first 0.3 s of the episode.
+    unpaid = sum(info["since_jump"] < 0.3 - 1e-9 for info in infos[1:]) * period
+    assert unpaid == pytest.approx(0.3 + 0.4, abs=2 * period + 1e-9)
+    assert paid > 0.6 * len(actions)
+
+
+def test_info_has_every_documented_field_and_agrees_with_the_plant():
+    env = make("BirthSIM/Forceps-v0", randomize=True)
+    _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
+    for step, info in enumerate(infos):
+        assert set(info) == set(FIELDS) | (set(TERMS) if step else set())
+        for field, (size, _) in FIELDS.items():
+            assert isinstance(info[field], float) if size == 1 else info[field].shape == (size,), field
+        assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)
+    plant, info = env.simulation.plant, infos[-1]
+    motion, flows = plant.end_effector()[:, 0], plant.mass_flows()[:, 0]
+    np.testing.assert_array_equal(info["position"], motion[:2])
+    np.testing.assert_array_equal(info["velocity"], motion[2:])
+    np.testing.assert_array_equal(info["piston_position"], plant.piston[:, 0])
+    np.testing.assert_array_equal(info["piston_velocity"], plant.piston_speed[:, 0])
+    np.testing.assert_array_equal(info["pressure"], plant.pressures[:, 0])
+    np.testing.assert_array_equal(info["temperature"], plant.temperatures[:, 0])
+    np.testing.assert_array_equal(info["opening"], plant.state[14:, 0])
+    assert info["supply_flow"] == pytest.approx(np.maximum(flows[:4], 0).sum())
+    bore, rod = math.pi / 4 * 0.025**2, math.pi / 4 * 0.010**2
+    pp, pn, length = info["pressure"][0::2] * bore, info["pressure"][1::2] * (bore - rod), np.array([0.1, 0.2])
+    y = info["piston_position"]
+    np.testing.assert_allclose(info["pneumatic_force"], pp - pn)
+    np.testing.assert_allclose(info["pneumatic_stiffness"], 1.2 * (pp / (length + y) + pn / (length - y)))
+    compliant = info["target"] + info["user_force"] / info["stiffness_setpoint"]
+    np.testing.assert_allclose(info["compliant_target"], compliant)
+    np.testing.assert_allclose(info["tracking_error"], info["position"] - compliant)

@@ -1,0 +1,401 @@
+"""Controllers over seeded episodes: the same worlds for each, lost lanes, interrupts, tables, and a user's own controller."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines import evaluation
+from baselines.backstepping import BacksteppingController
+from baselines.evaluation import TRACE, Evaluation, evaluate, table
+from baselines.metrics import UNITS, EpisodeMetrics
+from baselines.registry import controller_names, make_controller
+from birthsim_env import Parameters
+from birthsim_env.info import FIELDS
+
+PROBE, CIRCLE = "BirthSIM/Probe-v0", "BirthSIM/Circle-v0"
+RIG = Parameters()
+
+
+class Spy:
+    """A law of which every call is written down; ``after`` calls it raises KeyboardInterrupt."""
+
+    def __init__(self, law=None, interrupt_at=None):
+        self.law = law or BacksteppingController()
+        self.interrupt_at, self.calls, self.resets = interrupt_at, 0, 0
+        self.references, self.forces, self.keys, self.commands = [], [], [], []
+
+    def reset(self, lanes=None):
+        self.resets += 1
+        self.law.reset(lanes)
+
+    def command(self, measurement, reference):
+        if self.calls == self.interrupt_at:
+            raise KeyboardInterrupt
+        self.calls += 1
+        self.references.append(reference.rows.copy())
+        self.forces.append(measurement.user_force.copy())
+        self.commands.append(self.law.command(measurement, reference))
+        return self.commands[-1]
+
+
+class Slam:
+    """Holds all lanes with the law but ``lane``, whose cylinder 2 it slams into its end stop from ``begins`` s on."""
+
+    def __init__(self, lanes=(1,), begins=0.3):
+        self.law, self.lanes, self.begins = BacksteppingController(), list(lanes), begins
+
+    def reset(self, lanes=None):
+        self.law.reset(lanes)
+
+    def command(self, measurement, reference):
+        openings = self.law.command(measurement, reference)
+        late = [lane for lane in self.lanes if measurement.time[lane] >= self.begins]
+        openings[:, late] = np.array([0.0, 0.0, 1.0, -1.0])[:, None]
+        return openings
+
+
+@pytest.fixture
+def worlds(monkeypatch):
+    """The plant parameters (rows, N) of every environment that an evaluation made, as its first episode found them."""
+    made = []
+    make_vec = gymnasium.make_vec
+
+    def spied(*args, **kwargs):
+        env = make_vec(*args, **kwargs)
+        reset = env.reset
+
+        def recorded(**options):
+            result = reset(**options)
+            made.append(env.simulation.plant.lane_parameters.copy())
+            return result
+
+        env.reset = recorded
+        return env
+
+    monkeypatch.setattr(evaluation.gymnasium, "make_vec", spied)
+    return made
+
+
+def run(controller, name="it", episodes=3, seed=5, env=PROBE, **arguments) -> Evaluation:
+    arguments = {"duration": 0.8, "randomize": True, **arguments}
+    return evaluate(env, controller, name, episodes, seed, progress=False, **arguments)
+
+
+def same_figures(one: Evaluation, other: Evaluation):
+    assert one.seeds == other.seeds
+    assert one.lost == other.lost
+    for name in UNITS:
+        np.testing.assert_array_equal(one.metrics[name], other.metrics[name], err_msg=name)
+    for mine, its in zip(one.traces, other.traces, strict=True):
+        np.testing.assert_array_equal(mine, its)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors):
+    law = BacksteppingController()
+    first, again = run(law, sensors=sensors), run(law, sensors=sensors)
+    same_figures(first, again)
+    same_figures(first, run(BacksteppingController(), sensors=sensors))
+    other = run(law, sensors=sensors, seed=50)
+    assert first.seeds == [5, 6, 7]
+    assert other.seeds == [50, 51, 52]
+    assert not set(first.metrics["error_rms_x"]) & set(other.metrics["error_rms_x"])
+
+
+def test_two_controllers_meet_the_same_worlds(worlds):
+    law, weight = Spy(), Spy(BacksteppingController(weight_compensation=True))
+    run(law, duration=2.5), run(weight, duration=2.5)
+    np.testing.assert_array_equal(worlds[0], worlds[1])
+    np.testing.assert_array_equal(law.references, weight.references)
+    np.testing.assert_array_equal(law.forces, weight.forces)
+    # They are worlds that differ from each other, and the controllers did different things in them.
+    assert len({column.tobytes() for column in worlds[0].T}) == 3
+    assert len({lane.tobytes() for lane in np.moveaxis(law.forces, 2, 0)}) == 3
+    assert np.abs(law.forces).max() > 1
+    assert not np.array_equal(law.commands[100], weight.commands[100])
+
+
+def test_a_seed_means_the_same_world_however_many_episodes_run_beside_it(monkeypatch):
+    together = run(BacksteppingController(), episodes=5)
+    monkeypatch.setattr(evaluation, "LANES", 2)
+    batches = run(BacksteppingController(), episodes=5)
+    assert [trace.shape[1] for trace in batches.traces] == [2, 2, 1]
+    assert together.seeds == batches.seeds == [5, 6, 7, 8, 9]
+    for name in UNITS:
+        np.testing.assert_array_equal(together.metrics[name], batches.metrics[name], err_msg=name)
+
+
+def test_figures_are_those_of_the_environment_step_by_step():
+    result = run(BacksteppingController(), episodes=2, seed=3, randomize="plant", duration=1.2, env=CIRCLE)
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=1e-3, duration=1.2, randomize="plant")
+    _, info = env.reset(seed=3)
+    law, errors, flows, openings = BacksteppingController(), [], [], []
+    for _ in range(1200):
+        errors.append(1e3 * info["tracking_error"])
+        flows.append(info["supply_flow"])
+        openings.append(law.command(env.measurement, env.reference))
+        _, _, _, _, info = env.step(openings[-1].T)
+    size = np.array(errors)
+    np.testing.assert_allclose(result.metrics["error_rms_x"], np.sqrt((size[..., 0] ** 2).mean(axis=0)))
+    np.testing.assert_allclose(result.metrics["error_max_y"], np.abs(size[..., 1]).max(axis=0))
+    # Settled from 0.5 s on, until the push that begins at 1 s.
+    np.testing.assert_allclose(result.metrics["settled_rms_y"], np.sqrt((size[500:1001, :, 1] ** 2).mean(axis=0)))
+    np.testing.assert_allclose(result.metrics["air"], np.mean(flows, axis=0) / 1.293 * 60e3)
+    np.testing.assert_allclose(result.metrics["saturation"], 100 * (np.abs(openings).max(axis=1) >= 1).mean(axis=0))
+    np.testing.assert_array_equal(1e3 * result.traces[0], size[:: round(TRACE / 1e-3)])
+    assert np.isnan(result.metrics["stiffness_error"]).all()
+
+
+def test_the_stiffness_test_tells_a_stiffer_law_from_a_softer_one():
+    measured = run(BacksteppingController(), duration=5.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
+
+    class Stiff:
+        law = BacksteppingController()
+
+        def reset(self, lanes=None):
+            self.law.reset(lanes)
+
+        def command(self, measurement, reference):
+            rows = reference.rows.copy()
+            rows[8:10] *= 1.5
+            return self.law.command(measurement, type(reference)(rows))
+
+    stiff = run(Stiff(), duration=5.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
+    assert math.isfinite(measured)
+    # With LuGre friction it is not exactly 50 % above.
+    assert 25 < 100 * ((100 + stiff) / (100 + measured) - 1) < 75
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
+    calm, slammed = run(Slam(lanes=()), sensors=sensors), run(Slam(lanes=(1,)), sensors=sensors)
+    assert calm.lost == [False] * 3
+    assert slammed.lost == [False, True, False]
+    for name in UNITS:
+        for lane in (0, 2):
+            np.testing.assert_array_equal(slammed.metrics[name][lane], calm.metrics[name][lane], err_msg=name)
+    # The lost lane's figures are those of its episode alone, up to the end.
+    env = gymnasium.make_vec(PROBE, num_envs=1, policy_period=1e-3, duration=0.8, randomize=True, sensors=sensors)
+    _, info = env.reset(seed=[6])
+    alone, metrics, steps, terminated = Slam(lanes=(0,)), EpisodeMetrics(1, 1e-3), 0, [False]
+    while not terminated[0]:
+        command = alone.command(env.measurement, env.reference)
+        metrics.add(info, command, np.ones(1, bool))
+        _, _, terminated, _, info = env.step(command.T)
+        steps += 1
+    assert 300 < steps < 800
+    for name, values in metrics.result().items():
+        np.testing.assert_array_equal(slammed.metrics[name][1], values[0], err_msg=name)
+    trace = slammed.traces[0]
+    assert trace.shape == (80, 3, 2)
+    assert np.isfinite(trace[:, [0, 2]]).all()
+    seen = math.ceil(steps / 10)
+    assert np.isfinite(trace[:seen, 1]).all()
+    assert np.isnan(trace[seen:, 1]).all()
+
+
+def test_figures_of_a_lost_lane_hold_no_infinity_and_count_nowhere_else():
+    # Lost in the first half second, the lane runs 4.5 s of another episode, whose push must not be measured.
+    result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=5.0)
+    assert result.lost == [True, False]
+    for name in ("stiffness_error", "cross_motion", "hunting_x", "settled_max_x"):
+        assert math.isnan(result.metrics[name][0]), name
+        assert math.isfinite(result.metrics[name][1]), name
+        assert result.summary()[name]["max"] == abs(result.metrics[name][1])
+
+
+@pytest.mark.parametrize(("at", "complete"), [(1500, 2), (800, 2), (2399, 4)])
+def test_an_interrupt_keeps_the_episodes_that_are_complete(monkeypatch, capsys, at, complete):
+    monkeypatch.setattr(evaluation, "LANES", 2)
+    whole, cut = run(Spy(), episodes=6), run(Spy(interrupt_at=at), episodes=6)
+    assert cut.seeds == whole.seeds[:complete]
+    assert cut.lost == whole.lost[:complete]
+    for name in UNITS:
+        np.testing.assert_array_equal(cut.metrics[name], whole.metrics[name][:complete], err_msg=name)
+    assert len(cut.traces) == complete // 2
+    assert math.isfinite(cut.cost)
+    assert f"{complete} of 6 episodes" in capsys.readouterr().out
+    assert f"0 of {complete}" in table([cut])
+
+
+def test_an_interrupt_before_any_episode_is_complete_is_passed_on():
+    with pytest.raises(KeyboardInterrupt):
+        run(Spy(interrupt_at=10))
+
+
+def test_a_controller_forgets_the_past_before_every_batch(monkeypatch):
+    monkeypatch.setattr(evaluation, "LANES", 2)
+    spy = Spy()
+    run(spy, episodes=5, duration=0.05)
+    assert spy.resets == 3
+    assert spy.calls == 3 * 50
+
+
+def test_the_control_rate_is_that_of_the_rig():
+    spy = Spy(BacksteppingController(RIG.replace({"electronics.control_period": 0.002})))
+    run(spy, duration=0.5, parameters=RIG.replace({"electronics.control_period": 0.002}))
+    assert spy.calls == 250
+
+
+@pytest.mark.parametrize("episodes", [0, -3])
+def test_no_episodes_are_refused(episodes):
+    with pytest.raises(ValueError, match=rf"episodes = {episodes}; allowed: a whole number >= 1"):
+        run(BacksteppingController(), episodes=episodes)
+
+
+def test_commands_that_are_not_openings_stop_the_evaluation_by_name():
+    class Broken(BacksteppingController):
+        def command(self, measurement, reference, believed_force=None):
+            return np.full((4, measurement.position.shape[1]), np.nan)
+
+    with pytest.raises(ValueError, match=r"action\[0\] = nan in lane 0; allowed: -1 to 1"):
+        run(Broken())
+
+
+def test_the_dictionary_is_json_and_says_everything():
+    result = run(Slam(lanes=(1,)), "mine")
+    read = json.loads(json.dumps(result.to_dict()))
+    assert read["controller"] == "mine"
+    assert read["seeds"] == [5, 6, 7]
+    assert read["units"] == UNITS
+    assert read["lost"] == [False, True, False]
+    assert read["lost_episodes"] == 1
+    assert read["cost_us_per_lane_and_call"] > 0
+    assert set(read["episodes"]) == set(read["summary"]) == set(UNITS)
+    for name in UNITS:
+        assert len(read["episodes"][name]) == 3
+        assert set(read["summary"][name]) == {"median", "mean", "q95", "max"}
+    x = read["episodes"]["error_rms_x"]
+    assert read["summary"]["error_rms_x"]["median"] == pytest.approx(sorted(x)[1])
+    assert read["summary"]["error_rms_x"]["max"] == max(x)
+
+
+def example(name, values, lost, cost) -> Evaluation:
+    metrics = {metric: [math.nan] * len(lost) for metric in UNITS}
+    return Evaluation(name, list(range(len(lost))), {**metrics, **values}, lost, cost)
+
+
+def test_the_table_has_a_row_per_metric_and_three_columns_per_controller():
+    one = example(
+        "law", {"error_rms_x": [1.0, 2.0, 9.87654], "stiffness_error": [-30.0, 1.0, 2.0]}, [False, True, False], 1.23456
+    )
+    other = example("mine", {"error_rms_x": [0.5, 0.5, 0.5]}, [False, False, False], 2.0)
+    lines = table([one, other]).splitlines()
+    cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
+    assert cells["metric"] == ["unit", "law: median", "95 %", "max", "mine: median", "95 %", "max"]
+    assert set(lines[1]) == {"|", "-"}
+    assert len({line.count("|") for line in lines}) == 1
+    assert cells["error_rms_x"] == ["mm", "2", f"{np.quantile([1, 2, 9.87654], 0.95):.3g}", "9.88", "0.5", "0.5", "0.5"]
+    # Tails are of the size: -30 % is as bad as +30 %.
+    assert cells["stiffness_error"] == ["%", "1", f"{np.quantile([30, 1, 2], 0.95):.3g}", "30", "-", "-", "-"]
+    assert cells["hunting_x"] == ["mm"] + 6 * ["-"]
+    assert cells["lost episodes"] == ["", "1 of 3", "", "", "0 of 3", "", ""]
+    assert cells["control cost per lane and call"] == ["us", "1.23", "", "", "2", "", ""]
+    assert len(lines) == 2 + len(UNITS) + 2
+    means = table([one], "mean").splitlines()
+    assert means[0].split("|")[3].strip() == "law: mean"
+    assert means[2].split("|")[3].strip() == f"{np.mean([1, 2, 9.87654]):.3g}"
+
+
+OWN = """
+from __future__ import annotations
+from dataclasses import dataclass
+import numpy as np
+
+@dataclass
+class Own:
+    parameters: object
+    share: float = 0.05
+
+    def command(self, measurement, reference):
+        assert self.parameters.mechanics.mass == 3.5
+        return np.full((4, measurement.position.shape[1]), self.share) * [[1], [-1], [1], [-1]]
+
+    def reset(self, lanes=None):
+        pass
+
+def made_by_a_function(parameters):
+    return Own(parameters, 0.0)
+
+class Wordless:
+    def __init__(self, parameters):
+        pass
+
+number = 3
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    return path
+
+
+def test_a_controller_from_a_users_own_file_runs_as_named(own):
+    rig = RIG.replace({"mechanics.mass": 3.5})
+    chosen = make_controller(f"{own}:Own", rig)
+    assert type(chosen).__name__ == "Own"
+    assert chosen.parameters == rig
+    spy = Spy(chosen)
+    result = run(spy, duration=0.1, parameters=rig)
+    np.testing.assert_array_equal(np.unique(spy.commands), [-0.05, 0.05])
+    assert result.metrics["error_rms_x"][0] > 0
+    assert make_controller(f"{own}:made_by_a_function", rig).share == 0
+    assert make_controller(f"{own}:Own", rig, share=0.2).share == 0.2
+
+
+def test_two_files_of_one_name_are_two_controllers(tmp_path):
+    made = []
+    for folder, share in (("a", "0.1"), ("b", "0.2")):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "numpy.py"
+        path.write_text(OWN.replace("0.05", share))
+        made.append(make_controller(f"{path}:Own", RIG))
+    assert [one.share for one in made] == [0.1, 0.2]
+    # A file called numpy.py hides no package.
+    import numpy
+
+    assert numpy is np
+
+
+def test_the_named_controllers_are_the_law_with_and_without_weight():
+    assert {"backstepping", "backstepping-weight", "residual"} <= set(controller_names())
+    env = gymnasium.make_vec(CIRCLE, num_envs=2)
+    env.reset(seed=0)
+    for name, weight in (("backstepping", False), ("backstepping-weight", True)):
+        expected = BacksteppingController(RIG, weight_compensation=weight).command(env.measurement, env.reference)
+        np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("backsteping", r"controller = 'backsteping'; allowed: backstepping, backstepping-weight, .*path/to/file\.py:Class"),
+        ("", r"controller = ''; allowed: backstepping"),
+        ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
+        ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Class"),
+        ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a class with command\(\) and reset\(\)"),
+        ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a class"),
+        ("own.py:number", r"'{folder}/own\.py:number'.* allowed: a class with command\(\) and reset\(\)"),
+        ("own.py:Wordless", r"'{folder}/own\.py:Wordless'.* allowed: a class with command\(\) and reset\(\)"),
+    ],
+)
+def test_what_is_no_controller_is_refused_with_its_name_and_what_there_is(own, name, message):
+    given = f"{own.parent}/{name}" if ".py" in name else name
+    with pytest.raises(ValueError, match=message.replace("{folder}", str(own.parent))):
+        make_controller(given, RIG)
+
+
+def test_the_environments_arguments_reach_it():
+    with pytest.raises(ValueError, match="sensors = 'none'; allowed: 'ideal', 'lab'"):
+        run(BacksteppingController(), sensors="none")
+    spy = Spy()
+    run(spy, duration=0.02, episodes=1)
+    assert set(FIELDS) >= {"tracking_error", "supply_flow"}
+    assert len(spy.commands) == 20

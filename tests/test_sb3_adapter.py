@@ -1,0 +1,184 @@
+"""Stable-Baselines3's view of a native vector environment: the same rollouts, and ends as its own wrappers report them."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+from agents.sb3_adapter import SB3VecEnv
+
+PROBE, RESIDUAL = "BirthSIM/Probe-v0", "BirthSIM/CircleResidual-v0"
+SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
+"""Lane 0 runs into an end stop after some tenths of a second, the others live until their time is over."""
+
+
+def native(name=PROBE, lanes=3, **arguments):
+    return gymnasium.make_vec(name, num_envs=lanes, **{"duration": 0.6, "randomize": True, **arguments})
+
+
+def adapted(*args, **arguments) -> SB3VecEnv:
+    return SB3VecEnv(native(*args, **arguments))
+
+
+def seeded(env, seed):
+    env.seed(seed)
+    return env.reset()
+
+
+def random_actions(steps, lanes=3, size=2, seed=0):
+    return np.random.default_rng(seed).uniform(-1, 1, (steps, lanes, size)).astype(np.float32)
+
+
+def test_rollouts_are_those_of_the_native_environment_through_several_episodes():
+    env, base = adapted(), native()
+    np.testing.assert_array_equal(seeded(env, 4), base.reset(seed=4)[0])
+    ends = np.zeros((2, 3), int)
+    returns, lengths = np.zeros(3), np.zeros(3, int)
+    for _ in range(150):
+        observation, rewards, dones, infos = env.step(SLAM)
+        expected, paid, terminated, truncated, info = base.step(SLAM)
+        np.testing.assert_array_equal(observation, expected)
+        np.testing.assert_array_equal(rewards, paid.astype(np.float32))
+        np.testing.assert_array_equal(dones, terminated | truncated)
+        returns += paid
+        lengths += 1
+        for lane in range(3):
+            if not dones[lane]:
+                assert infos[lane] == {}
+                continue
+            ends[int(truncated[lane]), lane] += 1
+            assert set(infos[lane]) == {"terminal_observation", "TimeLimit.truncated", "episode"}
+            np.testing.assert_array_equal(infos[lane]["terminal_observation"], info["final_obs"][lane])
+            assert not np.array_equal(infos[lane]["terminal_observation"], observation[lane])
+            assert infos[lane]["TimeLimit.truncated"] is bool(truncated[lane])
+            assert infos[lane]["episode"] == {"r": pytest.approx(returns[lane]), "l": lengths[lane]}
+            returns[lane] = lengths[lane] = 0
+    # Row 0: terminated, row 1: truncated.
+    assert ends[0, 0] >= 3
+    np.testing.assert_array_equal(ends[:, 1:], [[0, 0], [2, 2]])
+
+
+def test_ends_are_reported_as_by_stable_baselines_own_vectorization():
+    env = adapted(lanes=1, randomize=False)
+    own = DummyVecEnv([lambda: Monitor(gymnasium.make(PROBE, duration=0.6))])
+    np.testing.assert_array_equal(seeded(env, 4), seeded(own, 4))
+    for action in (SLAM[:1], SLAM[1:2]):
+        for _ in range(130):
+            observation, reward, done, (info,) = env.step(action)
+            expected, paid, end, (its,) = own.step(action)
+            np.testing.assert_array_equal(reward, paid)
+            np.testing.assert_array_equal(done, end)
+            if end[0]:
+                np.testing.assert_array_equal(info["terminal_observation"], its["terminal_observation"])
+                assert info["TimeLimit.truncated"] == its["TimeLimit.truncated"]
+                # Monitor rounds the return to six digits.
+                assert info["episode"]["r"] == pytest.approx(its["episode"]["r"], abs=1e-6)
+                assert info["episode"]["l"] == its["episode"]["l"]
+                break
+            np.testing.assert_array_equal(observation, expected)
+        assert end[0]
+        np.testing.assert_array_equal(seeded(env, 6), seeded(own, 6))
+
+
+def test_spaces_are_those_of_one_lane():
+    env, base = adapted(RESIDUAL, lanes=5), native(RESIDUAL, lanes=5)
+    assert env.num_envs == 5
+    assert env.observation_space == base.single_observation_space
+    assert env.action_space == base.single_action_space
+    observation = env.reset()
+    assert observation.shape == (5, 22)
+    assert observation.dtype == np.float32
+    _, rewards, dones, infos = env.step(np.zeros((5, 2), np.float32))
+    assert rewards.shape == dones.shape == (5,)
+    assert (rewards.dtype, dones.dtype, len(infos)) == (np.float32, np.bool_, 5)
+
+
+def test_a_seed_counts_for_one_reset_and_the_next_episode_differs():
+    env, base = adapted(RESIDUAL), native(RESIDUAL)
+    first, second = seeded(env, 7), env.reset()
+    np.testing.assert_array_equal(first, base.reset(seed=7)[0])
+    np.testing.assert_array_equal(second, base.reset()[0])
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(seeded(env, 7), first)
+    # Stable-Baselines3's convention: lane i gets seed + i, as the native environment has it.
+    np.testing.assert_array_equal(seeded(env, 8)[:2], first[1:])
+    assert len(np.unique(first, axis=0)) == 3
+
+
+def test_a_reset_in_mid_episode_starts_return_and_length_anew():
+    env = adapted()
+    seeded(env, 0)
+    for _ in range(20):
+        env.step(SLAM)
+    env.reset()
+    infos = [env.step(np.zeros((3, 4), np.float32))[3] for _ in range(60)]
+    assert [info["episode"]["l"] for info in infos[-1]] == [60, 60, 60]
+    assert not any(info for row in infos[:-1] for info in row)
+
+
+def test_attributes_are_read_for_the_lanes_asked_for_and_never_set():
+    env = adapted(RESIDUAL)
+    assert env.get_attr("steps") == [60] * 3
+    assert env.get_attr("steps", 1) == [60]
+    assert env.get_attr("steps", [0, 2]) == [60, 60]
+    with pytest.raises(AttributeError):
+        env.get_attr("nothing_like_it")
+    with pytest.raises(NotImplementedError, match=r"set_attr\('steps'\).*share one environment"):
+        env.set_attr("steps", 3)
+    with pytest.raises(NotImplementedError, match=r"env_method\('reset'\).*share one environment"):
+        env.env_method("reset")
+    assert env.get_attr("steps") == [60] * 3
+    assert env.env_is_wrapped(Monitor) == [False] * 3
+    assert env.env_is_wrapped(Monitor, [1]) == [False]
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_a_vector_environment_that_resets_one_step_later_is_refused(mode):
+    env = gymnasium.make_vec("CartPole-v1", num_envs=2, vectorization_mode=mode)
+    with pytest.raises(ValueError, match=r"allowed: a vector environment that resets within the same step"):
+        SB3VecEnv(env)
+    env.close()
+
+
+def test_one_that_resets_within_the_step_is_taken_whoever_made_it():
+    mode = {"autoreset_mode": gymnasium.vector.AutoresetMode.SAME_STEP}
+    env = SB3VecEnv(gymnasium.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync", vector_kwargs=mode))
+    seeded(env, 0)
+    lengths = []
+    for _ in range(60):
+        infos = env.step(np.array([0, 1]))[3]
+        lengths += [info["episode"]["l"] for info in infos if info]
+    assert lengths
+    assert max(lengths) < 15
+
+
+def test_frames_come_from_the_lanes(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = adapted(RESIDUAL, lanes=2, render_mode="rgb_array")
+    env.reset()
+    frames = env.get_images()
+    assert [frame.shape for frame in frames] == [(480, 640, 3)] * 2
+    assert env.render().shape[2] == 3
+    env.close()
+    silent = adapted(RESIDUAL, lanes=2)
+    silent.reset()
+    assert silent.get_images() == [None, None]
+
+
+def test_normalization_and_ppo_run_on_it():
+    torch.set_num_threads(1)  # two threads on small matrices mostly wait for each other
+    env = VecNormalize(adapted(lanes=4), gamma=0.9)
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    before = model.policy.action_net.weight.detach().clone()
+    model.learn(512)
+    assert model.num_timesteps == 512
+    assert not np.array_equal(before, model.policy.action_net.weight.detach())
+    # 128 steps of 4 lanes with at most 60 in an episode: at least two ends in each.
+    assert len(model.ep_info_buffer) >= 8
+    assert all(1 <= episode["l"] <= 60 for episode in model.ep_info_buffer)
+    assert np.isfinite([episode["r"] for episode in model.ep_info_buffer]).all()

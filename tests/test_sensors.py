@@ -1,0 +1,217 @@
+"""Sensor models: when the laboratory's samples are taken and arrive, how noisy they are, and that ideal ones are exact."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_env import Parameters
+from birthsim_env.seeding import stream
+from birthsim_env.sensors import IdealSensors, LabSensors
+
+CIRCLE = "BirthSIM/Circle-v0"
+SEEN = ("position", "position_time", "velocity", "pressures")
+
+
+def board(**changes):
+    return Parameters().replace({f"electronics.{name}": value for name, value in changes.items()}).electronics
+
+
+def watch(electronics, motion, ticks, lanes=1, seeds=None):
+    """Every measurement of ``ticks`` control periods of lanes that move as ``motion(t)`` -> (4,): (ticks, ..., lanes)."""
+    sensors = LabSensors(electronics, lanes)
+    for lane in range(lanes):
+        sensors.begin(lane, stream(seeds[lane] if seeds else lane, 0, "sensors"))
+    rows, pressures = {name: [] for name in SEEN}, np.full((4, lanes), 3e5)
+    for tick in range(ticks):
+        time = np.full(lanes, tick * electronics.control_period)
+        moved = np.repeat(np.asarray(motion(time[0]), float)[:, None], lanes, axis=1)
+        seen = sensors.measure(np.full(lanes, tick), time, moved, pressures, np.zeros((2, lanes)))
+        for name, values in rows.items():
+            values.append(getattr(seen, name).copy())
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+def still(time):
+    return 0.5, 0.01, 0.0, 0.0
+
+
+def swing(time):
+    return 0.5 + 0.05 * math.sin(3 * time), 0.02 * time, 0.15 * math.cos(3 * time), 0.02
+
+
+def test_ideal_sensors_are_exact_at_every_instant():
+    env = gymnasium.make(CIRCLE, randomize="plant").unwrapped
+    env.reset(seed=1)
+    for _ in range(50):
+        info = env.step((0.1, -0.1, 0.05, 0.0))[4]
+        seen = env.measurement
+        for name, truth in (("position", "position"), ("velocity", "velocity"), ("pressures", "pressure"), ("user_force",) * 2):
+            np.testing.assert_array_equal(getattr(seen, name), info[truth])
+        assert seen.time == seen.position_time == info["time"]
+        assert not seen.sampled
+    assert not IdealSensors.sampled
+
+
+def test_samples_are_taken_240_times_a_second_on_the_control_clock():
+    seen = watch(board(), swing, 10_001)
+    arrivals = np.unique(seen["position_time"][:, 0])
+    ticks = arrivals / 1e-3
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
+    gaps = np.diff(np.round(ticks))
+    # 1/240 s is 4.17 ms: four or five control periods, 240 a second on average, each at the first instant due.
+    assert set(gaps) == {4.0, 5.0}
+    assert (len(arrivals) - 1) / arrivals[-1] == pytest.approx(240.0, rel=1e-3)
+    np.testing.assert_array_equal(np.round(ticks), np.ceil(np.arange(len(ticks)) * 1000 / 240 - 1e-9))
+    assert np.all(np.diff(seen["position_time"][:, 0]) >= 0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"position_latency": 0.0},
+        {"position_latency": 0.0137},
+        {"position_rate": 1000.0},
+        {"position_rate": 90.0, "position_latency": 0.05},
+        {"control_period": 0.00025, "position_rate": 1500.0},
+        # A tracker faster than the control clock is read once a period.
+        {"control_period": 0.01},
+        {"control_period": 0.01, "position_latency": 0.0},
+        {"position_rate": 4000.0, "position_latency": 0.0003},
+        {"control_period": 0.005, "position_rate": 4000.0, "position_latency": 0.012},
+    ],
+)
+def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sample_allows(changes):
+    electronics = board(position_noise=0.0, **changes)
+    period, latency = electronics.control_period, electronics.position_latency
+    seen = watch(electronics, swing, round(0.6 / period))
+    time = period * np.arange(len(seen["position"]))
+    taken = seen["position_time"][:, 0]
+    assert np.all(np.diff(taken) >= 0)
+    settled = time >= latency + 1 / electronics.position_rate + period
+    assert np.all(taken[time >= latency] <= time[time >= latency] - latency + 1e-9)
+    assert np.all((time - taken)[settled] <= latency + 1 / electronics.position_rate + period + 1e-9)
+    # Without noise a sample is where the end effector was when it was taken.
+    np.testing.assert_allclose(seen["position"][:, :, 0], [swing(t)[:2] for t in taken], atol=1e-12)
+    assert len(np.unique(taken)) >= 0.9 * min(electronics.position_rate, 1 / period) * (0.6 - latency) - 2
+
+
+def test_the_first_sample_is_there_from_the_start():
+    seen = watch(board(position_noise=0.0), lambda t: (0.5 + t, 0.0, 1.0, 0.0), 8)
+    np.testing.assert_array_equal(seen["position_time"][:, 0], 0.0)
+    np.testing.assert_array_equal(seen["position"][:, 0, 0], 0.5)
+
+
+def test_the_shown_velocity_is_a_slow_difference_that_finds_a_constant_speed():
+    def jump(time):
+        return 0.5 + 0.1 * max(time - 0.1, 0.0), 0.0, 0.1 * (time > 0.1), 0.0
+
+    seen = watch(board(position_noise=0.0), jump, 500)["velocity"][:, 0, 0]
+    np.testing.assert_allclose(seen[:104], 0.0, atol=1e-12)
+    assert 0.05 < seen[100 + 4 + 25] < 0.08  # a time constant of 20 ms behind the latency
+    assert seen[-1] == pytest.approx(0.1, rel=1e-6)
+    noisy = watch(board(), still, 4000)["velocity"][200:]
+    assert 1e-3 < noisy.std() < 1e-2
+
+
+@pytest.fixture(scope="module")
+def noise():
+    """10 000 control periods of 12 lanes at rest, in standard deviations: positions at their samples, pressures."""
+    seen = watch(board(), still, 10_000, lanes=12)
+    fresh = np.flatnonzero(np.diff(seen["position_time"][:, 0]) > 0) + 1
+    position = (seen["position"][fresh] - np.array([[0.5], [0.01]])) / 1e-4
+    return position.reshape(len(fresh), 24), ((seen["pressures"] - 3e5) / 500.0).reshape(-1, 48)
+
+
+def test_noise_is_normal_with_the_documented_deviation(noise):
+    for values in noise:
+        count = values.size
+        assert abs(values.mean()) < 4.5 / math.sqrt(count)
+        assert abs(values.std() - 1) < 4.5 / math.sqrt(2 * count)
+        assert abs((values**3).mean()) < 4.5 * math.sqrt(15 / count)
+        assert abs((values**4).mean() - 3) < 4.5 * math.sqrt(96 / count)
+        # In every channel of every lane as well.
+        assert np.abs(values.std(axis=0) - 1).max() < 5 / math.sqrt(2 * len(values))
+        share = (np.abs(values) > 2).mean()
+        assert share == pytest.approx(0.0455, abs=4.5 * math.sqrt(0.0455 * 0.9545 / count))
+
+
+def test_noise_is_independent_over_time_channels_and_lanes(noise):
+    for values in noise:
+        count = len(values)
+        for lag in (1, 2, 5):
+            assert np.abs((values[lag:] * values[:-lag]).mean(axis=0)).max() < 5 / math.sqrt(count - lag)
+        matrix = np.corrcoef(values.T) - np.eye(values.shape[1])
+        assert np.abs(matrix).max() < 5.2 / math.sqrt(count)
+
+
+def test_positions_keep_one_noise_between_samples_and_pressures_change_every_period():
+    seen = watch(board(), still, 400)
+    same = np.diff(seen["position_time"][:, 0]) == 0
+    np.testing.assert_array_equal((np.diff(seen["position"][:, :, 0], axis=0) == 0).all(axis=1), same)
+    assert np.abs(np.diff(seen["pressures"][:, :, 0], axis=0)).min() > 0
+
+
+def test_noise_depends_on_the_seed_alone_not_on_the_number_of_lanes():
+    one = watch(board(), swing, 300, seeds=[5])
+    many = watch(board(), swing, 300, lanes=40, seeds=[9] * 17 + [5] + list(range(100, 122)))
+    for name in SEEN:
+        np.testing.assert_array_equal(many[name][..., 17], one[name][..., 0])
+        np.testing.assert_array_equal(many[name][..., 0], many[name][..., 16])
+    for a, b in itertools.combinations((0, 17, 18, 39), 2):
+        assert not np.array_equal(many["pressures"][..., a], many["pressures"][..., b])
+
+
+def test_episodes_repeat_with_their_seed_and_differ_otherwise():
+    env = gymnasium.make(CIRCLE, sensors="lab").unwrapped
+
+    def seen(seed):
+        env.reset(seed=seed)
+        for _ in range(20):
+            observation = env.step((0.1, 0.0, 0.0, 0.1))[0]
+        return observation
+
+    first, second, other = seen(3), seen(None), seen(4)
+    np.testing.assert_array_equal(seen(3), first)
+    np.testing.assert_array_equal(seen(None), second)
+    assert not np.array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+def test_the_laboratory_hides_the_truth_from_policy_and_controller_but_not_from_info():
+    env = gymnasium.make(CIRCLE, sensors="lab").unwrapped
+    exact = gymnasium.make(CIRCLE).unwrapped
+    (observation, info), (_, truth) = env.reset(seed=0), exact.reset(seed=0)
+    errors = []
+    for _ in range(200):
+        observation, reward, _, _, info = env.step((0.0, 0.1, 0.05, 0.0))
+        _, paid, _, _, truth = exact.step((0.0, 0.1, 0.05, 0.0))
+        # The plant does not care who looks at it.
+        for name, value in truth.items():
+            np.testing.assert_allclose(info[name], value, rtol=1e-9, atol=1e-12, err_msg=name)
+        assert reward == pytest.approx(paid)
+        seen = env.measurement
+        assert seen.sampled
+        assert seen.time == info["time"]
+        np.testing.assert_array_equal(seen.user_force, info["user_force"])
+        assert info["time"] - 0.0093 <= seen.position_time <= info["time"] - 0.004 + 1e-9
+        off = seen.position - info["compliant_target"]
+        np.testing.assert_allclose(observation[:2], np.clip(off / 0.01, -10, 10), atol=1e-5)
+        np.testing.assert_allclose(observation[2:4], seen.velocity / 0.2, atol=1e-5)
+        errors.append(np.abs(seen.velocity - info["velocity"]).max())
+        assert np.abs(seen.pressures - info["pressure"]).max() < 5 * 500
+    assert np.median(errors) > 1e-3
+
+
+def test_a_laboratorys_own_figures_are_used():
+    rig = Parameters().replace({"electronics.pressure_noise": 0.0, "electronics.position_noise": 0.01})
+    env = gymnasium.make_vec(CIRCLE, num_envs=400, sensors="lab", parameters=rig)
+    infos = env.reset(seed=0)[1]
+    seen = env.unwrapped.measurement
+    np.testing.assert_array_equal(seen.pressures, infos["pressure"].T)
+    assert (seen.position.T - infos["position"]).std() == pytest.approx(0.01, rel=4.5 / math.sqrt(1600))
