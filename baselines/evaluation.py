@@ -111,6 +111,8 @@ def _run_batch(
         _, _, terminated, _, info = env.step(command.T)
         lost |= alive & terminated
         alive &= ~terminated
+        if terminated.any():
+            controller.reset(terminated)
         if step % 250 == 249:
             bar.update(250)
     bar.close()

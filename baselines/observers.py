@@ -27,7 +27,7 @@ BANDWIDTH = 70.0
 
 @kernel
 def _update(
-    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, age: Array, pressures: Array, p: Array,
+    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, velocity: Array, age: Array, pressures: Array, p: Array,
     period: float, bandwidth: float, fresh: Array,
 ) -> None:  # fmt: skip
     """One control period. ``estimate`` (6, N): y1, y2, v1, v2, d1, d2. ``history`` (H, 2, N): past y1, y2, ring at ``slot``.
@@ -40,10 +40,11 @@ def _update(
     for i in range(estimate.shape[1]):
         motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
         if fresh[i] > 0.0:
+            motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
             piston_motion(motion, p, joints, 1)
             for cylinder in range(2):
                 estimate[cylinder, i] = joints[cylinder, 0]
-                estimate[2 + cylinder, i] = 0.0
+                estimate[2 + cylinder, i] = joints[2 + cylinder, 0]
                 estimate[4 + cylinder, i] = 0.0
                 for k in range(depth):
                     history[k, cylinder, i] = joints[cylinder, 0]
@@ -124,9 +125,10 @@ class PistonObserver:
             self._last: Array = measurement.position_time.copy()
         self._slot = (self._slot + 1) % self._depth
         sampled = measurement.position_time - self._last
-        age = measurement.time - measurement.position_time
+        # The memory goes no further back than the rig's own description of its tracker.
+        age = np.minimum(measurement.time - measurement.position_time, (self._depth - 1) * self._period)
         _update(
-            self._estimate, self._history, self._slot, sampled, measurement.position, age, measurement.pressures, self._p,
+            self._estimate, self._history, self._slot, sampled, measurement.position, measurement.velocity, age, measurement.pressures, self._p,
             self._period, self._bandwidth, self._fresh,
         )  # fmt: skip
         self._last = measurement.position_time.copy()

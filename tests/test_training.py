@@ -25,7 +25,7 @@ from birthsim_env import Parameters
 PROBE, CIRCLE = "BirthSIM/ProbeResidual-v0", "BirthSIM/CircleResidual-v0"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(PROBE, steps=40_000, lanes=16, rollout=64, batch=256, validation_lanes=8, validations=4)
-"""On the stiffness test, four seconds are enough to halve the law's error."""
+"""On the stiffness test, a few seconds are enough to halve the law's error."""
 BRIEF = replace(SMALL, steps=3072, validations=2)
 
 
@@ -93,7 +93,7 @@ def test_before_training_the_policy_is_the_law(tmp_path, monkeypatch, short_prob
 def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     _, reached = trained
     law, policy, curve = reached["law"], reached["policy"], reached["curve"]
-    # Seeds 0 to 5 reached 0.40 to 0.50 of the law's error.
+    # Seeds 0 to 5 reached 0.42 to 0.58 of the law's error, and 0.37 to 0.49 of its tail.
     assert policy["pooled_mm"] < 0.75 * law["pooled_mm"]
     assert policy["tail_mm"] < 0.75 * law["tail_mm"]
     assert policy["lost"] == law["lost"] == 0

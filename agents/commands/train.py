@@ -8,7 +8,7 @@ from pathlib import Path
 import gymnasium
 
 import agents
-from baselines.commands.shared import RANDOMIZE, make_folder, run, whole, write_json
+from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
 from birthsim_env.parameters import load_parameters
 
 
@@ -21,7 +21,7 @@ def main() -> None:
     )
     parser.add_argument("--env", default="BirthSIM/CircleResidual-v0", help="residual environment (default: %(default)s)")
     parser.add_argument("--steps", type=whole, default=2_000_000, help="policy steps (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=seed_number, default=0)
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
     parser.add_argument("--randomize", default="all", choices=tuple(RANDOMIZE), help="what training varies (default: all)")
     parser.add_argument("--authority", type=float, help="bound of the residual force, N (default: 100)")

@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium
 
 import birthsim_env
-from baselines.commands.shared import RANDOMIZE, make_folder, run, whole, write_json
+from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
 from baselines.evaluation import evaluate, table
 from baselines.registry import controller_names, make_controller
 
@@ -31,7 +31,7 @@ def main() -> None:
     )
     parser.add_argument("--policy", type=Path, help="folder of a trained policy, for the controller 'residual'")
     parser.add_argument("--episodes", type=whole, default=32, help="default: %(default)s")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the first episode (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
     parser.add_argument(
         "--randomize",
@@ -54,8 +54,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
         raise ValueError("--controller residual needs --policy DIR, the folder that birthsim-train wrote")
-    if arguments.policy is not None and names == ["residual"]:
-        names = ["backstepping", "residual"]
+    if arguments.policy is not None:
+        names = ["backstepping", "residual"] if names == ["residual"] else list(dict.fromkeys([*names, "residual"]))
     controllers = {}
     for name in names:
         options: dict[str, Any] = {"policy": arguments.policy} if name == "residual" else {}

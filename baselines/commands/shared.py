@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -28,10 +29,16 @@ def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], 
 
 def whole(text: str) -> int:
     """A whole number >= 1, for argparse."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text}; allowed: a whole number >= 1")
-    return value
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number >= 1")
+    return int(text)
+
+
+def seed_number(text: str) -> int:
+    """A seed that NumPy and PyTorch take, for argparse."""
+    if not text.isdecimal() or int(text) >= 2**32:
+        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to {2**32 - 1}")
+    return int(text)
 
 
 def make_folder(path: Path) -> Path:
@@ -41,7 +48,15 @@ def make_folder(path: Path) -> Path:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write JSON as a whole or not at all."""
+    """Write JSON as a whole or not at all; a number that is not finite becomes null, for which JSON has no other word."""
     partial = path.with_suffix(path.suffix + ".partial")
-    partial.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    partial.write_text(json.dumps(_finite(content), indent=1, allow_nan=False), encoding="utf-8")
     partial.replace(path)
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {name: _finite(value) for name, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
