@@ -27,8 +27,8 @@ BANDWIDTH = 70.0
 
 @kernel
 def _update(
-    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, velocity: Array, age: Array, pressures: Array, p: Array,
-    period: float, bandwidth: float, fresh: Array,
+    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, velocity: Array, age: Array, pressures: Array,
+    p: Array, period: float, bandwidth: float, fresh: Array,
 ) -> None:  # fmt: skip
     """One control period. ``estimate`` (6, N): y1, y2, v1, v2, d1, d2. ``history`` (H, 2, N): past y1, y2, ring at ``slot``.
 
@@ -128,8 +128,8 @@ class PistonObserver:
         # The memory goes no further back than the rig's own description of its tracker.
         age = np.minimum(measurement.time - measurement.position_time, (self._depth - 1) * self._period)
         _update(
-            self._estimate, self._history, self._slot, sampled, measurement.position, measurement.velocity, age, measurement.pressures, self._p,
-            self._period, self._bandwidth, self._fresh,
+            self._estimate, self._history, self._slot, sampled, measurement.position, measurement.velocity, age,
+            measurement.pressures, self._p, self._period, self._bandwidth, self._fresh,
         )  # fmt: skip
         self._last = measurement.position_time.copy()
         self._fresh[:] = 0.0

@@ -92,7 +92,8 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
 class FlowActuation:
     """The action is a net mass flow in units of the choked flow C rho0 Ps sqrt(T0/T) (3.2 g/s by default).
 
-    The inverse of the valve characteristic at the present pressures turns it into openings at every control period. With
+    The inverse of the valve characteristic, at the true pressures and with the rig that was drawn, turns it into openings at
+    every control period. With
     ``two_valves`` there is a flow per chamber (into it is positive), with ``one_valve`` the active flow qA (8) per cylinder.
     """
 

@@ -97,7 +97,7 @@ def assemble(
         ranges, varied = checked_ranges(randomize, rig), False
     else:
         one_of("randomize", randomize, (False, True, "plant", "scenario"))
-        ranges = documented_ranges() if randomize in (True, "plant") else {}
+        ranges = checked_ranges(documented_ranges(), rig) if randomize in (True, "plant") else {}
         varied = randomize in (True, "scenario")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not (isinstance(duration, (int, float)) and math.isfinite(duration) and duration > 0):

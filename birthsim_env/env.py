@@ -63,8 +63,9 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Reward
     Per step of 10 ms, the sum of three terms that are also in `info`:
-    `reward_tracking` = -min((|ex| + |ey|) / 2 mm, 5), zero for 0.3 s after a jump of the force or of a stiffness setpoint;
-    `reward_action_change` = -0.05 sum |a - last a|; `reward_failure` = -250 when the episode terminates.
+    `reward_tracking` = -min((|ex| + |ey|) / 2 mm, 5), zero for 0.3 s after the start and after a jump
+    of the force or of a stiffness setpoint; `reward_action_change` = -0.05 sum |a - last a|; `reward_failure` = -250 when
+    the episode terminates.
 
     ## Start and end of an episode
     It starts on the target, moving with it, chambers in balance with weight and friction at the pneumatic stiffness asked
@@ -83,7 +84,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `reference` (`Trajectory`), `user_force` (`UserForce`), `stiffness` (`StiffnessSchedule`): your own instead of the
       scenario's.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
-    - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s.
+    - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`.
 
     Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.

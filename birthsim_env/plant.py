@@ -45,9 +45,18 @@ class Plant:
         rigs = parameters if several else load_parameters(parameters)  # type: ignore[arg-type]
         self.num_envs = int(num_envs)
         self.lane_parameters: Array = parameter_array(rigs, self.num_envs)  # type: ignore[arg-type]
-        self.state: Array = balanced_state(self.lane_parameters, np.zeros((2, self.num_envs)))
+        self._state = balanced_state(self.lane_parameters, np.zeros((2, self.num_envs)))
         self.impacts: Array = np.zeros((2, self.num_envs))
         """Largest speed at which each piston ran into an end stop during the last ``advance``, m/s, (2, num_envs)."""
+
+    @property
+    def state(self) -> Array:
+        """The state, (18, num_envs), with the rows of ``STATE_NAMES``, SI units; assigning to it checks and copies."""
+        return self._state
+
+    @state.setter
+    def state(self, state: ArrayLike) -> None:
+        self._state[:] = checked("state", state, (STATES, self.num_envs), "SI")
 
     def derivatives(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> Array:
         """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N."""

@@ -15,7 +15,7 @@ from birthsim_env.seeding import Range, draw
 
 
 class StiffnessSchedule:
-    """What stiffness is asked for. A user's own schedule has the same three methods.
+    """What stiffness is asked for. A user's own schedule derives from this class.
 
     ``sample(time)`` gets the time of every lane, s, (N,), and returns (6, N): Kclx, Kcly (N/m), the pneumatic stiffness
     setpoints of cylinders 1 and 2 (N/m) and their rates (N/(m s)).

@@ -55,16 +55,24 @@ def exhaust_conductance(opening: float, conductance: float, leakage: float) -> f
 
 
 @helper
+def opening_for(wanted: float, up: float, down: float, conductance: float) -> float:
+    """Opening in [-1, 1] for a flow ``wanted`` (kg/s) beyond leakage, of which an opening of 1 gives conductance x ``up``.
+
+    An opening of -1 gives -conductance x ``down``. Where the side that is needed has no driving pressure it stays shut.
+    """
+    driving = up if wanted > 0.0 else down
+    opened = wanted / (conductance * max(driving, 1e-9))
+    return max(-1.0, min(1.0, opened)) if driving > 0.0 else 0.0
+
+
+@helper
 def opening_for_flow(flow: float, fill: float, drain: float, conductance: float, leakage: float) -> float:
     """Opening in [-1, 1] at which a chamber's net mass flow is ``flow`` (kg/s): the exact inverse of the characteristic.
 
     ``fill`` and ``drain`` are the flows per unit of conductance through the supply and exhaust orifices at the present
-    pressures. Saturates where the flow cannot be had; an orifice without driving pressure is never divided by.
+    pressures. Saturates where the flow is too large to be had, and stays shut where opening would let it run the other way.
     """
-    wanted = flow - leakage * (fill - drain)
-    tiny = 1e-9
-    opened = wanted / (conductance * max(fill, tiny)) if wanted > 0.0 else wanted / (conductance * max(drain, tiny))
-    return max(-1.0, min(1.0, opened))
+    return opening_for(flow - leakage * (fill - drain), fill, drain, conductance)
 
 
 @helper
@@ -84,8 +92,4 @@ def opening_for_active_flow(
     With ``share = l / (2 L)`` of each chamber the weighted difference is qA of (8).
     """
     wanted = active - leakage * (share_p * (fill_p - drain_p) - share_n * (fill_n - drain_n))
-    tiny = 1e-9
-    extend = share_p * fill_p + share_n * drain_n
-    retract = share_p * drain_p + share_n * fill_n
-    opened = wanted / (conductance * max(extend, tiny)) if wanted > 0.0 else wanted / (conductance * max(retract, tiny))
-    return max(-1.0, min(1.0, opened))
+    return opening_for(wanted, share_p * fill_p + share_n * drain_n, share_p * drain_p + share_n * fill_n, conductance)

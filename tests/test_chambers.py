@@ -67,7 +67,7 @@ class Bookkeeper:
 
     def advance(self, command: Array, force: Array, seconds: float) -> None:
         for _ in range(round(seconds / self.step)):
-            h, x, book = self.step, self.plant.state, self.ledger
+            h, x, book = self.step, self.plant.state.copy(), self.ledger
             k1, s1 = self._rates(x, command, force)
             k2, s2 = self._rates(x + h / 2 * k1, command, force)
             k3, s3 = self._rates(x + h / 2 * k2, command, force)
@@ -133,12 +133,12 @@ def test_insulated_air_follows_the_adiabat() -> None:
 
 
 def test_air_at_the_walls_temperature_follows_the_isotherm() -> None:
-    rig = Parameters().replace({**SEALED, "chambers.wall_heat_transfer": 5e4})
-    states = slow_squeeze(Plant(rig), 150, 2.0)
+    rig = Parameters().replace({**SEALED, "chambers.wall_heat_transfer": 1e4})
+    states = slow_squeeze(Plant(rig), 150, 10.0)
     invariant = np.array([s[P] * Volumes(rig, s).volume for s in states])[..., 0]
     volume = np.array([Volumes(rig, s).volume for s in states])[..., 0]
     assert np.all(volume[:, 2:].max(axis=0) > 1.1 * volume[:, 2:].min(axis=0))
-    np.testing.assert_allclose(invariant / invariant[0], 1, rtol=0, atol=2e-4)
+    np.testing.assert_allclose(invariant / invariant[0], 1, rtol=0, atol=5e-4)
     assert max(np.abs(s[T] - WALL).max() for s in states) < 0.1
 
 

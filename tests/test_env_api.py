@@ -97,13 +97,16 @@ def test_duration_and_policy_period_set_the_number_of_steps():
         assert env.simulation.time[0] == pytest.approx(duration)
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
 @pytest.mark.parametrize("push", [(0, 0, 1, -1), (0, 0, -1, 1), (1, -1, 0, 0), (-1, 1, 0, 0)])
-def test_running_into_an_end_stop_terminates_and_costs_250(push, sensors):
-    env = make(PROBE, sensors=sensors)
-    env.reset(seed=0)
+def test_running_into_an_end_stop_terminates_and_costs_250(push):
+    # With sensors that look at every control period the step is integrated in ten parts; the collision is the same.
+    env, fine = make(PROBE), make(PROBE, sensors="lab")
+    env.reset(seed=0), fine.reset(seed=0)
     for _ in range(200):
         _, reward, terminated, truncated, info = env.step(push)
+        again = fine.step(push)
+        np.testing.assert_allclose(again[4]["impact_speed"], info["impact_speed"], rtol=1e-6)
+        assert again[2] == terminated
         if terminated:
             break
         assert info["impact_speed"].max() <= 0.1
@@ -181,7 +184,7 @@ def test_a_commanded_flow_is_what_the_chambers_get(valves):
     unit = 3.9e-9 * 7.0e5 * 1.185
     env = make(PROBE, action_mode="flow", valves=valves, parameters=rig, duration=1.0)
     for wish in np.random.default_rng(0).uniform(-0.1, 0.1, (6, env.action_space.shape[0])):
-        env.reset(seed=0)
+        env.reset(seed=0, options={"position": (0.58, -0.12)})  # far from mid stroke, where the transform is no difference
         for _ in range(3):
             info = env.step(wish)[4]
         assert np.abs(info["opening"]).max() < 0.9

@@ -163,7 +163,7 @@ def test_columns_are_orthogonal_with_lengths_kappa_and_1(rig: Parameters) -> Non
 @pytest.mark.parametrize(
     ("point", "why"),
     [
-        ((0.7001, 0.0), "0.1 mm beyond the stroke of cylinder 2"),
+        ((0.700001, 0.0), "a micrometre beyond the stroke of cylinder 2"),
         ((0.25, 0.0), "nearer than the shortest cylinder 2"),
         ((0.3, 0.4), "above the shortest cylinder 1"),
         ((-0.5, 0.0), "linkage folded over"),

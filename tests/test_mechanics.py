@@ -25,7 +25,7 @@ RIGS = {
     "other mass and areas": SLIPPERY.replace(
         {
             **{"geometry.gamma3": -2.0, "mechanics.mass": 4.3, "mechanics.gravity": 1.62},
-            **{"cylinder1.piston_diameter": 0.04, "cylinder2.rod_diameter": 0.02},
+            **{"cylinder1.piston_diameter": 0.04, "cylinder2.rod_diameter": 0.02, "chambers.dead_volume": 2e-5},
         }
     ),
 }

@@ -148,7 +148,8 @@ def test_hunting_and_restarts_say_nothing_where_no_window_is_quiet():
     for name in ("hunting_x", "hunting_y", "restarts", "stiffness_error", "cross_motion"):
         assert np.isnan(result[name]).all(), name
     short = measure(round(0.9 / PERIOD))
-    assert np.isnan(short["hunting_x"]).all() and np.isnan(short["restarts"]).all()
+    assert np.isnan(short["hunting_x"]).all()
+    assert np.isnan(short["restarts"]).all()
 
 
 def test_restarts_per_second_count_breaks_from_rest_with_a_dead_band():
@@ -215,7 +216,8 @@ def test_rendered_stiffness_needs_a_push_held_for_two_seconds_and_a_resting_refe
     changed = over_time(np.where((time < 0.5)[:, None], (2000.0, 2000.0), (2000.0, 3000.0)))
     for name, values in (("target", moved), ("stiffness_setpoint", changed)):
         result = measure(len(time), user_force=force, **{name: values})
-        assert np.isnan(result["stiffness_error"]).all() and np.isnan(result["cross_motion"]).all()
+        assert np.isnan(result["stiffness_error"]).all()
+        assert np.isnan(result["cross_motion"]).all()
 
 
 def test_a_lane_that_died_before_its_push_says_nothing_about_stiffness():
@@ -224,7 +226,8 @@ def test_a_lane_that_died_before_its_push_says_nothing_about_stiffness():
     force = np.zeros((len(time), 1, 2))
     force[:, 0, 0] = 20 * np.clip(time - 1.4, 0, 1)
     result = measure(len(time), position=(0.5, 0.0) + force / 2000, user_force=force, alive=(time < 0.4)[:, None])
-    assert np.isnan(result["stiffness_error"]).all() and np.isnan(result["cross_motion"]).all()
+    assert np.isnan(result["stiffness_error"]).all()
+    assert np.isnan(result["cross_motion"]).all()
 
 
 def test_a_lane_that_died_after_its_push_was_measured_keeps_the_figure():
@@ -241,26 +244,31 @@ def test_without_a_settled_sample_the_settled_figures_are_nan_and_the_others_are
     result = measure(100, since_jump=0.1, tracking_error=(2e-3, 1e-3))
     for name in ("settled_rms_x", "settled_rms_y", "settled_rms", "settled_max_x", "settled_max_y"):
         assert np.isnan(result[name]).all(), name
-    assert result["error_rms_x"] == pytest.approx(2) and result["error_max_y"] == pytest.approx(1)
+    assert result["error_rms_x"] == pytest.approx(2)
+    assert result["error_max_y"] == pytest.approx(1)
 
 
 def test_the_caller_may_reuse_its_arrays():
-    fresh = measure(50, target=over_time(0.5 + 0.01 * np.arange(50)))
-    metrics, info = EpisodeMetrics(1, PERIOD), {name: np.full((1,) if name in SINGLE else (1, 2), 0.0) for name in RESTING}
-    for k in range(50):
+    # A target that moves all along: no second is quiet, though the array that says so is always the same one.
+    steps = round(2 / PERIOD)
+    metrics = EpisodeMetrics(1, PERIOD)
+    info = {name: np.zeros(1 if name in SINGLE else (1, 2)) for name in RESTING}
+    for k in range(steps):
         for name, value in RESTING.items():
             info[name][:] = value
         info["target"][:] = 0.5 + 0.01 * k
         metrics.add(info, np.zeros((4, 1)), np.ones(1, bool))
-    for name, value in metrics.result().items():
-        np.testing.assert_array_equal(value, fresh[name], err_msg=name)
+    assert np.isnan(metrics.result()["hunting_x"]).all()
 
 
 def test_summarize_takes_tails_by_size_and_ignores_what_says_nothing():
     values = np.array([1.0, -10.0, 3.0, np.nan, 2.0])
     result = summarize(values)
-    assert result["median"] == 1.5 and result["mean"] == -1.0 and result["max"] == 10.0
+    assert result["median"] == 1.5
+    assert result["mean"] == -1.0
+    assert result["max"] == 10.0
     assert result["q95"] == pytest.approx(np.quantile([1, 10, 3, 2], 0.95))
     nothing = summarize(np.array([np.nan, np.nan]))
-    assert set(nothing) == {"median", "mean", "q95", "max"} and all(math.isnan(value) for value in nothing.values())
+    assert set(nothing) == {"median", "mean", "q95", "max"}
+    assert all(math.isnan(value) for value in nothing.values())
     assert math.isnan(summarize(np.array([]))["max"])

@@ -171,3 +171,18 @@ def test_columns_of_the_kernels_follow_their_names() -> None:
     both = parameter_array([Parameters(), rig], 2)
     np.testing.assert_array_equal(both, np.stack([parameter_column(Parameters()), parameter_column(rig)], axis=1))
     np.testing.assert_array_equal(parameter_array(rig, 3), np.repeat(both[:, 1:], 3, axis=1))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"chambers.dead_volume": 4e-6}, r"Chambers.dead_volume = 4e-06 is impossible; allowed: at least 4\.91e-06 m3"),
+        ({"cylinder2.piston_diameter": 0.05}, r"Chambers.dead_volume = 1e-05 is impossible; allowed: at least 1\.96e-05 m3"),
+        ({"mechanics.mass": 0.01}, r"Mechanics.mass = 0.01 is impossible with this friction; allowed: at least 0\.0264 kg"),
+        ({"friction.law": "coulomb", "mechanics.mass": 1.0}, r"Mechanics.mass = 1.0 is impossible with this friction"),
+        ({"chambers.wall_heat_transfer": 1e6}, "Chambers.wall_heat_transfer = 1000000.0 is impossible; allowed: .*<= 10000"),
+    ],
+)
+def test_rigs_that_the_integrator_could_not_follow_are_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Parameters().replace(changes)

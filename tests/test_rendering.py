@@ -168,7 +168,7 @@ OTHER_RIGS = [
     {"cylinder1.stroke": 0.12, "cylinder2.stroke": 0.6, "geometry.k2": 0.62},
     {"cylinder1.stroke": 0.16, "cylinder2.stroke": 0.1, "geometry.k2": 0.4, "geometry.gamma3": 2.2},
     {"geometry.gamma3": -1.0, "geometry.d6": 0.3},
-    {"cylinder2.piston_diameter": 0.1, "cylinder2.rod_diameter": 0.05},
+    {"cylinder2.piston_diameter": 0.1, "cylinder2.rod_diameter": 0.05, "chambers.dead_volume": 1e-4},
 ]
 
 

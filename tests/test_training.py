@@ -316,7 +316,15 @@ def test_a_reset_forgets_the_last_episode(steering):
     np.testing.assert_array_equal(runs[0], runs[1][:37])
 
 
-def test_a_reset_of_one_lane_forgets_that_lane_alone(steering):
+@pytest.fixture
+def asked(monkeypatch):
+    """Every observation (N, D) that a policy was asked with."""
+    seen, actions = [], PolicyNetwork.actions
+    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows: (seen.append(rows), actions(self, rows))[1])
+    return seen
+
+
+def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
     env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3)
     controller = ResidualController(policy=steering)
     env.reset(seed=2)
@@ -327,11 +335,15 @@ def test_a_reset_of_one_lane_forgets_that_lane_alone(steering):
     openings = controller.command(env.measurement, env.reference)
     np.testing.assert_array_equal(openings[:, 1], untold[:, 1])
     assert (openings[:, [0, 2]] != untold[:, [0, 2]]).any(axis=0).all()
+    for _ in range(15):
+        env.step(controller.command(env.measurement, env.reference).T)
+    # The next question to the policy shows its last action: none in that lane.
+    assert len(asked) == 4
+    np.testing.assert_array_equal(asked[-1][1, -2:], 0)
+    assert (np.abs(asked[-1][[0, 2], -2:]).max(axis=1) > 0.1).all()
 
 
-def test_the_policy_is_asked_once_per_policy_period(steering, monkeypatch):
-    asked, actions = [], PolicyNetwork.actions
-    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, seen: (asked.append(seen), actions(self, seen))[1])
+def test_the_policy_is_asked_once_per_policy_period(steering, asked):
     env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3)
     controller = ResidualController(policy=steering)
     env.reset(seed=0)
@@ -339,4 +351,4 @@ def test_the_policy_is_asked_once_per_policy_period(steering, monkeypatch):
         env.step(controller.command(env.measurement, env.reference).T)
     assert len(asked) == 3
     np.testing.assert_array_equal(asked[0][:, -2:], 0)
-    np.testing.assert_array_equal(asked[1][:, -2:], actions(load_policy(steering).network, asked[0]))
+    np.testing.assert_array_equal(asked[1][:, -2:], load_policy(steering).network.actions(asked[0]))

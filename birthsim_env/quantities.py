@@ -1,0 +1,78 @@
+"""Dataclass fields that know their unit, their basis, their limits and their range, and parts made of such fields."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+
+def quantity(
+    default: Any,
+    unit: str,
+    basis: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    most: float = math.inf,
+    randomized: tuple[float, float] | None = None,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field that knows its unit, its basis, its limits and the range that domain randomisation draws from."""
+    metadata = {
+        "unit": unit,
+        "basis": basis,
+        "above": above,
+        "least": least,
+        "most": most,
+        "randomized": randomized,
+        "choices": choices,
+    }
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def _allowed(field: dataclasses.Field[Any]) -> str:
+    m = field.metadata
+    if m["choices"]:
+        return "one of " + ", ".join(repr(choice) for choice in m["choices"])
+    limits = []
+    if m["above"] > -math.inf:
+        limits.append(f"> {m['above']:g}")
+    if m["least"] > -math.inf:
+        limits.append(f">= {m['least']:g}")
+    if m["most"] < math.inf:
+        limits.append(f"<= {m['most']:g}")
+    return "a finite number" + (" " + " and ".join(limits) if limits else "") + f" ({m['unit']})"
+
+
+def _check_field(owner: str, field: dataclasses.Field[Any], value: Any) -> None:
+    m = field.metadata
+    if m["choices"]:
+        valid = value in m["choices"]
+    else:
+        valid = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        valid = valid and value > m["above"] and m["least"] <= value <= m["most"]
+    if not valid:
+        raise ValueError(f"{owner}.{field.name} = {value!r} is impossible; allowed: {_allowed(field)}")
+
+
+class Part:
+    """A group of quantities: checks every value by name, and lists its fields in the docstring of each subclass."""
+
+    def __init_subclass__(cls) -> None:
+        """Append the fields with unit, basis and range to the docstring."""
+        lines = [cls.__doc__ or "", "", "Fields (unit; basis; range of domain randomisation):", ""]
+        for name, field in vars(cls).items():
+            if isinstance(field, dataclasses.Field):
+                m = field.metadata
+                drawn = f"; {m['randomized'][0]:g} to {m['randomized'][1]:g}" if m["randomized"] else ""
+                lines.append(f"- ``{name}`` = {field.default!r} ({m['unit']}; {m['basis']}{drawn})")
+        cls.__doc__ = "\n".join(lines)
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            _check_field(type(self).__name__, field, getattr(self, field.name))
+        self._check_together()
+
+    def _check_together(self) -> None:
+        """Refuse values that are possible one by one but not together."""
