@@ -21,7 +21,7 @@ from agents.policy_files import Policy, save_policy
 from agents.policy_network import PolicyNetwork
 from agents.residual_law import ResidualSettings
 from agents.sb3_adapter import SB3VecEnv
-from agents.validation import Score, validate
+from agents.validation import SEED_SPACING, TRAINING_SEED, Score, validate
 
 __all__ = ["TrainingSettings", "train"]
 assert agents  # importing it registers the residual environments
@@ -85,6 +85,7 @@ def train(settings: TrainingSettings, residual: ResidualSettings, folder: Path, 
         },
         device="cpu",
     )
+    normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
     # The mean action starts at zero: the return at step 0 is the law's.
     torch.nn.init.zeros_(_output_layer(model).weight)
     torch.nn.init.zeros_(_output_layer(model).bias)

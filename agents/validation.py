@@ -13,7 +13,13 @@ SETTLED = 0.5
 """s after a jump from which an error counts, as in the evaluation."""
 
 VALIDATION_SEED = 1_000_000
-"""First seed of the validation worlds; training and evaluation seeds stay below it."""
+"""First seed of the validation worlds; evaluation seeds stay below it."""
+
+TRAINING_SEED = 2_000_000
+"""First seed of the training worlds, which neither validation nor evaluation should meet."""
+
+SEED_SPACING = 10_000
+"""Between the first lanes of neighbouring training seeds, so that they share no worlds."""
 
 
 @dataclass(frozen=True)

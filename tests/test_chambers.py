@@ -139,7 +139,7 @@ def test_air_at_the_walls_temperature_follows_the_isotherm() -> None:
     volume = np.array([Volumes(rig, s).volume for s in states])[..., 0]
     assert np.all(volume[:, 2:].max(axis=0) > 1.1 * volume[:, 2:].min(axis=0))
     np.testing.assert_allclose(invariant / invariant[0], 1, rtol=0, atol=5e-4)
-    assert max(np.abs(s[T] - WALL).max() for s in states) < 0.1
+    assert max(np.abs(s[T] - WALL).max() for s in states) < 0.15
 
 
 def test_temperatures_relax_to_the_wall_with_their_time_constant() -> None:

@@ -147,13 +147,8 @@ def test_opening_for_flow_saturates_beyond_full_opening_only(pressure: float, te
 
 
 def test_valve_stays_shut_where_opening_would_let_air_run_the_other_way() -> None:
-    for pressure, wanted, expected in (
-        (SUPPLY, 1e-4, 0.0),
-        (8e5, 1e-4, 0.0),
-        (ATMOSPHERE, -1e-4, 0.0),
-        (0.9e5, -1e-4, 0.0),
-        (6.9e5, 1e-2, 1.0),
-    ):
+    shut = ((SUPPLY, 1e-4, 0.0), (8e5, 1e-4, 0.0), (ATMOSPHERE, -1e-4, 0.0), (0.9e5, -1e-4, 0.0))
+    for pressure, wanted, expected in (*shut, (6.9e5, 1e-2, 1.0)):
         assert valves.opening_for_flow(wanted, *per_conductance(pressure, T0), C, CL) == expected
     fill, drain = per_conductance(3e5, T0)
     assert valves.opening_for_flow(CL * (fill - drain), fill, drain, C, CL) == 0, "what leaks anyway needs no opening"

@@ -10,7 +10,7 @@ import gymnasium
 
 import birthsim_env
 from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
-from baselines.evaluation import evaluate, table
+from baselines.evaluation import Evaluation, evaluate, table
 from baselines.registry import controller_names, make_controller
 
 
@@ -62,10 +62,16 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         controllers[name] = make_controller(name, rig, **options)
     folder = make_folder(arguments.out)
     setting = {"parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize]}
-    evaluations = [
-        evaluate(arguments.env, controller, name, arguments.episodes, arguments.seed, **setting)
-        for name, controller in controllers.items()
-    ]
+    evaluations: list[Evaluation] = []
+    for name, controller in controllers.items():
+        try:
+            evaluations.append(evaluate(arguments.env, controller, name, arguments.episodes, arguments.seed, **setting))
+        except KeyboardInterrupt:
+            if not evaluations:
+                raise
+            break
+        if len(evaluations[-1].seeds) < arguments.episodes:
+            break  # interrupted: what is complete is written, and no further controller is begun
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures import error_over_time
 

@@ -1,0 +1,63 @@
+"""A million random policy steps through the environments at the corners of the documented parameter ranges."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import birthsim_env
+from birthsim_env.randomization import documented_ranges
+
+LANES, STEPS = 256, 500
+SETUPS = [
+    ("BirthSIM/Circle-v0", "two_valves", "lugre"),
+    ("BirthSIM/Circle-v0", "one_valve", "coulomb"),
+    ("BirthSIM/Circle-v0", "two_valves", "coulomb"),
+    ("BirthSIM/Circle-v0", "one_valve", "lugre"),
+    ("BirthSIM/Forceps-v0", "two_valves", "lugre"),
+    ("BirthSIM/Forceps-v0", "two_valves", "coulomb"),
+    ("BirthSIM/Forceps-v0", "one_valve", "lugre"),
+    ("BirthSIM/Dystocia-v0", "two_valves", "lugre"),
+]
+
+
+def corner(corner_seed: int, friction: str) -> birthsim_env.Parameters:
+    rng = np.random.default_rng(corner_seed)
+    changes = {name: float(rng.choice(bounds)) for name, bounds in documented_ranges().items()}
+    return birthsim_env.Parameters().replace({**changes, "friction.law": friction})
+
+
+def random_actions(rng: np.random.Generator, size: int) -> Any:
+    """Per lane and 0.3 s one of: white noise, held openings, bang-bang noise, full openings held."""
+    for step in range(STEPS):
+        if step % 30 == 0:
+            held, kind = rng.uniform(-1, 1, (LANES, size)), rng.integers(4, size=(LANES, 1))
+        white = rng.uniform(-1, 1, (LANES, size))
+        yield np.choose(kind, [white, held, np.sign(white), np.sign(held)])
+
+
+@pytest.mark.parametrize(("setup", "seed"), zip(SETUPS, range(len(SETUPS)), strict=True))
+def test_random_policies_leave_only_finite_states(setup: tuple[str, str, str], seed: int) -> None:
+    name, valves, friction = setup
+    env = gymnasium.make_vec(name, num_envs=LANES, parameters=corner(seed, friction), valves=valves, randomize="scenario")
+    env.reset(seed=seed)
+    ended = beyond = 0
+    for actions in random_actions(np.random.default_rng(seed), env.single_action_space.shape[0]):
+        observation, rewards, terminated, _, info = env.step(actions)
+        assert np.isfinite(observation).all()
+        assert np.isfinite(rewards).all()
+        assert all(np.isfinite(info[field]).all() for field in ("position", "pressure", "temperature", "piston_velocity"))
+        assert np.all((info["pressure"] > 0.2e5) & (info["pressure"] < 20e5))
+        if terminated.any():
+            last = info["final_info"]["pressure"][terminated]
+            ended += len(last)
+            beyond += int(np.any((last < 0.2e5) | (last > 20e5), axis=1).sum())
+            # A chamber that a flung mass squeezes in its last 10 ms may pass 20 bar; the episode ends there.
+            assert 0.1e5 < last.min()
+            assert last.max() < 60e5
+    assert ended > 100, "random openings must drive pistons into the end stops"
+    assert beyond <= 1e-3 * LANES * STEPS
+    print(f"{name}, {valves}, {friction}: {ended} episodes ended, {beyond} of them with a chamber outside 0.2 to 20 bar")
