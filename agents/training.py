@@ -32,7 +32,7 @@ class TrainingSettings:
     """PPO's settings and the experiment around it; the learning rate falls linearly to a tenth."""
 
     environment: str = "BirthSIM/CircleResidual-v0"
-    steps: int = 2_000_000
+    steps: int = 3_000_000
     seed: int = 0
     sensors: str = "ideal"
     randomize: bool | str = True

@@ -125,13 +125,15 @@ def _run_batch(
 
 
 def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
-    """A Markdown table with a row per metric and, per controller, its ``statistic`` and 95 % and largest values."""
+    """A Markdown table: a row per metric that says something; per controller its ``statistic``, 95 % and largest value."""
     head = ["metric", "unit"]
     for evaluation in evaluations:
         head += [f"{evaluation.controller}: {statistic}", "95 %", "max"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     summaries = [evaluation.summary() for evaluation in evaluations]
     for name, unit in UNITS.items():
+        if not any(np.isfinite(summary[name]["max"]) for summary in summaries):
+            continue
         row = [name, unit]
         for summary in summaries:
             row += [_number(summary[name][key]) for key in (statistic, "q95", "max")]

@@ -118,6 +118,7 @@ def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path)
     """Size of the tracking error over time: median and 5-95 % band over the episodes, one line per controller."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+        lowest = np.inf
         colours, styles = (DARK, MIDDLE, ACCENT, LIGHT), ("-", "--", "-.", ":")
         for k, evaluation in enumerate(evaluations):
             # The fifth controller has the first one's colour and another style.
@@ -128,6 +129,10 @@ def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path)
             low, middle, high = np.nanquantile(size, (0.05, 0.5, 0.95), axis=1)
             axes.fill_between(time, low, high, color=colour, alpha=0.15, lw=0)
             axes.plot(time, middle, color=colour, ls=style, lw=1.2, label=f"{evaluation.controller} (median, 5-95 %)")
+            # Every episode starts without error, which would stretch a logarithmic axis without end.
+            lowest = min(lowest, float(np.quantile(low, 0.05)))
         axes.set(xlabel="time (s)", ylabel="tracking error (mm)", yscale="log", title=title)
-        axes.legend()
+        axes.set_ylim(bottom=max(lowest / 2, 1e-3))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.legend(loc="lower center", ncol=2)
         return save(figure, folder, "error_over_time")

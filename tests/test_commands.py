@@ -125,8 +125,8 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
     for name in UNITS:
         assert len(law["episodes"][name]) == 3
         median = law["summary"][name]["median"]
-        shown = next(line for line in table.splitlines() if line.startswith(f"| {name} |")).split("|")[3].strip()
-        assert shown == ("-" if median is None else f"{median:.3g}"), name
+        rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
+        assert [row.split("|")[3].strip() for row in rows] == ([] if median is None else [f"{median:.3g}"]), name
     assert weight["summary"]["settled_rms"]["median"] < law["summary"]["settled_rms"]["median"]
     # The figures are there for the stiffness test, whose reference stands still.
     assert math.isfinite(law["summary"]["stiffness_error"]["median"])
@@ -144,7 +144,7 @@ def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp
     # On the circle the reference never rests.
     assert result["summary"]["stiffness_error"]["median"] is None
     assert result["episodes"]["stiffness_error"] == [None]
-    assert "| stiffness_error | % | - | - | - |" in printed
+    assert "stiffness_error" not in printed, "a row in which nothing is said is left out"
     assert content["rig"]["mechanics"]["mass"] == 3.5
 
 

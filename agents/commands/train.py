@@ -20,7 +20,7 @@ def main() -> None:
         epilog="The best policy on validation worlds is kept in --out whenever it improves; Ctrl-C stops and keeps it.",
     )
     parser.add_argument("--env", default="BirthSIM/CircleResidual-v0", help="residual environment (default: %(default)s)")
-    parser.add_argument("--steps", type=whole, default=2_000_000, help="policy steps (default: %(default)s)")
+    parser.add_argument("--steps", type=whole, default=3_000_000, help="policy steps (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=0)
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
     parser.add_argument("--randomize", default="all", choices=tuple(RANDOMIZE), help="what training varies (default: all)")
