@@ -8,7 +8,6 @@ from birthsim_env import control_model, dynamics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
-from birthsim_env.signals import REFERENCES
 from birthsim_env.simulation import Simulation
 
 FIELDS = {
@@ -88,7 +87,6 @@ def describe(simulation: Simulation) -> Array:
     """All fields of all lanes, (ROWS, N), in the order of ``FIELDS``."""
     plant = simulation.plant
     rows = np.empty((ROWS, plant.num_envs))
-    assert simulation.reference.rows.shape[0] == REFERENCES
     _describe(
         simulation.time, simulation.since_jump, plant.state, simulation.motion, simulation.reference.rows, simulation.force,
         simulation.impacts, plant.lane_parameters, rows,
