@@ -101,13 +101,9 @@ def law(
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
         m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
-        r4, r2 = y1 + p[at.K1], y2 + p[at.K2]
-        w = r4 * r4 - p[at.D_SQUARES]
-        s2 = geometry.s_squared(w, p[at.D_PRODUCT])
-        root = math.sqrt(s2)
-        kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
-        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
         pole = 2.0 * r4 * w / s2
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + pole * v1

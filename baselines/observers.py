@@ -50,13 +50,9 @@ def _update(
                     history[k, cylinder, i] = joints[cylinder, 0]
             continue
         y1, y2, v1, v2 = estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i]
-        r4, r2 = y1 + p[at.K1], y2 + p[at.K2]
-        w = r4 * r4 - p[at.D_SQUARES]
-        s2 = geometry.s_squared(w, p[at.D_PRODUCT])
-        root = math.sqrt(s2)
-        kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
-        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
         load1 = (
             mechanics.piston_force(pressures[0, i], pressures[1, i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
             - p[at.FV1] * v1

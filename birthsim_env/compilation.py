@@ -1,7 +1,7 @@
 """How kernels are compiled: two Numba decorators, a cache that notices changed helpers, and a word while a user waits.
 
 Kernels run over lanes (environments). They are written so that LLVM vectorises the innermost loop: quantities are rows of
-scratch arrays whose shape is a compile-time constant, helpers return one float, conditions are max, min or a ternary, and
+scratch arrays whose shape is a compile-time constant, helpers are always inlined, conditions are max, min or a ternary, and
 only + - * / sqrt occur inside. Without ``fastmath`` every operation is IEEE-exact, so a lane computes the same bits
 whether it runs in a vector register or alone.
 """

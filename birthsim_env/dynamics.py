@@ -6,8 +6,6 @@ shape, works there, and copies back; the right-hand side is inlined where it is 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from birthsim_env import chambers, friction, geometry, mechanics, valves
@@ -62,13 +60,9 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
     """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
     for i in range(n):
         y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
-        r4, r2 = y1 + p[at.K1, i], y2 + p[at.K2, i]
-        w = r4 * r4 - p[at.D_SQUARES, i]
-        s2 = geometry.s_squared(w, p[at.D_PRODUCT, i])
-        root = math.sqrt(s2)
-        kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
-        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
+        )
 
         s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
         level1 = friction.stribeck_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])

@@ -16,12 +16,16 @@ from birthsim_env.lanes import Array
 def _balance(state: Array, stiffness: Array, p: Array) -> None:
     """Fills pressures, temperatures and bristles of a state whose positions and speeds are set."""
     for i in range(state.shape[1]):
-        r4, r2 = state[at.Y1, i] + p[at.K1, i], state[at.Y2, i] + p[at.K2, i]
-        w = r4 * r4 - p[at.D_SQUARES, i]
-        root = math.sqrt(geometry.s_squared(w, p[at.D_PRODUCT, i]))
-        kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
-        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i])
+        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
+            state[at.Y1, i],
+            state[at.Y2, i],
+            p[at.K1, i],
+            p[at.K2, i],
+            p[at.D_SQUARES, i],
+            p[at.D_PRODUCT, i],
+            p[at.SIN_GAMMA3, i],
+            p[at.COS_GAMMA3, i],
+        )
         weight1 = p[at.MASS, i] * kappa * p[at.GRAVITY, i] * sine
         weight2 = p[at.MASS, i] * p[at.GRAVITY, i] * cosine
         for cylinder in range(2):

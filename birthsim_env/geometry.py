@@ -42,6 +42,20 @@ def amplification(r2: float, r4: float, root: float) -> float:
 
 
 @helper
+def pose(
+    y1: float, y2: float, k1: float, k2: float, d_squares: float, d_product: float, sin_gamma3: float, cos_gamma3: float
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Lengths r4, r2 (m), w (m2), S^2 (m4), S (m2), kappa, sin(theta1) and cos(theta1) for piston positions y1, y2 (m)."""
+    r4, r2 = y1 + k1, y2 + k2
+    w = r4 * r4 - d_squares
+    s2 = s_squared(w, d_product)
+    root = math.sqrt(s2)
+    sine = sin_theta1(w, root, d_product, sin_gamma3, cos_gamma3)
+    cosine = cos_theta1(w, root, d_product, sin_gamma3, cos_gamma3)
+    return r4, r2, w, s2, root, amplification(r2, r4, root), sine, cosine
+
+
+@helper
 def length_r4(
     sin_theta: float, cos_theta: float, d_squares: float, d_product: float, sin_gamma3: float, cos_gamma3: float
 ) -> float:
@@ -137,12 +151,9 @@ def joint_force(force: ArrayLike, piston: ArrayLike, parameters: Parameters) -> 
 def end_effector_motion(state: Array, p: Array, motion: Array) -> None:
     """Writes x, y, vx, vy of the end effector for states (18, N) into ``motion`` (4, N)."""
     for i in range(state.shape[1]):
-        r4, r2 = state[Y1, i] + p[K1, i], state[Y2, i] + p[K2, i]
-        w = r4 * r4 - p[D_SQUARES, i]
-        root = math.sqrt(s_squared(w, p[D_PRODUCT, i]))
-        kappa = amplification(r2, r4, root)
-        sine = sin_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
-        cosine = cos_theta1(w, root, p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i])
+        _, r2, _, _, _, kappa, sine, cosine = pose(
+            state[Y1, i], state[Y2, i], p[K1, i], p[K2, i], p[D_SQUARES, i], p[D_PRODUCT, i], p[SIN_GAMMA3, i], p[COS_GAMMA3, i]
+        )
         motion[0, i] = r2 * sine
         motion[1, i] = -r2 * cosine
         motion[2, i] = -kappa * cosine * state[V1, i] + sine * state[V2, i]

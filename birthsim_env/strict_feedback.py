@@ -6,8 +6,6 @@ pneumatic stiffness (9). Input U, (4, N): qA2, qT2, qA1, qT1, the active and pre
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -27,13 +25,9 @@ def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, n
     gas_t, index = p[at.GAS] * p[at.TEMPERATURE], p[at.INDEX]
     for i in range(x.shape[1]):
         y2, v2, f2, k2, y1, v1, f1, k1 = x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
-        r4, r2 = y1 + p[at.K1], y2 + p[at.K2]
-        w = r4 * r4 - p[at.D_SQUARES]
-        s2 = geometry.s_squared(w, p[at.D_PRODUCT])
-        root = math.sqrt(s2)
-        kappa = geometry.amplification(r2, r4, root)
-        sine = geometry.sin_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
-        cosine = geometry.cos_theta1(w, root, p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3])
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
         outside1 = p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1])
         outside2 = p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2])
         net1 = f1 - outside1 - friction.coulomb_force(v1, p[at.FC1], p[at.FV1], p[at.SIGN_SPEED])
