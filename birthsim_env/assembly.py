@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -86,8 +87,12 @@ def assemble(
     policy_period: float = 0.01,
     duration: float | None = None,
     actuation: Actuation | None = None,
+    **unknown: Any,
 ) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed."""
+    if unknown:
+        known = [name for name in inspect.signature(assemble).parameters if name not in ("num_envs", "scenario", "unknown")]
+        raise ValueError(f"unknown argument {', '.join(map(repr, unknown))}; allowed: {', '.join(known)}")
     table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
     rig = load_parameters(parameters)
     one_of("valves", valves, VALVE_LAYOUTS)

@@ -52,7 +52,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     | 0, 1 | tracking error x, y: end effector minus compliant target | 0.01 m |
     | 2, 3 | end effector velocity x, y | 0.2 m/s |
     | 4, 5 | piston positions y1, y2 | half a stroke |
-    | 6, 7 | piston forces F - Fext of cylinders 1, 2 | 200 N |
+    | 6, 7 | forces on pistons 1, 2: F - Fext + user force along the cylinder (17) | 200 N |
     | 8, 9 | pneumatic stiffness (9) of cylinders 1, 2 | 5000, 2500 N/m |
     | 10, 11 | its setpoints | 5000, 2500 N/m |
     | 12, 13 | closed-loop stiffness setpoints Kclx, Kcly | 5000 N/m |

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import control_model, mechanics
+from birthsim_env import control_model, geometry, mechanics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
@@ -65,8 +65,8 @@ ENTRIES = (
     Entry("end effector velocity y", "m/s", 0.2),
     Entry("piston position y1", "half strokes", 1.0),
     Entry("piston position y2", "half strokes", 1.0),
-    Entry("piston force of cylinder 1 (F - Fext)", "N", 200.0),
-    Entry("piston force of cylinder 2 (F - Fext)", "N", 200.0),
+    Entry("force on piston 1 (F - Fext + user force (17))", "N", 200.0),
+    Entry("force on piston 2 (F - Fext + user force (17))", "N", 200.0),
     Entry("pneumatic stiffness of cylinder 1", "N/m", 5000.0),
     Entry("pneumatic stiffness of cylinder 2", "N/m", 2500.0),
     Entry("pneumatic stiffness setpoint of cylinder 1", "N/m", 5000.0),
@@ -107,8 +107,14 @@ def _observe(
             seen[16 + axis] = reference[2 + axis, i]
             seen[18 + axis] = reference[4 + axis, i]
         seen[4], seen[5] = y1 / half1, y2 / half2
-        seen[6] = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
-        seen[7] = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
+        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        # Pressures and hand together: what is left to hold them in balance is weight and friction, whatever the hand does.
+        pressed1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
+        pressed2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
+        seen[6] = pressed1 + mechanics.user_force1(force[0, i], force[1, i], kappa, sine, cosine)
+        seen[7] = pressed2 + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
         seen[8] = control_model.pneumatic_stiffness(
             pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], max(half1 + y1, edge1), max(half1 - y1, edge1), p[at.INDEX]
         )

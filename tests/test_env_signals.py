@@ -12,6 +12,8 @@ import pytest
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
+from birthsim_env.parameters import Parameters
+from tests import linkage_by_points as by_points
 
 IDS = tuple(f"BirthSIM/{name}-v0" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))
 TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
@@ -52,6 +54,19 @@ def test_the_table_in_the_docstring_is_the_table_of_entries():
         assert name == f"{entry.name}, {entry.scale:g} {entry.unit}"
 
 
+def along_cylinders(info):
+    """The user's force along both cylinders, N, from the work that it does on a small motion of each piston."""
+    geometry = Parameters().geometry
+
+    def point(shift1, shift2):
+        y1, y2 = info["piston_position"] + (shift1, shift2)
+        return by_points.pose_from_lengths(y1 + geometry.k1, y2 + geometry.k2, geometry).end_effector
+
+    h = 1e-6
+    motion = [point(h, 0) - point(-h, 0), point(0, h) - point(0, -h)]
+    return np.array([way @ info["user_force"] / (2 * h) for way in motion])
+
+
 @pytest.mark.parametrize("name", IDS)
 def test_an_ideal_observation_is_info_over_the_documented_scales(name):
     env = make(name, randomize=True)
@@ -64,7 +79,7 @@ def test_an_ideal_observation_is_info_over_the_documented_scales(name):
             info["tracking_error"] / 0.01,
             info["velocity"] / 0.2,
             info["piston_position"] / (0.1, 0.2),
-            (info["pneumatic_force"] - external) / 200,
+            (info["pneumatic_force"] - external + along_cylinders(info)) / 200,
             info["pneumatic_stiffness"] / (5000, 2500),
             info["pneumatic_stiffness_setpoint"] / (5000, 2500),
             info["stiffness_setpoint"] / 5000,
