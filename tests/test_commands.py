@@ -64,7 +64,7 @@ def assert_picture(folder, name):
 def trained(tmp_path_factory):
     """A policy folder of birthsim-train, and the process that made it."""
     folder = tmp_path_factory.mktemp("policies") / "deeper" / "policy"
-    done = run("train", "--env", RESIDUAL, "--steps", "20000", "--seed", "3", "--authority", "60", "--out", folder)
+    done = run("train", "--env", RESIDUAL, "--steps", "60000", "--seed", "3", "--authority", "60", "--out", folder)
     return folder, done
 
 
