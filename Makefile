@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
-# pip's first copy of a package decides; a build that finds none on disk must not wait for a prompt.
+# --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 
 .PHONY: run test test-slow lint bench pictures golden clean

@@ -85,6 +85,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       scenario's.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
+    - `actuation`: an object of your own between action and valves (`birthsim_env.actuation.Actuation`) instead of a mode.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`.
 
     Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.

@@ -16,9 +16,6 @@ from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import checked
 
-STATE_NAMES = ("y2", "v2", "F2", "K2", "y1", "v1", "F1", "K1")
-INPUT_NAMES = ("qA2", "qT2", "qA1", "qT1")
-
 
 @kernel
 def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, neglected: Array) -> None:
@@ -62,5 +59,8 @@ def strict_feedback_rates(state: ArrayLike, flows: ArrayLike, parameters: Parame
 
 
 def neglected_acceleration(state: ArrayLike, parameters: Parameters) -> Array:
-    """The term (14), (N,), m/s2: weight and centrifugal acceleration along cylinder 2, for states (8, N)."""
+    """The term (14), (N,), m/s2: weight and centrifugal acceleration along cylinder 2, for states (8, N).
+
+    Raises ``ValueError`` for wrong shapes and numbers that are not finite.
+    """
     return _evaluate(state, np.zeros((4, np.shape(state)[-1])), parameters, 0.0)[1]
