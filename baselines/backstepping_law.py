@@ -18,7 +18,8 @@ import numpy as np
 
 from baselines.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.gains import equal_gain
-from birthsim_env import control_model, geometry, mechanics, valves
+from baselines.valve_inverse import two_valve_openings
+from birthsim_env import control_model, geometry, mechanics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import BLOCK, helper, kernel
 from birthsim_env.dynamics import load, store
@@ -63,38 +64,13 @@ def force_rate_command(
 
 
 @helper
-def valve_openings(
-    u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
-    length_p: float, length_n: float, v: float, p: Array,
-) -> None:  # fmt: skip
-    """Openings of one cylinder's two valves for the wanted dF/dt and dK/dt: (10), inverse A-T, inverse characteristic."""
-    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    force = pp * ap - pn * an
-    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
-    active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
-    pressurization = control_model.pressurization_flow_for(
-        stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
-    )
-    flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
-    flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
-    # The controller measures no temperatures: all air counts as ambient.
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
-    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
-    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
-    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
-    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
-
-
-@helper
 def law(
     joints: Array, pressures: Array, wanted: Array, target: Array, believed: Array, p: Array, c4: float, width: float,
     compensate: float, u: Array, n: int,
 ) -> None:  # fmt: skip
     """Openings (4, n) for n lanes.
 
-    ``joints`` (4, n): y1, y2, v1, v2. ``wanted`` (8, n): the reference in joint coordinates. ``target`` (14, n): the
+    ``joints`` (4, n): y1, y2, v1, v2. ``wanted`` (8, n): the reference in joint coordinates. ``target`` (15, n): the
     reference. ``believed`` (2, n): forces along the cylinders that the law is told about, N. ``compensate`` is 1 with (14).
     """
     for i in range(n):
@@ -155,8 +131,8 @@ def law(
         kp2 = control_model.pneumatic_stiffness(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, p[at.INDEX])
         kp1_rate = target[12, i] - c4 * (kp1 - target[10, i])
         kp2_rate = target[13, i] - c4 * (kp2 - target[11, i])
-        valve_openings(u, i, 0, rate1, kp1_rate, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
-        valve_openings(u, i, 2, rate2, kp2_rate, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
+        two_valve_openings(u, i, 0, rate1, kp1_rate, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
+        two_valve_openings(u, i, 2, rate2, kp2_rate, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
 
 
 @kernel

@@ -35,10 +35,10 @@ def _source_stamp() -> str:
     """One hash of all kernels and the row numbers they share: Numba itself looks at the outermost function's file only."""
     digest = hashlib.sha256(numba.__version__.encode())
     for package in _PACKAGES:
-        for path in sorted((_ROOT / package).glob("*.py")):
+        for path in sorted((_ROOT / package).rglob("*.py")):
             text = path.read_bytes()
             if b"\n@kernel\n" in text or b"\n@helper\n" in text or path.name in ("compilation.py", "lanes.py"):
-                digest.update(path.name.encode() + text)
+                digest.update(str(path.relative_to(_ROOT)).encode() + text)
     return digest.hexdigest()
 
 
@@ -61,7 +61,9 @@ class _PackageCacheLocator(_CacheLocator):
     """Keeps machine code of this project's kernels under a stamp of all of them."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
-        self._lineno = py_func.__code__.co_firstlineno
+        # Files of the same name in two packages may have a function of the same name in the same line.
+        place = Path(py_file).resolve().relative_to(_ROOT).with_suffix("").parts
+        self._place = f"{'-'.join(place)}-{py_func.__code__.co_firstlineno}"
 
     def get_cache_path(self) -> str:
         return str(_cache_folder())
@@ -70,11 +72,11 @@ class _PackageCacheLocator(_CacheLocator):
         return _source_stamp()
 
     def get_disambiguator(self) -> str:
-        return str(self._lineno)
+        return self._place
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> _PackageCacheLocator | None:
-        ours = Path(py_file).resolve().parent.parent == _ROOT and Path(py_file).resolve().parent.name in _PACKAGES
+        ours = any(Path(py_file).resolve().is_relative_to(_ROOT / package) for package in _PACKAGES)
         return cls(py_func, py_file) if ours and _cache_folder() else None
 
 

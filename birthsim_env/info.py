@@ -8,6 +8,7 @@ from birthsim_env import control_model, dynamics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
+from birthsim_env.signals import compliance
 from birthsim_env.simulation import Simulation
 
 FIELDS = {
@@ -52,8 +53,9 @@ def _describe(
 ) -> None:
     for i in range(state.shape[1]):
         rows[0, i], rows[1, i] = time[i], since[i]
+        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         for k in range(2):
-            compliant = reference[k, i] + force[k, i] / reference[8 + k, i]
+            compliant = reference[k, i] + given[k]
             rows[2 + k, i], rows[4 + k, i] = motion[k, i], motion[2 + k, i]
             rows[6 + k, i], rows[8 + k, i] = reference[k, i], compliant
             rows[10 + k, i] = motion[k, i] - compliant

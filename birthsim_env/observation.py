@@ -17,7 +17,7 @@ from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
 from birthsim_env.lanes import Array
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.signals import Measurement, Reference, compliance
 
 LIMIT = 10.0
 """Bound of every observation entry, in units of its scale."""
@@ -98,8 +98,9 @@ def _observe(
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
         half1, half2 = p[at.HALF_L1], p[at.HALF_L2]
         edge1, edge2 = 0.02 * half1, 0.02 * half2
+        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         for axis in range(2):
-            seen[axis] = position[axis, i] - reference[axis, i] - force[axis, i] / reference[8 + axis, i]
+            seen[axis] = position[axis, i] - reference[axis, i] - given[axis]
             seen[2 + axis] = velocity[axis, i]
             seen[10 + axis] = reference[10 + axis, i]
             seen[12 + axis] = reference[8 + axis, i]
@@ -144,8 +145,9 @@ def _assess(
     impacts: Array, impact_speed: float, steps: float, terms: Array, failed: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     for i in range(state.shape[1]):
-        error_x = motion[0, i] - reference[0, i] - force[0, i] / reference[8, i]
-        error_y = motion[1, i] - reference[1, i] - force[1, i] / reference[9, i]
+        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
+        error_x = motion[0, i] - reference[0, i] - given[0]
+        error_y = motion[1, i] - reference[1, i] - given[1]
         cost = min((abs(error_x) + abs(error_y)) / ERROR_UNIT, ERROR_CAP)
         change = 0.0
         for k in range(action.shape[0]):

@@ -6,24 +6,36 @@ Arrays are (rows, N) over N lanes. Everything also works for one rig without the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.compilation import helper
 from birthsim_env.lanes import Array
 
 REFERENCE_NAMES = (
     *("x", "y", "vx", "vy", "ax", "ay", "jx", "jy"),
-    *("Kclx", "Kcly", "Kpneu1", "Kpneu2", "dKpneu1", "dKpneu2"),
+    *("Kclx", "Kcly", "Kpneu1", "Kpneu2", "dKpneu1", "dKpneu2", "Kclxy"),
 )
 """Rows of a reference: the target's position, velocity, acceleration and jerk; the setpoints of closed-loop stiffness;
-those of pneumatic stiffness and their rates."""
+those of pneumatic stiffness and their rates; the coupling of the closed-loop stiffness [[Kclx, Kclxy], [Kclxy, Kcly]]."""
 REFERENCES = len(REFERENCE_NAMES)
+
+
+def displacement(force_x: Any, force_y: Any, kx: Any, ky: Any, kxy: Any) -> tuple[Any, Any]:
+    """Displacement (m) of a spring [[kx, kxy], [kxy, ky]] (N/m) under a force (N)."""
+    determinant = kx * ky - kxy * kxy
+    return (ky * force_x - kxy * force_y) / determinant, (kx * force_y - kxy * force_x) / determinant
+
+
+compliance = helper(displacement)
+"""``displacement`` for kernels."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What a controller is asked to do at one instant. ``rows`` is (14, N) or (14,) in the order of ``REFERENCE_NAMES``."""
+    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,) in the order of ``REFERENCE_NAMES``."""
 
     rows: Array
 
@@ -62,9 +74,16 @@ class Reference:
         """Rates of those setpoints, N/(m s), (2, N)."""
         return self.rows[12:14]
 
+    @property
+    def stiffness_coupling(self) -> Array:
+        """Setpoint Kclxy of what couples x and y, N/m, (N,); zero in the paper."""
+        return np.asarray(self.rows[14])
+
     def compliant_target(self, user_force: Array) -> Array:
         """Where a hand that pushes with ``user_force`` (2, N), N, should find the end effector (19), m, (2, N)."""
-        return np.asarray(self.position + user_force / self.stiffness)
+        (kx, ky), kxy = self.stiffness, self.stiffness_coupling
+        x, y = displacement(user_force[0], user_force[1], kx, ky, kxy)
+        return np.asarray(self.position + np.stack([x, y]))
 
 
 @dataclass(frozen=True)

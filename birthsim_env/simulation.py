@@ -149,10 +149,15 @@ class Simulation:
         for instant in np.linspace(0.0, duration, CHECKS):
             time = np.full(lanes, instant)
             motion = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")
-            setpoints = checked("stiffness.sample(time)", self.stiffness.sample(time), (6, lanes), "SI")
+            setpoints = checked("stiffness.sample(time)", self.stiffness.sample(time), (7, lanes), "SI")
             if not (setpoints[:4, chosen] > 0).all():
                 raise ValueError(
                     f"stiffness.sample(time = {instant:g} s) = {setpoints[:4, chosen].min():g} N/m; allowed: more than 0"
+                )
+            kx, ky, kxy = setpoints[0, chosen], setpoints[1, chosen], setpoints[6, chosen]
+            if not (kxy**2 < kx * ky).all():
+                raise ValueError(
+                    f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
                 )
             try:
                 inverse_geometry(motion[:2, chosen], self.parameters)
@@ -171,5 +176,5 @@ def _track_jumps(forces: Array, later: Array, setpoints: Array, new: Array, peri
                 after = forces[k + 1, axis, i] if k + 1 < samples else later[0, axis, i]
                 if abs(after - forces[k, axis, i]) > JUMP_RATE * period:
                     since[i] = 0.0
-        if setpoints[8, i] != new[8, i] or setpoints[9, i] != new[9, i]:
+        if setpoints[8, i] != new[8, i] or setpoints[9, i] != new[9, i] or setpoints[14, i] != new[14, i]:
             since[i] = 0.0

@@ -17,12 +17,13 @@ from birthsim_env.seeding import Range, draw
 class StiffnessSchedule:
     """What stiffness is asked for. A user's own schedule derives from this class.
 
-    ``sample(time)`` gets the time of every lane, s, (N,), and returns (6, N): Kclx, Kcly (N/m), the pneumatic stiffness
-    setpoints of cylinders 1 and 2 (N/m) and their rates (N/(m s)).
+    ``sample(time)`` gets the time of every lane, s, (N,), and returns (7, N): Kclx, Kcly (N/m), the pneumatic stiffness
+    setpoints of cylinders 1 and 2 (N/m), their rates (N/(m s)), and Kclxy (N/m), which couples x and y.
 
     Arguments, one entry per phase, numbers or ranges (low, high): ``times`` (s) at which the phases start, the first 0;
-    ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given; ``pneumatic1``, ``pneumatic2``
-    (N/m) for the cylinders. ``transition`` (s) of the pneumatic stiffness.
+    ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given; ``closed_loop_xy`` (N/m), what
+    couples them, whose square must be below the product of the two; ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
+    ``transition`` (s) of the pneumatic stiffness.
     """
 
     def __init__(
@@ -32,10 +33,12 @@ class StiffnessSchedule:
         pneumatic1: Sequence[Range] = (4600.0,),
         pneumatic2: Sequence[Range] = (2300.0,),
         closed_loop_y: Sequence[Range] | None = None,
+        closed_loop_xy: Sequence[Range] | None = None,
         transition: float = 0.5,
     ) -> None:
         columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
-        if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns):
+        coupled = [] if closed_loop_xy is None else [closed_loop_xy]
+        if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns + coupled):
             raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
         if not all(sooner < later for sooner, later in pairwise(times)):
             raise ValueError(f"times = {times!r}; allowed: increasing (s)")
@@ -45,24 +48,29 @@ class StiffnessSchedule:
         if not transition > 0:
             raise ValueError(f"transition = {transition!r}; allowed: more than 0 (s)")
         self.times, self.transition = times, transition
-        self.closed_loop, self.closed_loop_y = closed_loop, closed_loop_y
+        self.closed_loop, self.closed_loop_y, self.closed_loop_xy = closed_loop, closed_loop_y, closed_loop_xy
+        for across, x, y in zip(closed_loop_xy or (), closed_loop, closed_loop_y or closed_loop, strict=False):
+            if not np.max(np.abs(across)) ** 2 < np.min(x) * np.min(y):
+                raise ValueError(f"closed_loop_xy {across!r}; allowed: below sqrt(Kclx Kcly), here of {x!r} and {y!r} (N/m)")
         self.pneumatic1, self.pneumatic2 = pneumatic1, pneumatic2
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
         self._starts: Array = np.array(self.times, dtype=np.float64)
-        self._values: Array = np.zeros((len(self.times), 4, num_envs))
+        self._values: Array = np.zeros((len(self.times), 5, num_envs))
 
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
         for phase in range(len(self.times)):
             x = draw(self.closed_loop[phase], rng)
             y = x if self.closed_loop_y is None else draw(self.closed_loop_y[phase], rng)
-            self._values[phase, :, lane] = (x, y, draw(self.pneumatic1[phase], rng), draw(self.pneumatic2[phase], rng))
+            pneumatic = draw(self.pneumatic1[phase], rng), draw(self.pneumatic2[phase], rng)
+            across = 0.0 if self.closed_loop_xy is None else draw(self.closed_loop_xy[phase], rng)
+            self._values[phase, :, lane] = (x, y, *pneumatic, across)
 
     def sample(self, time: Array) -> Array:
-        """Setpoints (6, N) at ``time`` (N,), s."""
-        rows = np.empty((6, time.shape[0]))
+        """Setpoints (7, N) at ``time`` (N,), s."""
+        rows = np.empty((7, time.shape[0]))
         _sample(time, self._starts, self._values, self.transition, rows)
         return rows
 
@@ -74,7 +82,7 @@ def _sample(time: Array, starts: Array, values: Array, transition: float, rows: 
         # Half a microsecond of grace: a phase that starts on a control instant starts there, whatever the rounding.
         while phase + 1 < starts.shape[0] and time[i] >= starts[phase + 1] - 5e-7:
             phase += 1
-        rows[0, i], rows[1, i] = values[phase, 0, i], values[phase, 1, i]
+        rows[0, i], rows[1, i], rows[6, i] = values[phase, 0, i], values[phase, 1, i], values[phase, 4, i]
         u = (time[i] - starts[phase]) / transition
         for k in range(2):
             now = values[phase, 2 + k, i]

@@ -54,7 +54,7 @@ def random_situations(
 def as_signals(s: dict[str, Array], rig: Parameters) -> tuple[Measurement, Reference]:
     """A random situation as the controller meets it."""
     reference = derived.cartesian(s["wanted"], rig)
-    reference.rows[8:] = np.concatenate([s["stiffness"], s["pneumatic_wanted"], s["pneumatic_rate"]])
+    reference.rows[8:14] = np.concatenate([s["stiffness"], s["pneumatic_wanted"], s["pneumatic_rate"]])
     return derived.seen(s["piston"], s["speed"], s["pressures"], rig), reference
 
 
@@ -327,9 +327,9 @@ def test_signals_over_different_lanes_are_refused() -> None:
         law.command(mixed[0], reference)
     with pytest.raises(ValueError, match=r"measurement.velocity has shape \(2, 1\); allowed: \(2, 3\)"):
         law.command(mixed[1], reference)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(14, 1\); allowed: \(14, 3\)"):
+    with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
         law.command(measured, fewer_wanted)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(8, 3\); allowed: \(14, 3\)"):
+    with pytest.raises(ValueError, match=r"reference.rows has shape \(8, 3\); allowed: \(15, 3\)"):
         law.command(measured, Reference(reference.rows[:8].copy()))
     for wrong in (believed[:, :1], believed[:1], believed[:, 0]):
         with pytest.raises(ValueError, match=r"believed_force has shape .*; allowed: \(2, 3\)"):

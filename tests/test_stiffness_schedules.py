@@ -19,7 +19,7 @@ TWO = ((0.0, 0.8), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
 
 
 def course(schedule, times, seed=0):
-    """(6, len(times)) of one lane, one instant per call."""
+    """(7, len(times)) of one lane, one instant per call."""
     schedule.prepare(1)
     schedule.begin(0, stream(seed, 0, "stiffness"))
     return np.stack([schedule.sample(np.array([t]))[:, 0] for t in times], axis=1)
@@ -73,8 +73,8 @@ def test_the_axes_may_differ_and_the_first_phase_starts_without_a_transition():
     schedule = StiffnessSchedule((0.0, 1.0), (1000.0, 2000.0), *TWO[2:], closed_loop_y=(3000.0, 4000.0))
     rows = course(schedule, [0.0, 0.2, 1.0])
     np.testing.assert_array_equal(rows[:2], [[1000, 1000, 2000], [3000, 3000, 4000]])
-    np.testing.assert_array_equal(rows[2:, 0], (4600, 2300, 0, 0))
-    np.testing.assert_array_equal(rows[2:, 1], (4600, 2300, 0, 0))
+    np.testing.assert_array_equal(rows[2:, 0], (4600, 2300, 0, 0, 0))
+    np.testing.assert_array_equal(rows[2:, 1], (4600, 2300, 0, 0, 0))
 
 
 def test_three_PHASES_each_go_on_from_the_one_before():
@@ -165,9 +165,13 @@ def test_impossible_schedules_are_refused_by_name(arguments, words):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (np.ones((4, 1)), ("stiffness.sample(time)", "(4, 1)", "(6, 1)")),
-        (np.full((6, 1), np.inf), ("stiffness.sample(time)[0, 0] = inf", "finite")),
-        (np.array([[2e3], [0.0], [4e3], [2e3], [0.0], [0.0]]), ("stiffness.sample(time = 0 s) = 0 N/m", "more than 0")),
+        (np.ones((4, 1)), ("stiffness.sample(time)", "(4, 1)", "(7, 1)")),
+        (np.full((7, 1), np.inf), ("stiffness.sample(time)[0, 0] = inf", "finite")),
+        (np.array([[2e3], [0.0], [4e3], [2e3], [0.0], [0.0], [0.0]]), ("stiffness.sample(time = 0 s) = 0 N/m", "more than 0")),
+        (
+            np.array([[2e3], [1e3], [4e3], [2e3], [0.0], [0.0], [2e3]]),
+            ("Kclxy = 2000 N/m", "below sqrt(Kclx Kcly)"),
+        ),
     ],
 )
 def test_wrong_answers_of_a_users_own_schedule_are_refused_by_name(rows, words):
@@ -180,3 +184,24 @@ def test_wrong_answers_of_a_users_own_schedule_are_refused_by_name(rows, words):
     assert all(word in str(refusal.value) for word in words), refusal.value
     with pytest.raises(ValueError, match=r"stiffness = 4000; allowed: None or a birthsim_env.*StiffnessSchedule"):
         gymnasium.make(CIRCLE, stiffness=4000)
+
+
+def test_a_coupling_of_x_and_y_is_drawn_and_reaches_info_and_reference():
+    schedule = StiffnessSchedule(
+        (0.0, 1.0), (3e3, 2e3), *TWO[2:], closed_loop_y=(1500.0, 1e3), closed_loop_xy=((700, 900), 0.0)
+    )
+    env = gymnasium.make("BirthSIM/Probe-v0", stiffness=schedule)
+    _, info = env.reset(seed=0)
+    coupling = float(env.unwrapped.reference.stiffness_coupling)
+    assert 700 <= coupling <= 900
+    for _ in range(350):
+        *_, info = env.step(env.action_space.sample() * 0)
+        stiffness = np.array([[3e3, coupling], [coupling, 1500.0]]) if info["time"] < 1 else np.diag([2e3, 1e3])
+        given = info["compliant_target"] - info["target"]
+        np.testing.assert_allclose(stiffness @ given, info["user_force"], atol=1e-9)
+    assert info["user_force"][0] > 10
+
+
+def test_a_coupling_that_is_not_positive_definite_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"closed_loop_xy -3000.0; allowed: below sqrt\(Kclx Kcly\)"):
+        StiffnessSchedule((0.0,), (2000.0,), (4600.0,), (2300.0,), closed_loop_xy=(-3000.0,))

@@ -1,0 +1,36 @@
+"""From wanted rates of force and pneumatic stiffness to spool openings: (10), the inverse A-T transform, the inverse valves."""
+
+from __future__ import annotations
+
+from birthsim_env import control_model, valves
+from birthsim_env import lanes as at
+from birthsim_env.compilation import helper
+from birthsim_env.lanes import Array
+
+
+@helper
+def two_valve_openings(
+    u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
+    length_p: float, length_n: float, v: float, p: Array,
+) -> None:  # fmt: skip
+    """Writes the openings of one cylinder's two valves, rows ``row`` and ``row + 1``, for the wanted dF/dt and dK/dt.
+
+    Where a valve saturates, both rates fall short: neither has priority (the paper's law).
+    """
+    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+    force = pp * ap - pn * an
+    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
+    active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
+    pressurization = control_model.pressurization_flow_for(
+        stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
+    )
+    flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
+    flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
+    # The controller measures no temperatures: all air counts as ambient.
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
+    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
+    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
