@@ -1,0 +1,147 @@
+"""A stiff loop that follows a reference motion through friction, as a kernel over lanes.
+
+The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
+    j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
+    L_i = F_i - Fext_i - Fv v_i + believed_i + m_e d_i
+with the believed force of ``reference_friction`` and the disturbance d of an observer.
+
+- While pistons rest (``observers``) errors within ``dead_zone`` move nothing, and once the reference rests the loop has a gain
+  of its own, softer: what noise a slow average leaves must not wear the friction down.
+- ``watch`` lowers c where the loop oscillates: the rig is then slower, lighter or held more stiffly than believed.
+- ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baselines.cartesian_law import across, along, load_rates, pressure_openings
+from birthsim_env import geometry, mechanics
+from birthsim_env import lanes as at
+from birthsim_env.compilation import helper, kernel
+from birthsim_env.lanes import Array
+
+MEMORY_NAMES = (
+    *("spool1P", "spool1N", "spool2P", "spool2N", "gain_share", "motion_share"),
+    *("extreme_t", "since_t", "last_peak_t", "extreme_n", "since_n", "last_peak_n"),
+)
+"""Rows of what a lane remembers: spools as believed, the share of c that oscillations have left, how far the reference was
+moving of late, and across and along cylinder 2 the largest speed error of this half wave (m/s), the time (s) since it
+began and the size of the last one."""
+MEMORY = len(MEMORY_NAMES)
+SPOOL, GAIN_SHARE, MOTION_SHARE, WATCH_T, WATCH_N = 0, 4, 5, 6, 9
+
+BELIEVED_LIMIT = 120.0
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
+
+MOTION_TIME = 0.1
+"""s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
+
+REST_PUSH = 2.0
+"""Weight of the position error while a piston rests: stiction, not inertia, has to be overcome. Found by trial."""
+
+HALF_WAVE = 0.2
+"""s: a longer half wave of the speed error is no oscillation of the loop."""
+
+SUSTAINED = 0.75
+"""A half wave of at least this share of the one before is sustained; a transient dies faster."""
+
+
+@helper
+def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> None:
+    """Lowers the gain share, by ``fall`` down to ``least``, at each sustained half wave of a speed error beyond ``level``."""
+    extreme = memory[row, i]
+    memory[row + 1, i] += period
+    if error * extreme < 0.0:
+        peak = abs(extreme) if memory[row + 1, i] < HALF_WAVE else 0.0
+        last = memory[row + 2, i]
+        if peak > level and last > 0.0 and peak > SUSTAINED * last:
+            memory[GAIN_SHARE, i] = max(least, fall * memory[GAIN_SHARE, i])
+        memory[row, i], memory[row + 1, i], memory[row + 2, i] = error, 0.0, peak
+    elif abs(error) > abs(extreme):
+        memory[row, i] = error
+
+
+@helper
+def lead(wanted: float, spool: float, kept: float, quickness: float) -> float:
+    """Opening command that takes a spool of known lag a share ``quickness`` of the way to ``wanted`` in one period.
+
+    ``kept`` is exp(-period/tau), the share of the way that the spool leaves by itself.
+    """
+    return max(-1.0, min(1.0, spool + quickness * (wanted - spool) / (1.0 - kept)))
+
+
+@helper
+def jerk_for(acceleration: float, speed: float, position: float, c: float) -> float:
+    """What errors of acceleration, speed and position take off the jerk with three equal gains c, m/s3."""
+    return 3.0 * c * acceleration + (3.0 * c * c + 2.0) * speed + (c * c + 2.0) * c * position
+
+
+@helper
+def beyond(error: float, zone: float) -> float:
+    """What of ``error`` exceeds +-``zone``."""
+    return error - max(-zone, min(zone, error))
+
+
+@kernel
+def command(
+    joints: Array, pressures: Array, motion: Array, target: Array, force: Array, believed: Array, disturbance: Array,
+    rest: Array, moving: Array, p: Array, period: float, gain: float, rest_gain: float, dead_zone: float, quickness: float,
+    level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
+) -> None:  # fmt: skip
+    """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
+
+    ``joints`` (4, N): y1, y2, v1, v2; ``motion`` (8, N) to follow; ``target`` (15, N) the reference; ``force`` (2, N) the
+    user's, N; ``believed`` (2, N), N, and ``disturbance`` (2, N), m/s2, along the pistons; ``rest`` (2, N); ``moving`` (N,).
+    """
+    u, kept = np.empty((4, 1)), math.exp(-period / p[at.TAU])
+    for i in range(joints.shape[1]):
+        y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
+        pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
+        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        turn = -2.0 * r4 * v1 / root
+        growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
+        unseen1 = believed[0, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, m * kappa * kappa * disturbance[0, i]))
+        unseen2 = believed[1, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, m * disturbance[1, i]))
+        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1 + unseen1
+        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2 + unseen2
+
+        # Across (t) and along (n) cylinder 2: errors of position, speed and acceleration.
+        ex, ey = r2 * sine - motion[0, i], -r2 * cosine - motion[1, i]
+        et, en = across(ex, ey, sine, cosine), along(ex, ey, sine, cosine)
+        dt = -kappa * v1 - across(motion[2, i], motion[3, i], sine, cosine)
+        dn = v2 - along(motion[2, i], motion[3, i], sine, cosine)
+        push_t, push_n = across(force[0, i], force[1, i], sine, cosine), along(force[0, i], force[1, i], sine, cosine)
+        at_ = (push_t - load1 / kappa) / m - gravity * sine - across(motion[4, i], motion[5, i], sine, cosine)
+        an_ = (push_n + load2) / m + gravity * cosine - along(motion[4, i], motion[5, i], sine, cosine)
+
+        watch(memory, WATCH_T, i, dt, period, level, fall, least)
+        watch(memory, WATCH_N, i, dn, period, level, fall, least)
+        memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * math.exp(-period / MOTION_TIME))
+        share = memory[GAIN_SHARE, i]
+        c = share * (rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i])
+        et = (1.0 + (REST_PUSH - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
+        en = (1.0 + (REST_PUSH - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
+        jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, c)
+        jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, c)
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        rate1 += p[at.FV1] * mechanics.acceleration1(
+            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity
+        )  # fmt: skip
+        rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, m, gravity)
+        pressure_openings(
+            u, 0, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p
+        )
+        pressure_openings(
+            u, 0, 2, rate2, target[11, i], target[13, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.HALF_L2], y2, v2, p
+        )
+        for valve in range(4):
+            spool = memory[SPOOL + valve, i]
+            opening = lead(u[valve, 0], spool, kept, quickness)
+            memory[SPOOL + valve, i] = kept * spool + (1.0 - kept) * opening
+            openings[valve, i] = opening
