@@ -42,6 +42,12 @@ REST_SPEED = 6e-3
 REST_TIME = 0.1
 """s: time constant at which it does."""
 
+RELUCTANCE = 5.0
+"""A full rest that ends by itself makes that time longer by so many times itself: what moves without being asked to is held by little friction."""
+
+TRUST_TIME = 20.0
+"""s: time constant at which that is forgotten."""
+
 INNOVATION_SHARE = 0.3
 """Of a new innovation in the low-passed one."""
 
@@ -53,13 +59,14 @@ STIR = 1.65
 def _update(
     estimate: Array, history: Array, slot: int, sampled: Array, position: Array, velocity: Array, age: Array, pressures: Array,
     p: Array, period: float, bandwidth: float, noise: float, force: Array, believed: Array, moving: Array, rest: Array,
-    innovations: Array, fresh: Array,
+    innovations: Array, reluctance: Array, fresh: Array,
 ) -> None:  # fmt: skip
     """One control period. ``estimate`` (6, N): y1, y2, v1, v2, d1, d2. ``history`` (H, 2, N): past y1, y2, ring at ``slot``.
 
     ``sampled`` (N,) time since the previous sample, s, zero where none is new; ``age`` (N,) of the newest sample, s;
     ``force`` (2, N) the user's, N, and ``believed`` (2, N), N along the pistons, as known; ``moving`` (N,) 1 where no piston
-    may rest; ``rest`` (2, N) how far each rests, 0 to 1; ``innovations`` (2, N) low-passed, m; ``fresh`` (N,) 1 at a new start.
+    may rest; ``rest`` (2, N) how far each rests, 0 to 1; ``innovations`` (2, N) low-passed, m; ``reluctance``
+    (2, N) factor of ``REST_TIME``; ``fresh`` (N,) 1 at a new start.
     """
     depth, held = history.shape[0], math.exp(-REST_BANDWIDTH * period)
     motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
@@ -72,6 +79,7 @@ def _update(
                 estimate[cylinder, i] = joints[cylinder, 0]
                 estimate[2 + cylinder, i] = joints[2 + cylinder, 0]
                 estimate[4 + cylinder, i], rest[cylinder, i], innovations[cylinder, i] = 0.0, 0.0, 0.0
+                reluctance[cylinder, i] = 1.0
                 for k in range(depth):
                     history[k, cylinder, i] = joints[cylinder, 0]
             continue
@@ -102,8 +110,9 @@ def _update(
             estimate[2 + cylinder, i] -= resting * (1.0 - held * held) * speed
             estimate[4 + cylinder, i] -= resting * (1.0 - held) ** 2 / period * speed
             slow = abs(estimate[2 + cylinder, i]) < REST_SPEED
-            calm = resting + (1.0 - resting) * min(period / REST_TIME, 1.0) if slow else resting
-            rest[cylinder, i] = (1.0 - moving[i]) * calm
+            reluctance[cylinder, i] += (1.0 - reluctance[cylinder, i]) * min(period / TRUST_TIME, 1.0)
+            settling = min(period / (REST_TIME * reluctance[cylinder, i]), 1.0)
+            rest[cylinder, i] = (1.0 - moving[i]) * (resting + (1.0 - resting) * settling if slow else resting)
         history[slot, 0, i] = estimate[0, i]
         history[slot, 1, i] = estimate[1, i]
         if sampled[i] > 0.0:
@@ -117,8 +126,10 @@ def _update(
                 innovation = joints[cylinder, 0] - (newer + part * (older - newer))
                 innovations[cylinder, i] += INNOVATION_SHARE * (innovation - innovations[cylinder, i])
                 explained = STIR * noise / (kappa if cylinder == 0 else 1.0)
-                resting = rest[cylinder, i] if abs(innovations[cylinder, i]) <= explained else 0.0
-                rest[cylinder, i] = resting
+                resting = rest[cylinder, i]
+                if abs(innovations[cylinder, i]) > explained:
+                    reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
+                    rest[cylinder, i], resting = 0.0, 0.0
                 kept = math.exp(-bandwidth * sampled[i])
                 to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - math.exp(-SLOW_BANDWIDTH * sampled[i]))
                 to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled[i]
@@ -179,7 +190,7 @@ class PistonObserver:
             self._history: Array = np.zeros((self._depth, 2, lanes))
             self._slot = 0
             self._fresh: Array = np.ones(lanes)
-            self.rest, self._innovations = np.zeros((2, lanes)), np.zeros((2, lanes))
+            self.rest, self._innovations, self._reluctance = np.zeros((2, lanes)), np.zeros((2, lanes)), np.ones((2, lanes))
             self._last: Array = measurement.position_time.copy()
         self._slot = (self._slot + 1) % self._depth
         sampled = measurement.position_time - self._last
@@ -189,7 +200,8 @@ class PistonObserver:
             self._estimate, self._history, self._slot, sampled, measurement.position, measurement.velocity, age,
             measurement.pressures, self._p, self._period, self._bandwidth, self._noise,
             np.zeros((2, lanes)) if force is None else force, np.zeros((2, lanes)) if believed is None else believed,
-            np.ones(lanes) if moving is None else moving, self.rest, self._innovations, self._fresh,
+            np.ones(lanes) if moving is None else moving, self.rest, self._innovations, self._reluctance,
+            self._fresh,
         )  # fmt: skip
         self._last = measurement.position_time.copy()
         self._fresh[:] = 0.0

@@ -19,7 +19,7 @@ from birthsim_env.signals import Mask
 def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, period: float) -> float:
     """Deflection after one period at a piston's ``speed``, m."""
     level = friction.stribeck_level(speed, coulomb, static, p[at.STRIBECK])
-    most = level / p[at.BRISTLE_S0]
+    most: float = level / p[at.BRISTLE_S0]
     deflection: float = z + period * friction.bristle_rate(speed, z, level, p[at.BRISTLE_S0])
     return max(-most, min(most, deflection))
 
