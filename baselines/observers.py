@@ -43,7 +43,7 @@ REST_TIME = 0.1
 """s: time constant at which it does."""
 
 RELUCTANCE = 5.0
-"""A full rest that ends by itself makes that time longer by so many times itself: what moves without being asked to is held by little friction."""
+"""By so many times itself a full rest that ends by itself makes that time longer: what moves unasked has little friction."""
 
 TRUST_TIME = 20.0
 """s: time constant at which that is forgotten."""
