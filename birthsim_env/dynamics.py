@@ -18,31 +18,34 @@ INTEGRATION_STEP = 0.25e-3
 
 
 @helper
-def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
-    """Mass flow from the supply into a chamber given by its state rows, kg/s."""
-    c = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
-    inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
-    return valves.orifice_flow(c, p[at.SUPPLY, i], source, x[pressure, i], inside, p[at.CRITICAL, i])
+def outer_factor(p: Array, i: int) -> float:
+    """Density factor of supply and surroundings, which are equally warm, kg/m3."""
+    return valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
 
 
 @helper
-def exhausted_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
-    """Mass flow from a chamber given by its state rows to the atmosphere, kg/s."""
-    c = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+def orifice_flows(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int, outer: float) -> tuple[float, float]:
+    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s."""
     inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
-    return valves.orifice_flow(c, x[pressure, i], inside, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
+    supply = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    exhaust = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    supplied = valves.orifice_flow(supply, p[at.SUPPLY, i], outer, x[pressure, i], inside, p[at.CRITICAL, i])
+    return supplied, valves.orifice_flow(exhaust, x[pressure, i], inside, p[at.ATMOSPHERE, i], outer, p[at.CRITICAL, i])
+
+
+@helper
+def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
+    """Mass flow from the supply into a chamber given by its state rows, kg/s."""
+    return orifice_flows(x, p, i, pressure, temperature, spool, outer_factor(p, i))[0]
 
 
 @helper
 def chamber_rates(
     x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, spool: int, area: int, perimeter: int,
-    length: float, length_rate: float,
+    length: float, length_rate: float, outer: float,
 ) -> None:  # fmt: skip
     """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
-    supplied = supplied_flow(x, p, i, pressure, temperature, spool)
-    exhausted = exhausted_flow(x, p, i, pressure, temperature, spool)
+    supplied, exhausted = orifice_flows(x, p, i, pressure, temperature, spool, outer)
     t, wall = x[temperature, i], p[at.TEMPERATURE, i]
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
     heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
@@ -67,15 +70,16 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
         s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
         level1 = friction.stribeck_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
         level2 = friction.stribeck_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
-        dz1 = friction.bristle_rate(v1, x[at.Z1, i], level1, s0)
-        dz2 = friction.bristle_rate(v2, x[at.Z2, i], level2, s0)
-        lugre1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
-        lugre2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
+        is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+        breakaway, steepness = p[at.BREAKAWAY, i], p[at.STEEPNESS, i]
+        dz1 = friction.bristle_rate_by_law(v1, x[at.Z1, i], level1, s0, is_lugre, breakaway, steepness)
+        dz2 = friction.bristle_rate_by_law(v2, x[at.Z2, i], level2, s0, is_lugre, breakaway, steepness)
+        bristle1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
+        bristle2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
         coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SPEED, i])
         coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SPEED, i])
-        is_lugre = p[at.LUGRE, i] > 0.5
-        friction1 = lugre1 if is_lugre else coulomb1
-        friction2 = lugre2 if is_lugre else coulomb2
+        friction1 = bristle1 if is_bristle else coulomb1
+        friction2 = bristle2 if is_bristle else coulomb2
 
         force1 = (
             mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
@@ -93,13 +97,14 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
         dx[at.V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS, i], p[at.GRAVITY, i])
         dx[at.Y2, i] = v2
         dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.MASS, i], p[at.GRAVITY, i])
-        dx[at.Z1, i] = dz1 if is_lugre else 0.0
-        dx[at.Z2, i] = dz2 if is_lugre else 0.0
+        dx[at.Z1, i] = dz1 if is_bristle else 0.0
+        dx[at.Z2, i] = dz2 if is_bristle else 0.0
 
-        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
-        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
-        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
-        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+        outer = outer_factor(p, i)
+        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1, outer)
+        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1, outer)
+        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2, outer)
+        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2, outer)
         dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) / p[at.TAU, i]
         dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) / p[at.TAU, i]
         dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) / p[at.TAU, i]
@@ -149,14 +154,11 @@ def derivatives(state: Array, command: Array, force: Array, parameters: Array, r
 def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
     """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
     for i in range(state.shape[1]):
-        flows[0, i] = supplied_flow(state, parameters, i, at.PP1, at.TP1, at.S1P)
-        flows[1, i] = supplied_flow(state, parameters, i, at.PN1, at.TN1, at.S1N)
-        flows[2, i] = supplied_flow(state, parameters, i, at.PP2, at.TP2, at.S2P)
-        flows[3, i] = supplied_flow(state, parameters, i, at.PN2, at.TN2, at.S2N)
-        flows[4, i] = exhausted_flow(state, parameters, i, at.PP1, at.TP1, at.S1P)
-        flows[5, i] = exhausted_flow(state, parameters, i, at.PN1, at.TN1, at.S1N)
-        flows[6, i] = exhausted_flow(state, parameters, i, at.PP2, at.TP2, at.S2P)
-        flows[7, i] = exhausted_flow(state, parameters, i, at.PN2, at.TN2, at.S2N)
+        outer = outer_factor(parameters, i)
+        flows[0, i], flows[4, i] = orifice_flows(state, parameters, i, at.PP1, at.TP1, at.S1P, outer)
+        flows[1, i], flows[5, i] = orifice_flows(state, parameters, i, at.PN1, at.TN1, at.S1N, outer)
+        flows[2, i], flows[6, i] = orifice_flows(state, parameters, i, at.PP2, at.TP2, at.S2P, outer)
+        flows[3, i], flows[7, i] = orifice_flows(state, parameters, i, at.PN2, at.TN2, at.S2N, outer)
 
 
 @helper

@@ -36,8 +36,9 @@ def _balance(state: Array, stiffness: Array, p: Array) -> None:
             y = state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]
             speed = state[v, i]
             level = friction.stribeck_level(speed, p[fc, i], p[fs, i], p[at.STRIBECK, i])
-            bristle = friction.steady_deflection(speed, level, p[at.BRISTLE_S0, i]) if p[at.LUGRE, i] > 0.5 else 0.0
-            sliding = level if p[at.LUGRE, i] > 0.5 else p[fc, i]
+            has_bristle = p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+            bristle = friction.steady_deflection(speed, level, p[at.BRISTLE_S0, i]) if has_bristle else 0.0
+            sliding = level if has_bristle else p[fc, i]
             drag = (math.copysign(sliding, speed) if speed != 0.0 else 0.0) + p[fv, i] * speed
             weight = weight1 if cylinder == 0 else weight2
             force = p[at.ATMOSPHERE, i] * (ap - an) + drag - weight

@@ -33,6 +33,7 @@ PARAMETER_NAMES = (
     *("d_squares", "d_product", "sin_gamma3", "cos_gamma3", "k1", "k2", "half_l1", "half_l2"),
     *("mass", "gravity", "stop_stiffness", "stop_damping"),
     *("lugre", "fc1", "fc2", "fs1", "fs2", "fv1", "fv2", "stribeck", "s0", "s1", "sign_speed"),
+    *("elasto_plastic", "breakaway", "steepness"),
     *("area_p1", "area_n1", "area_p2", "area_n2", "perimeter1", "perimeter2", "dead_volume", "h_wall", "g12"),
     *("conductance", "critical", "leakage", "tau", "supply", "atmosphere", "temperature"),
     *("gas", "gamma", "index", "rho0", "t0"),
@@ -62,6 +63,9 @@ PARAMETERS = len(PARAMETER_NAMES)
     BRISTLE_S0,
     BRISTLE_S1,
     SIGN_SPEED,
+    ELASTO_PLASTIC,
+    BREAKAWAY,
+    STEEPNESS,
     AREA_P1,
     AREA_N1,
     AREA_P2,
@@ -89,7 +93,8 @@ PARAMETERS = len(PARAMETER_NAMES)
 def parameter_column(parameters: Parameters) -> Array:
     """One lane's column of the parameter array: (PARAMETERS,), SI units.
 
-    ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` is 1 for LuGre friction and 0 for Coulomb.
+    ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` and ``elasto_plastic`` are 1 for the friction law of that
+    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway).
     """
     g, c1, c2, m = parameters.geometry, parameters.cylinder1, parameters.cylinder2, parameters.mechanics
     f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
@@ -100,6 +105,7 @@ def parameter_column(parameters: Parameters) -> Array:
         *(m.mass, m.gravity, m.stop_stiffness, m.stop_damping),
         *(float(f.law == "lugre"), fc1, fc2, f.static_ratio * fc1, f.static_ratio * fc2),
         *(c1.viscous_friction, c2.viscous_friction, f.stribeck_speed, f.bristle_stiffness, f.bristle_damping, f.sign_speed),
+        *(float(f.law == "elasto_plastic"), f.breakaway_ratio, 1 / (1 - f.breakaway_ratio)),
         *(c1.area_p, c1.area_n, c2.area_p, c2.area_n, np.pi * c1.piston_diameter, np.pi * c2.piston_diameter),
         *(ch.dead_volume, ch.wall_heat_transfer, ch.piston_conductance),
         *(conductance, v.critical_ratio, v.leakage_ratio * conductance, v.time_constant),

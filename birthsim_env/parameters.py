@@ -74,11 +74,19 @@ class Mechanics(Part):
 class Friction(Part):
     """Friction law of both pistons; the Coulomb and viscous levels belong to each cylinder."""
 
-    law: str = quantity("lugre", "-", "LuGre (Canudas de Wit 1995) or the paper's (4)", choices=("lugre", "coulomb"))
+    law: str = quantity(
+        "lugre",
+        "-",
+        "LuGre (Canudas de Wit 1995), the paper's (4), or elasto-plastic without presliding drift (Dupont 2002)",
+        choices=("lugre", "coulomb", "elasto_plastic"),
+    )
     static_ratio: float = quantity(1.33, "-", "assumed; Fs/Fc", least=1)
     stribeck_speed: float = quantity(0.015, "m/s", "assumed", above=0)
     bristle_stiffness: float = quantity(5e4, "N/m", "assumed; s0", above=0, most=5e5)
     bristle_damping: float = quantity(150.0, "N s/m", "assumed; s1", least=0, most=2000)
+    breakaway_ratio: float = quantity(
+        0.7, "-", "assumed; z_ba/z_ss, elasto-plastic law only: below this share of the level it is a spring", above=0, most=0.9
+    )
     sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001)
 
 
@@ -191,7 +199,7 @@ class Parameters:
     def _check_stability(self) -> None:
         f, viscous = self.friction, max(self.cylinder1.viscous_friction, self.cylinder2.viscous_friction)
         coulomb = max(self.cylinder1.coulomb_friction, self.cylinder2.coulomb_friction)
-        damping = viscous + (f.bristle_damping if f.law == "lugre" else coulomb / f.sign_speed)
+        damping = viscous + (coulomb / f.sign_speed if f.law == "coulomb" else f.bristle_damping)
         if damping / self.mechanics.mass > FASTEST_RATE:
             raise ValueError(
                 f"Mechanics.mass = {self.mechanics.mass!r} is impossible with this friction; allowed: at least "

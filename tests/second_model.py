@@ -29,7 +29,8 @@ def constants(rig: Parameters) -> tuple[Array, ...]:
     sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
     pistons = np.array([(*size, c.coulomb_friction, c.viscous_friction) for size, c in zip(sizes, cylinders, strict=True)])
     bristle = f.bristle_stiffness, f.bristle_damping
-    law = np.array([f.law == "lugre", f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed], dtype=float)
+    number = ("coulomb", "lugre", "elasto_plastic").index(f.law)
+    law = np.array([number, f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio], dtype=float)
     heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
     valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
     around = air.supply_pressure, air.atmospheric_pressure, air.temperature
@@ -49,6 +50,17 @@ def orifice(conductance: float, p_up: float, t_up: float, p_down: float, b: floa
     else:
         psi = np.sqrt(1 - ((0.99 - b) / (1 - b)) ** 2) * (1 - x) * 100
     return conductance * rho * p_up * np.sqrt(t_ref / t_up) * psi
+
+
+@numba.njit
+def plastic_share(z: float, v: float, steady: float, breakaway: float) -> float:
+    """alpha of the elasto-plastic law: where the bristle leans the way it moves, a cubic from z_ba to z_ss."""
+    if z * v <= 0 or abs(z) <= breakaway * steady:
+        return 0.0
+    if abs(z) >= steady:
+        return 1.0
+    s = (abs(z) - breakaway * steady) / (steady - breakaway * steady)
+    return 3 * s**2 - 2 * s**3
 
 
 @numba.njit
@@ -102,9 +114,10 @@ def rates(
             ds[8 + k] = enthalpy_rate - p * rate[side] + warming
             ds[14 + k] = (command[k] - spool) / valve[3]
 
-        if law[0] == 1.0:
+        if law[0] > 0:
             level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
-            sliding = v - law[3] * abs(v) / level * s[12 + c]
+            alpha = 1.0 if law[0] == 1 else plastic_share(s[12 + c], v, level / law[3], law[6])
+            sliding = v - alpha * law[3] * abs(v) / level * s[12 + c]
             ds[12 + c] = sliding
             rubbing = law[3] * s[12 + c] + law[4] * sliding + fv * v
         else:

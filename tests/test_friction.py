@@ -1,5 +1,7 @@
 """Friction: LuGre (Canudas de Wit et al. 1995) and the paper's (4), against the textbook equations written afresh here.
 
+What the elasto-plastic law shares with LuGre is tested here too; what sets it apart in ``test_elasto_plastic.py``.
+
 The force that the plant applies is measured from its accelerations: friction is what is missing compared with a rig
 without friction in the same state.
 """
@@ -77,10 +79,11 @@ def test_lugre_follows_the_textbook_along_a_motion(amplitude: float, frequency: 
         np.testing.assert_allclose(force[:, 0], wanted, rtol=0, atol=1e-9)
 
 
-def test_steady_sliding_is_on_the_stribeck_curve() -> None:
+@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
+def test_steady_sliding_is_on_the_stribeck_curve(law: str) -> None:
     """Including speeds above the rate limit of the bristle, which must not change the steady force."""
     speeds = np.concatenate([-np.geomspace(1e-3, 6, 25), np.geomspace(1e-3, 6, 25)])
-    plant, z = PlantFriction(50), np.zeros((2, 50))
+    plant, z = PlantFriction(50, {"friction.law": law}), np.zeros((2, 50))
     v = np.stack([speeds, speeds])
     step = 0.05 / np.maximum(S0 * np.abs(v) / FS[0], 1.0)
     for _ in range(1500):
@@ -106,9 +109,10 @@ def test_rate_is_textbook_below_the_limit_and_limited_above(v: float, z: float, 
         assert rate == pytest.approx(8000 * toward, rel=1e-6, abs=1e-9)
 
 
-def test_presliding_stiffness_is_s0() -> None:
+@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
+def test_presliding_stiffness_is_s0(law: str) -> None:
     """A tenth of a micrometre at 1 um/s: the first stretch of the spring, without noticeable damping."""
-    plant, speed, z = PlantFriction(1), np.full((2, 1), 1e-6), np.zeros((2, 1))
+    plant, speed, z = PlantFriction(1, {"friction.law": law}), np.full((2, 1), 1e-6), np.zeros((2, 1))
     for _ in range(100):
         z = z + 1e-3 * plant(speed, z)[1]
     force, _ = plant(speed, z)
@@ -135,9 +139,10 @@ def test_a_push_below_the_breakaway_force_gives_and_springs_back() -> None:
     assert plant.state[Y2, 0] > 1e-3, "30 N break it away"
 
 
-def test_bristle_stays_bounded_by_the_breakaway_deflection() -> None:
+@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
+def test_bristle_stays_bounded_by_the_breakaway_deflection(law: str) -> None:
     lanes, rng = 200, np.random.default_rng(7)
-    plant, largest = Plant(num_envs=lanes), 0.0
+    plant, largest = Plant(Parameters().replace({"friction.law": law}), lanes), 0.0
     for _ in range(100):
         plant.advance(rng.uniform(-1, 1, (4, lanes)), rng.uniform(-150, 150, (5, 2, lanes)), 0.01)
         largest = np.maximum(largest, np.abs(plant.state[[Z1, Z2]]).max(axis=1))
@@ -173,11 +178,11 @@ def test_piston_coasts_as_long_as_coulomb_and_viscous_friction_let_it() -> None:
     assert abs(plant.state[V2, 0]) < 0.001
 
 
-@pytest.mark.parametrize("law", ["lugre", "coulomb"])
+@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
 def test_no_friction_when_switched_off(law: str) -> None:
     plant = PlantFriction(3, {**NO_FRICTION, "friction.law": law})
     force, _ = plant(np.array([[-0.7, 0.0, 2.5]] * 2), np.zeros((2, 3)))
-    assert np.abs(force).max() <= (1e-7 if law == "lugre" else 0.0)
+    assert np.abs(force).max() <= (0.0 if law == "coulomb" else 1e-7)
 
 
 def test_frictionless_rig_keeps_its_energy() -> None:
@@ -211,9 +216,10 @@ def test_steady_friction_takes_energy_at_every_speed(v: float, cylinder: int) ->
     assert v == 0 or lugre * v > least
 
 
-def test_friction_takes_energy_over_a_cycle() -> None:
-    """Work of both LuGre pistons over closed cycles of position is positive, from presliding to gross sliding."""
-    plant = PlantFriction(6)
+@pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
+def test_friction_takes_energy_over_a_cycle(law: str) -> None:
+    """Work of both pistons over closed cycles of position is positive, from presliding to gross sliding."""
+    plant = PlantFriction(6, {"friction.law": law})
     amplitude = np.array([1e-5, 1e-4, 4e-4, 1e-3, 1e-2, 1e-1])
     z, work, step = np.zeros((2, 6)), np.zeros((2, 6)), 2e-5
     for k in range(50000):

@@ -33,6 +33,8 @@ DESIGN_RANGES = {
 }
 """Design section 4, the figures in brackets."""
 
+LAWS = ["lugre", "coulomb", "elasto_plastic"]
+
 UNITS = {"m", "rad", "N", "N s/m", "kg", "m/s2", "N/m", "s/m", "m/s", "-", "m3", "W/(m2 K)", "W/K", "m3/(s Pa)", "s", "Pa", "K"}
 UNITS |= {"J/(kg K)", "kg/m3", "Hz"}
 
@@ -82,7 +84,9 @@ IMPOSSIBLE = [
     ("mechanics.gravity", -9.81, "Mechanics.gravity = -9.81 is impossible; allowed: a finite number >= 0 (m/s2)"),
     ("cylinder1.stroke", -0.2, "Cylinder.stroke = -0.2"),
     ("cylinder2.rod_diameter", 0.025, "Cylinder.rod_diameter = 0.025 is impossible; allowed: less than piston_diameter"),
-    ("friction.law", "viscous", "Friction.law = 'viscous' is impossible; allowed: one of 'lugre', 'coulomb'"),
+    ("friction.law", "viscous", "Friction.law = 'viscous' is impossible; allowed: one of 'lugre', 'coulomb', 'elasto_plastic'"),
+    ("friction.breakaway_ratio", 0, "Friction.breakaway_ratio = 0 is impossible; allowed: a finite number > 0 and <= 0.9 (-)"),
+    ("friction.breakaway_ratio", 0.95, "Friction.breakaway_ratio = 0.95 is impossible"),
     ("friction.static_ratio", 0.9, "Friction.static_ratio = 0.9"),
     ("valves.critical_ratio", 1.0, "Valves.critical_ratio = 1.0 is impossible; allowed: a finite number >= 0 and <= 0.9"),
     ("valves.time_constant", 1e-5, "Valves.time_constant = 1e-05"),
@@ -120,7 +124,7 @@ def test_replace_changes_what_it_names_only() -> None:
     )
 
 
-@given(mass=st.floats(2, 5), gamma3=st.floats(-3, 3), volume=st.floats(5e-6, 25e-6), law=st.sampled_from(["lugre", "coulomb"]))
+@given(mass=st.floats(2, 5), gamma3=st.floats(-3, 3), volume=st.floats(5e-6, 25e-6), law=st.sampled_from(LAWS))
 def test_toml_file_gives_the_same_rig_back(tmp_path_factory: Any, mass: float, gamma3: float, volume: float, law: str) -> None:
     changes = {"mechanics.mass": mass, "geometry.gamma3": gamma3, "chambers.dead_volume": volume, "friction.law": law}
     rig, path = Parameters().replace(changes), tmp_path_factory.mktemp("rig") / "rig.toml"
@@ -166,8 +170,11 @@ def test_columns_of_the_kernels_follow_their_names() -> None:
     column = dict(zip(PARAMETER_NAMES, parameter_column(rig), strict=True))
     expected = {"mass": 4.5, "fc1": 10, "fs1": 15, "fc2": 15, "fs2": 22.5, "k1": 0.43, "half_l2": 0.2, "gamma": 1.4}
     expected |= {"d_squares": 0.35**2 + 0.25**2, "d_product": 2 * 0.35 * 0.25, "perimeter1": math.pi * 0.025}
-    expected |= {"leakage": 0.005 * 3.9e-9, "index": 1.2}
+    expected |= {"leakage": 0.005 * 3.9e-9, "index": 1.2, "breakaway": 0.7, "steepness": 1 / 0.3}
     assert {name: column[name] for name in expected} == pytest.approx(expected, rel=1e-14)
+    for law in LAWS:
+        column = dict(zip(PARAMETER_NAMES, parameter_column(rig.replace({"friction.law": law})), strict=True))
+        assert (column["lugre"], column["elasto_plastic"]) == (law == "lugre", law == "elasto_plastic")
     both = parameter_array([Parameters(), rig], 2)
     np.testing.assert_array_equal(both, np.stack([parameter_column(Parameters()), parameter_column(rig)], axis=1))
     np.testing.assert_array_equal(parameter_array(rig, 3), np.repeat(both[:, 1:], 3, axis=1))
@@ -179,6 +186,7 @@ def test_columns_of_the_kernels_follow_their_names() -> None:
         ({"chambers.dead_volume": 4e-6}, r"Chambers.dead_volume = 4e-06 is impossible; allowed: at least 4\.91e-06 m3"),
         ({"cylinder2.piston_diameter": 0.05}, r"Chambers.dead_volume = 1e-05 is impossible; allowed: at least 1\.96e-05 m3"),
         ({"mechanics.mass": 0.01}, r"Mechanics.mass = 0.01 is impossible with this friction; allowed: at least 0\.0264 kg"),
+        ({"friction.law": "elasto_plastic", "mechanics.mass": 0.01}, r"this friction; allowed: at least 0\.0264 kg"),
         ({"friction.law": "coulomb", "mechanics.mass": 1.0}, r"Mechanics.mass = 1.0 is impossible with this friction"),
         ({"chambers.wall_heat_transfer": 1e6}, "Chambers.wall_heat_transfer = 1000000.0 is impossible; allowed: .*<= 10000"),
     ],

@@ -29,8 +29,8 @@ RANDOMIZED = {
 
 def varied_rigs(lanes: int, rng: np.random.Generator) -> list[Parameters]:
     draws = {name: rng.uniform(*limits, lanes) for name, limits in RANDOMIZED.items()}
-    laws = {"friction.law": ["lugre", "coulomb"]}
-    changes = ({**{k: float(v[i]) for k, v in draws.items()}, **{k: v[i % 2] for k, v in laws.items()}} for i in range(lanes))
+    laws = ["lugre", "coulomb", "elasto_plastic"]
+    changes = ({**{k: float(v[i]) for k, v in draws.items()}, "friction.law": laws[i % 3]} for i in range(lanes))
     return [Parameters().replace(change) for change in changes]
 
 

@@ -31,6 +31,8 @@ DEMANDING_RIG = {
     **{"chambers.dead_volume": 5e-6, "chambers.wall_heat_transfer": 100.0, "valves.time_constant": 0.0015},
 }
 """A corner of the ranges of domain randomisation: light, tight and quick, so that the integrator has least to spare."""
+ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}
+LATE_BREAKAWAY = {**ELASTO_PLASTIC, "friction.breakaway_ratio": 0.9}
 
 _rng = np.random.default_rng(0)
 JERKS = [(_rng.uniform(0.4, 1), _rng.uniform(-80, 80, 2)) for _ in range(PERIODS)]
@@ -88,6 +90,9 @@ CASES = {
     "other rig, stick-slip": (OTHER_RIG, stick_slip, 1, (2e-8, 1e-7)),
     "other rig, strong": (OTHER_RIG, strong, 1, (1e-7, 1e-6)),
     "demanding rig, strong": (DEMANDING_RIG, strong, 1, (3e-7, 2e-6)),
+    "elasto-plastic, stick-slip": (ELASTO_PLASTIC, stick_slip, 1, (5e-9, 3e-8)),
+    "elasto-plastic, other rig, strong": ({**OTHER_RIG, **LATE_BREAKAWAY}, strong, 1, (1.5e-7, 1e-6)),
+    "elasto-plastic, demanding rig, strong": ({**DEMANDING_RIG, **ELASTO_PLASTIC}, strong, 1, (1e-7, 1e-6)),
     "Coulomb, stick-slip": ({"friction.law": "coulomb"}, stick_slip, 1, (1e-7, 1e-6)),
     # The corners of sign(v) in (4) cost the default step more; smaller steps show that nothing else differs.
     "Coulomb, strong": ({"friction.law": "coulomb"}, strong, 1, (5e-6, 2e-5)),
@@ -109,7 +114,7 @@ def test_plant_moves_like_the_second_model(
         assert np.all(np.abs(speeds).max(axis=0) > [0.5, 0.7])
 
 
-@pytest.mark.parametrize("law", ["lugre", "coulomb"])
+@pytest.mark.parametrize("law", ["lugre", "coulomb", "elasto_plastic"])
 def test_fourth_order_where_the_motion_is_smooth(law: str) -> None:
     """No reversal, no spool through zero, no pressure ratio through 0.3 or 0.99: halving the step leaves 1/16 of the error."""
     rig = Parameters().replace({"friction.law": law})
