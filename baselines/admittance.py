@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from baselines.controller import require_stiffness
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters
@@ -79,8 +80,10 @@ class Admittance:
     def update(self, measurement: Measurement, reference: Reference) -> Array:
         """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
 
-        Called once per control period, with signals over N lanes.
+        Called once per control period, with signals over N lanes. Raises ``ValueError`` for a stiffness that is not positive
+        definite.
         """
+        require_stiffness(reference, 0.0)
         lanes = reference.rows.shape[1]
         if self._offset.shape[1] != lanes:
             self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)

@@ -11,6 +11,7 @@ import numpy as np
 from baselines import admittance_law
 from baselines.admittance import Admittance
 from baselines.backstepping import PNEUMATIC_GAIN
+from baselines.controller import lanes_of
 from baselines.disturbance_observer import DisturbanceObserver
 from baselines.observers import PistonObserver
 from baselines.reference_friction import ReferenceFriction
@@ -78,6 +79,8 @@ class AdmittanceBackstepping:
                 raise ValueError(f"{name} = {value!r} is no gain of {type(self).__name__}; allowed: {', '.join(self.TUNABLE)}")
             if not (math.isfinite(value) and (value > 0 or (name == "dead_zone" and value == 0))):
                 raise ValueError(f"{name} = {value!r}; allowed: a positive number")
+        if gains.get("yielding", 1.0) > 1:
+            raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
         self._period = self.parameters.electronics.control_period
@@ -106,11 +109,12 @@ class AdmittanceBackstepping:
     def command(self, measurement: Measurement, reference: Reference) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes.
+        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness
+        setpoint that is not positive definite.
         """
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference))[:, 0]
-        lanes = measurement.position.shape[1]
+        lanes = lanes_of(measurement, reference)
         if self._memory.shape[1] != lanes:
             self._memory = np.zeros((admittance_law.MEMORY, lanes))
             self._memory[admittance_law.GAIN_SHARE] = 1.0

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from baselines import backstepping_law
-from baselines.observers import PistonObserver
-from birthsim_env.compilation import kernel
-from birthsim_env.inverse_kinematics import piston_motion
+from baselines.controller import lanes_of
+from baselines.gains import gains_for
+from baselines.observers import PistonObserver, measured_joints
+from birthsim_env.actuation import VALVE_LAYOUTS
+from birthsim_env.geometry import jacobian
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference, one_lane
+from birthsim_env.signals import Mask, Measurement, Reference, one_lane
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -21,15 +25,23 @@ SIGN_WIDTH = 0.002
 """m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
 
 
-@kernel
-def _measured_joints(position: Array, velocity: Array, p: Array, joints: Array) -> None:
-    motion, one = np.empty((4, 1)), np.empty((4, 1))
-    for i in range(position.shape[1]):
-        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
-        motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
-        piston_motion(motion, p, one, 1)
-        for row in range(4):
-            joints[row, i] = one[row, 0]
+@dataclass(frozen=True)
+class LawTerms:
+    """What the law knows and wants at one instant in N lanes; the second-last axis counts cylinders 1 and 2. SI units.
+
+    ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated; ``wanted`` (8, N): yd1, yd2 and their three derivatives;
+    ``gains`` (3, 2, N): c1, c2, c3, and ``gain_rates`` their rates at constant setpoints, since they follow the pose;
+    ``wanted_force`` F* (2, N); the rates that the law asks for, ``force_rate`` dF/dt (2, N) and ``pneumatic_stiffness_rate``
+    dK/dt (2, N).
+    """
+
+    joints: Array
+    wanted: Array
+    gains: Array
+    gain_rates: Array
+    wanted_force: Array
+    force_rate: Array
+    pneumatic_stiffness_rate: Array
 
 
 class BacksteppingController:
@@ -40,9 +52,19 @@ class BacksteppingController:
         weight_compensation: put (14), weight and centrifugal force on cylinder 2, back into the model (the paper's section VI).
         pneumatic_gain: c4, 1/s, of the pneumatic stiffness.
         sign_width: speed, m/s, over which the sign of (4) is smoothed.
+        damping_ratio: zeta of the damping B = 2 zeta sqrt(K m_e) that slow pushes meet beside the stiffness K, whatever K is at
+            the time; m_e is the mass that moves, m at the end effector. None: equal gains, the least damped, with a zeta of
+            about 0.8. More takes a larger sum c1 + c2 + c3, and a slow valve bears no more than it must: the law takes
+            c1 = c3 > c2, which makes the sum as small as it can be (``gains.gains_for``). With valves of 4 ms up to 4000 N/m a
+            ratio of 2 is rendered, one of 3 no longer.
+        frozen_friction: leave the part of the Coulomb friction out of dF*/dt. At rest the model's acceleration, which does not
+            know the hand, is not zero and would make that part render a stiffness 25 to 90 % too high.
+        valves: ``two_valves`` per cylinder, or ``one_valve``, a 5/3 valve that gives chamber N minus the opening of chamber P
+            and leaves the pneumatic stiffness to itself (section VI). An environment with one valve per cylinder takes rows
+            0 and 2 of the openings as its action.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds.
-    Raises ``ValueError`` for gains that are not positive.
+    Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
     """
 
     def __init__(
@@ -51,13 +73,27 @@ class BacksteppingController:
         weight_compensation: bool = False,
         pneumatic_gain: float = PNEUMATIC_GAIN,
         sign_width: float = SIGN_WIDTH,
+        damping_ratio: float | None = None,
+        frozen_friction: bool = False,
+        valves: str = "two_valves",
     ) -> None:
-        for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width)):
+        ratio = 1.0 if damping_ratio is None else damping_ratio
+        for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value!r}; allowed: a positive number")
+        if valves not in VALVE_LAYOUTS:
+            raise ValueError(f"valves = {valves!r}; allowed: {', '.join(VALVE_LAYOUTS)}")
         self.parameters = load_parameters(parameters)
+        self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
+        self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
         self._p = parameter_column(self.parameters)
-        self._options = (float(pneumatic_gain), float(sign_width), float(bool(weight_compensation)))
+        self._options: Array = np.empty(backstepping_law.OPTIONS)
+        self._options[backstepping_law.PNEUMATIC_GAIN] = pneumatic_gain
+        self._options[backstepping_law.SIGN_WIDTH] = sign_width
+        self._options[backstepping_law.WEIGHT] = self.weight_compensation
+        self._options[backstepping_law.COULOMB_RATE] = not frozen_friction
+        self._options[backstepping_law.DAMPING_RATIO] = damping_ratio or 0.0
+        self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
         self._observer = PistonObserver(self.parameters, self._p)
 
     def reset(self, lanes: Mask | None = None) -> None:
@@ -68,29 +104,62 @@ class BacksteppingController:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
         ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons.
-        Raises ``ValueError`` for signals over different numbers of lanes.
+        Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that no positive gains render,
+        naming the lane and what is allowed there.
         """
         if measurement.position.ndim == 1:
             told = None if believed_force is None else np.asarray(believed_force, dtype=np.float64)[..., None]
             return self.command(*one_lane(measurement, reference), told)[:, 0]
-        lanes = measurement.position.shape[1]
-        believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
-        for name, signal, rows in (
-            ("measurement.position", measurement.position, 2),
-            ("measurement.velocity", measurement.velocity, 2),
-            ("measurement.pressures", measurement.pressures, 4),
-            ("reference.rows", reference.rows, REFERENCES),
-            ("believed_force", believed, 2),
-        ):
-            if signal.shape != (rows, lanes):
-                raise ValueError(
-                    f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
-                )
-        if measurement.sampled:
-            joints = np.ascontiguousarray(self._observer.update(measurement))
-        else:
-            joints = np.empty((4, lanes))
-            _measured_joints(measurement.position, measurement.velocity, self._p, joints)
-        openings = np.empty((4, lanes))
-        backstepping_law.command(joints, measurement.pressures, reference.rows, believed, self._p, *self._options, openings)
+        joints, believed = self._joints(measurement, reference, believed_force)
+        openings = np.empty(measurement.pressures.shape)
+        misses = backstepping_law.command(
+            joints, measurement.pressures, reference.rows, believed, self._p, self._options, openings
+        )
+        if misses > 0:
+            self._refuse(joints, reference)
         return openings
+
+    def inspect(self, measurement: Measurement, reference: Reference, believed_force: Array | None = None) -> LawTerms:
+        """What ``command`` would want with the same signals, over N lanes.
+
+        Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
+        """
+        joints, believed = self._joints(measurement, reference, believed_force)
+        lanes = joints.shape[1]
+        wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
+        gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
+        flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
+        backstepping_law.inspect(
+            joints, measurement.pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent
+        )
+        return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
+
+    def _joints(self, measurement: Measurement, reference: Reference, believed_force: Array | None) -> tuple[Array, Array]:
+        """y1, y2, v1, v2 (4, N) and the believed force (2, N) from signals whose shapes are checked."""
+        lanes = lanes_of(measurement, reference)
+        believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
+        if believed.shape != (2, lanes):
+            raise ValueError(
+                f"believed_force has shape {believed.shape}; allowed: {(2, lanes)}, with the lanes of measurement.position"
+            )
+        if measurement.sampled:
+            return np.ascontiguousarray(self._observer.update(measurement)), believed
+        return measured_joints(measurement, self._p), believed
+
+    def _refuse(self, joints: Array, reference: Reference) -> None:
+        """Raises the error of the first lane whose setpoints have no gains."""
+        for lane, setpoints in enumerate(reference.stiffness.T):
+            if not np.isfinite(joints[:, lane]).all():
+                continue
+            squares = jacobian(joints[:2, lane], self.parameters) ** 2
+            for i, cylinder in enumerate((self.parameters.cylinder1, self.parameters.cylinder2)):
+                stiffness = float(setpoints @ squares[:, i])
+                apparent_mass = float(self.parameters.mechanics.mass * squares[:, i].sum())
+                damping = None
+                if self.damping_ratio is not None and stiffness > 0:
+                    damping = 2 * self.damping_ratio * math.sqrt(stiffness * apparent_mass)
+                try:
+                    gains_for(stiffness, apparent_mass, cylinder.viscous_friction, damping)
+                except ValueError as error:
+                    place = f"reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
+                    raise ValueError(f"{place}, cylinder {i + 1}: {error}") from None

@@ -94,8 +94,7 @@ def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, wid
         dx, dy = vx - target[2, i], vy - target[3, i]
         kxx, kyy, kxy = target[8, i] / m, target[9, i] / m, target[14, i] / m
         springx, springy = kxx * ex + kxy * ey, kxy * ex + kyy * ey
-        # A setpoint below 2 m/3 N/m, far below what friction lets through, has no gain.
-        cxx, cyy, cxy = square_root(max(3.0 * kxx - 2.0, 1.0), max(3.0 * kyy - 2.0, 1.0), 3.0 * kxy)
+        cxx, cyy, cxy = square_root(3.0 * kxx - 2.0, 3.0 * kyy - 2.0, 3.0 * kxy)
         fx, fy = ax - target[4, i] + springx, ay - target[5, i] + springy
         drag_t = p[at.FV1] / (kappa * kappa * m) * across(springx, springy, sine, cosine)
         drag_n = p[at.FV2] / m * along(springx, springy, sine, cosine)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
+
 from birthsim_env.lanes import Array
-from birthsim_env.signals import Mask, Measurement, Reference
+from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
 
 
 class Controller(Protocol):
@@ -19,3 +21,32 @@ class Controller(Protocol):
     def command(self, measurement: Measurement, reference: Reference) -> Array: ...
 
     def reset(self, lanes: Mask | None = None) -> None: ...
+
+
+def lanes_of(measurement: Measurement, reference: Reference) -> int:
+    """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
+    lanes = measurement.position.shape[1]
+    for name, signal, rows in (
+        ("measurement.position", measurement.position, 2),
+        ("measurement.velocity", measurement.velocity, 2),
+        ("measurement.pressures", measurement.pressures, 4),
+        ("measurement.user_force", measurement.user_force, 2),
+        ("reference.rows", reference.rows, REFERENCES),
+    ):
+        if signal.shape != (rows, lanes):
+            raise ValueError(
+                f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
+            )
+    return lanes
+
+
+def require_stiffness(reference: Reference, least: float) -> None:
+    """Raises ``ValueError`` for a setpoint [[Kclx, Kclxy], [Kclxy, Kcly]] that somewhere is not stiffer than ``least``, N/m."""
+    (kx, ky), kxy = reference.stiffness, reference.stiffness_coupling
+    softest = 0.5 * (kx + ky) - np.hypot(0.5 * (kx - ky), kxy)
+    if (softest <= least).any():
+        lane = int(np.argmax(softest <= least))
+        raise ValueError(
+            f"stiffness setpoint [[{kx[lane]:g}, {kxy[lane]:g}], [{kxy[lane]:g}, {ky[lane]:g}]] N/m in lane {lane}; "
+            f"allowed: more than {least:.3g} N/m in every direction"
+        )

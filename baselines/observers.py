@@ -144,6 +144,24 @@ def _update(
                 estimate[4 + cylinder, i] += to_disturbance * innovation
 
 
+@kernel
+def _measured_joints(position: Array, velocity: Array, p: Array, joints: Array) -> None:
+    motion, one = np.empty((4, 1)), np.empty((4, 1))
+    for i in range(position.shape[1]):
+        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
+        motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
+        piston_motion(motion, p, one, 1)
+        for row in range(4):
+            joints[row, i] = one[row, 0]
+
+
+def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
+    """y1, y2 (m), v1, v2 (m/s), (4, N), where position and velocity are measured at every control period."""
+    joints = np.empty((4, measurement.position.shape[1]))
+    _measured_joints(measurement.position, measurement.velocity, lane_parameters, joints)
+    return joints
+
+
 class PistonObserver:
     """Positions and speeds of both pistons, (4, N): y1, y2 (m), v1, v2 (m/s), from sampled positions.
 

@@ -34,3 +34,65 @@ def two_valve_openings(
     drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
     u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
     u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+
+
+@helper
+def one_valve_openings(
+    u: Array, i: int, row: int, rate: float, pp: float, pn: float, ap: float, an: float, length_p: float, length_n: float,
+    v: float, p: Array,
+) -> None:  # fmt: skip
+    """Writes the openings of one cylinder's single 5/3 valve for the wanted dF/dt: chamber N gets minus those of chamber P.
+
+    The pneumatic stiffness is left to itself.
+    """
+    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+    stroke = length_p + length_n
+    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
+    active = control_model.active_flow_for(rate, stiffness, v, stroke, index, gas_t)
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
+    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
+    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    opened = valves.opening_for_active_flow(
+        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / length_p, 0.5 * stroke / length_n, p[at.CONDUCTANCE],
+        p[at.LEAKAGE],
+    )  # fmt: skip
+    u[row, i], u[row + 1, i] = opened, -opened
+
+
+@helper
+def force_first_openings(
+    u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
+    length_p: float, length_n: float, v: float, p: Array,
+) -> None:  # fmt: skip
+    """As ``two_valve_openings``, but where a valve saturates the pneumatic stiffness gives way to the force.
+
+    The pressurisation flow is moved to the nearest at which both chambers still get what the active flow asks of them;
+    where none is, the active flow comes as near as both valves allow.
+    """
+    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+    force = pp * ap - pn * an
+    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
+    active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
+    pressurization = control_model.pressurization_flow_for(
+        stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
+    )
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
+    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
+    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
+    to_p, to_n = (length_p + length_n) / length_p, (length_p + length_n) / length_n
+    # Bounds of qT + qA and of qT - qA from what each chamber can get; a valve without driving pressure stays shut.
+    shut_p, shut_n = leak * (fill_p - drain_p), leak * (fill_n - drain_n)
+    most_p, least_p = to_p * (shut_p + c * max(fill_p, 0.0)), to_p * (shut_p - c * max(drain_p, 0.0))
+    most_n, least_n = to_n * (shut_n + c * max(fill_n, 0.0)), to_n * (shut_n - c * max(drain_n, 0.0))
+    low, high = max(least_p - active, least_n + active), min(most_p - active, most_n + active)
+    middle = 0.5 * (low + high)
+    pressurization = max(low, min(high, pressurization)) if low < high else middle
+    flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
+    flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
+    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, c, leak)
+    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, c, leak)

@@ -21,11 +21,12 @@ from tests import linkage_by_points as by_points
 
 STATE = sp.symbols("y1 y2 v1 v2 F1 F2", real=True)
 WANTED = sp.symbols("yd1 yd2 vd1 vd2 ad1 ad2 jd1 jd2", real=True)
-GAINS = sp.symbols("c1 c2", positive=True)
+GAINS = sp.symbols("c11 c12 c13 c21 c22 c23", positive=True)
+"""c1, c2, c3 of cylinder 1, then of cylinder 2."""
 BELIEVED = sp.symbols("b1 b2", real=True)
-RIG = sp.symbols("m g d3 d6 gamma3 k1 k2 Fext1 Fext2 Fc1 Fc2 Fv1 Fv2 width compensate", real=True)
+RIG = sp.symbols("m g d3 d6 gamma3 k1 k2 Fext1 Fext2 Fc1 Fc2 Fv1 Fv2 width compensate sliding", real=True)
 Y1, Y2, V1, V2, F1, F2 = STATE
-MASS, GRAVITY, D3, D6, GAMMA3, K1, K2, FEXT1, FEXT2, FC1, FC2, FV1, FV2, WIDTH, COMPENSATE = RIG
+MASS, GRAVITY, D3, D6, GAMMA3, K1, K2, FEXT1, FEXT2, FC1, FC2, FV1, FV2, WIDTH, COMPENSATE, SLIDING = RIG
 
 R4, R2 = Y1 + K1, Y2 + K2
 W = R4**2 - D3**2 - D6**2
@@ -65,28 +66,30 @@ def model_13() -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
 def errors_and_rates() -> tuple[Callable[..., Any], Callable[..., Any]]:
     """Numeric functions of all symbols: z1, z2, z3, g of both cylinders; and the wanted dF/dt of both."""
     f1, g1, f2, g2 = model_13()
-    errors, stars = [], []
-    for i, (y, v, f, g) in enumerate(((Y1, V1, f1, g1), (Y2, V2, f2, g2))):
-        yd, vd, ad, _ = WANTED[i::2]
-        z1, z2 = y - yd, v - vd + GAINS[i] * (y - yd)
-        stars.append((ad - GAINS[i] * (v - vd) - f - z1 - GAINS[i] * z2) / g)
-        errors.append([z1, z2, STATE[4 + i] - stars[i], g])
     flow = {Y1: V1, Y2: V2, V1: f1 + g1 * F1, V2: f2 + g2 * F2}
     flow |= dict(zip(WANTED[:6], WANTED[2:], strict=True))
-    rates = []
-    for (_, z2, z3, g), star, gain in zip(errors, stars, GAINS, strict=True):
-        rates.append(sum(star.diff(x) * rate for x, rate in flow.items()) - z2 / g - gain * z3)
+    errors, rates = [], []
+    for i, (y, v, f, g, coulomb) in enumerate(((Y1, V1, f1, g1, FC1), (Y2, V2, f2, g2, FC2))):
+        (yd, vd, ad, _), (c1, c2, c3) = WANTED[i::2], GAINS[3 * i : 3 * i + 3]
+        z1, z2 = y - yd, v - vd + c1 * (y - yd)
+        star = (ad - c1 * (v - vd) - f - z1 - c2 * z2) / g
+        z3 = STATE[4 + i] - star
+        errors.append([z1, z2, z3, g])
+        along_model = sum(star.diff(x) * rate for x, rate in flow.items())
+        frozen = (1 - SLIDING) * drag(v, coulomb, 0).diff(v) * flow[v]
+        rates.append(along_model - frozen - z2 / g - c3 * z3)
     arguments = [*STATE, *WANTED, *GAINS, *BELIEVED, *RIG]
     return sp.lambdify(arguments, errors, cse=True), sp.lambdify(arguments, rates, cse=True)
 
 
-def rig_values(rig: Parameters, width: float, compensate: bool) -> list[float]:
-    """Values of ``RIG``."""
+def rig_values(rig: Parameters, width: float, compensate: bool, frozen: bool = False) -> list[float]:
+    """Values of ``RIG``; ``frozen`` leaves the Coulomb friction out of dF*/dt."""
     g, c1, c2 = rig.geometry, rig.cylinder1, rig.cylinder2
     rod = [rig.air.atmospheric_pressure * math.pi / 4 * c.rod_diameter**2 for c in (c1, c2)]
     return [
         rig.mechanics.mass, rig.mechanics.gravity, g.d3, g.d6, g.gamma3, g.k1, g.k2, *rod,
-        c1.coulomb_friction, c2.coulomb_friction, c1.viscous_friction, c2.viscous_friction, width, float(compensate),
+        c1.coulomb_friction, c2.coulomb_friction, c1.viscous_friction, c2.viscous_friction,
+        width, float(compensate), float(not frozen),
     ]  # fmt: skip
 
 
@@ -95,11 +98,15 @@ def areas(cylinder: Cylinder) -> tuple[float, float]:
     return bore, bore - math.pi / 4 * cylinder.rod_diameter**2
 
 
-def gains_for(piston: Array, stiffness: Array, rig: Parameters) -> Array:
-    """Largest roots of the cubic for the joint stiffness (18) of the linkage made of points, (2, N)."""
+def gains_for(piston: Array, stiffness: Array, rig: Parameters, ratio: float | None = None) -> Array:
+    """Gains, (6, N), for the joint stiffness (18) of the linkage made of points.
+
+    Equal, the largest roots of the cubic, or with a damping ratio the larger c1 = c3 at which K and B s, the impedance's first
+    two terms, are as asked.
+    """
     r4, r2 = piston[0] + rig.geometry.k1, piston[1] + rig.geometry.k2
     pose = by_points.pose_from_lengths(r4, r2, rig.geometry)
-    found = np.empty(piston.shape)
+    found = np.empty((6, piston.shape[1]))
     for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
         column, _ = by_points.cartesian_velocity(pose, r2, 1.0 - i, float(i))
         kcl, mass, viscous = (
@@ -108,8 +115,29 @@ def gains_for(piston: Array, stiffness: Array, rig: Parameters) -> Array:
             cylinder.viscous_friction,
         )
         for lane, (k, m) in enumerate(zip(kcl, mass, strict=True)):
-            found[i, lane] = np.roots([m, 0, 2 * m - 3 * k, k * viscous / m]).real.max()
+            rows = slice(3 * i, 3 * i + 3)
+            if ratio is None:
+                found[rows, lane] = np.roots([m, 0, 2 * m - 3 * k, k * viscous / m]).real.max()
+            else:
+                found[rows, lane] = damped_gains(k, 2 * ratio * math.sqrt(k * m), m, viscous)
     return found
+
+
+def damped_gains(stiffness: float, damping: float, mass: float, viscous: float) -> tuple[float, float, float]:
+    """c1 = c3 and c2 by bracketing c1 above the minimum of B; c2 from K, which is linear in it."""
+
+    def inner(q: Any) -> Any:
+        # m (2 q + q^2 c2) = K (2 q + c2 - Fv/m)
+        return (stiffness * (2 * q - viscous / mass) - 2 * mass * q) / (mass * q * q - stiffness)
+
+    def excess(q: Any) -> Any:
+        pole = 2 * q + inner(q) - viscous / mass
+        return (mass * (q * q + 2 * q * inner(q) + 2) - stiffness) / pole - damping
+
+    grid = math.sqrt(stiffness / mass) * np.geomspace(1.001, 100, 500)
+    least = grid[int(np.argmin(excess(grid)))]
+    q = float(brentq(excess, least, grid[-1], xtol=1e-13, rtol=1e-14))
+    return q, inner(q), q
 
 
 def chamber_rates(air: Any, flow: Any, y: float, v: float, cylinder: Cylinder, rig: Parameters) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from tests import derived_law as derived
 
 
 def random_situations(
-    rig: Parameters, width: float, compensate: bool, lanes: int, rng: np.random.Generator
+    rig: Parameters, width: float, compensate: bool, lanes: int, rng: np.random.Generator, ratio: float | None = None
 ) -> dict[str, Array]:
     """States near random references: F within some N of F*, K inside the range of the pressures, the valves not all shut."""
     half = np.array([[rig.cylinder1.stroke / 2], [rig.cylinder2.stroke / 2]])
@@ -33,7 +33,7 @@ def random_situations(
     s["wanted"] = np.concatenate([s["piston"], s["speed"], np.zeros((4, lanes))]) + noise * rng.normal(0, 1, (8, lanes))
     s["stiffness"] = rng.uniform(800, 4500, (2, lanes))
     s["believed"] = rng.normal(0, 20, (2, lanes))
-    s["gains"] = derived.gains_for(s["piston"], s["stiffness"], rig)
+    s["gains"] = derived.gains_for(s["piston"], s["stiffness"], rig, ratio)
     s["pneumatic"] = rng.uniform([[2500], [1300]], [[5000], [2600]], (2, lanes))
     s["pneumatic_wanted"] = s["pneumatic"] + rng.normal(0, 50, (2, lanes))
     s["pneumatic_rate"] = rng.normal(0, 500, (2, lanes))
@@ -104,26 +104,28 @@ def test_model_13_is_5_without_14() -> None:
     assert sp.simplify(ours2 - full2.subs(angle)) == 0
 
 
-@pytest.mark.parametrize("compensate", [False, True], ids=["paper", "compensated"])
+OPTIONS: dict[str, dict[str, Any]] = {
+    "paper": {},
+    "compensated": {"weight_compensation": True},
+    "damped": {"weight_compensation": True, "damping_ratio": 1.3},
+    "frozen": {"weight_compensation": True, "frozen_friction": True},
+}
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
 @pytest.mark.parametrize(
     ("rig", "gain", "width"), [(Parameters(), 30.0, 0.01), (TILTED, 47.0, 0.004)], ids=["default", "tilted"]
 )
-def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, width: float, compensate: bool) -> None:
-    situation = random_situations(rig, width, compensate, 800, np.random.default_rng(7))
-    controller = BacksteppingController(rig, compensate, pneumatic_gain=gain, sign_width=width)
-    got = controller.command(*as_signals(situation, rig), situation["believed"])
+def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, width: float, options: dict[str, Any]) -> None:
+    compensate, frozen = options.get("weight_compensation", False), options.get("frozen_friction", False)
+    s = random_situations(rig, width, compensate, 800, np.random.default_rng(7), options.get("damping_ratio"))
+    controller = BacksteppingController(rig, pneumatic_gain=gain, sign_width=width, **options)
+    got = controller.command(*as_signals(s, rig), s["believed"])
     _, wanted_rates = derived.errors_and_rates()
-    s = situation
-    values = [
-        *s["piston"],
-        *s["speed"],
-        *s["force"],
-        *s["wanted"],
-        *s["gains"],
-        *s["believed"],
-        *derived.rig_values(rig, width, compensate),
-    ]
-    force_rate = np.array(wanted_rates(*values))
+    values = derived.rig_values(rig, width, compensate, frozen)
+    force_rate = np.array(
+        wanted_rates(*s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values)
+    )
     stiffness_rate = s["pneumatic_rate"] - gain * (s["pneumatic"] - s["pneumatic_wanted"])
     expected = np.empty_like(got)
     for lane in range(got.shape[1]):
@@ -132,9 +134,13 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
             flows = derived.flows_for(rates, air, s["piston"][i, lane], s["speed"][i, lane], cylinder, rig)
             expected[2 * i : 2 * i + 2, lane] = [derived.opening_for(q, p, rig) for q, p in zip(flows, air, strict=True)]
     unsaturated = np.all(np.abs(expected) < 1, axis=0)
-    assert unsaturated.sum() >= 100
+    assert unsaturated.sum() >= 60
     assert (~unsaturated).any(), "saturated valves must have been met too"
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-8)
+    terms = controller.inspect(*as_signals(s, rig), s["believed"])
+    np.testing.assert_allclose(terms.gains.swapaxes(0, 1).reshape(6, -1), s["gains"], rtol=1e-8)
+    np.testing.assert_allclose(terms.force_rate, force_rate, rtol=1e-7, atol=1e-4)
+    np.testing.assert_allclose(terms.wanted, s["wanted"], rtol=1e-7, atol=1e-7)
 
 
 def moving_target(time: float, rig: Parameters) -> tuple[Array, Reference]:
@@ -205,7 +211,7 @@ def test_errors_decay_as_lyapunovs_function_says(compensate: bool) -> None:
     v = np.array([(z**2).sum(axis=0) / 2 for z, _, _ in path])
     assert np.all(np.diff(v, axis=0) < 0)
     assert np.all(v[-1] < 1e-5 * v[0])
-    gain = path[0][1][1]
+    gain = path[0][1][3]
     np.testing.assert_allclose(v[:, 1], v[0, 1] * np.exp(-2 * gain * times), rtol=1e-4)
 
     def error_equations(time: float, z: Array) -> list[float]:
@@ -303,7 +309,7 @@ def test_believing_the_users_force_removes_the_compliance() -> None:
     np.testing.assert_allclose(moved[:, told == 1], 0, atol=0.00001)
 
 
-@pytest.mark.parametrize("name", ["pneumatic_gain", "sign_width"])
+@pytest.mark.parametrize("name", ["pneumatic_gain", "sign_width", "damping_ratio"])
 @pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf])
 def test_options_that_cannot_be_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name} = {value!r}; allowed: a positive number"):

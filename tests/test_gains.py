@@ -1,4 +1,4 @@
-"""Gains for a closed-loop stiffness: the static formula derived with SymPy, and its cubic solved by other means."""
+"""Gains for a closed-loop stiffness and damping: formulas derived with SymPy, and the polynomials solved by other means."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ import pytest
 import sympy as sp
 from scipy.optimize import minimize_scalar
 
-from baselines.gains import closed_loop_stiffness, equal_gain, least_stiffness
+from baselines.gains import (
+    closed_loop_damping,
+    closed_loop_stiffness,
+    equal_gain,
+    equal_gain_misses,
+    gains_for,
+    least_stiffness,
+)
 from birthsim_env.lanes import Array
 
 C1, C2, C3, MASS, FV, PUSH = sp.symbols("c1 c2 c3 m Fv U", positive=True)
@@ -59,12 +66,52 @@ def test_a0_and_a2_are_the_characteristic_polynomial_of_the_errors() -> None:
     assert sp.expand(a0 - (C1 + C3 + C1 * C2 * C3)) == 0
 
 
-def test_closed_loop_stiffness_is_the_static_formula() -> None:
+@cache
+def impedance() -> sp.Expr:
+    """Push over displacement in s. The push accelerates the piston (z2') and, through dF*/dv, lets F lag behind F* (z3')."""
+    s, z1, z2, z3, push = sp.symbols("s z1 z2 z3 push")
+    star = MASS * (-C1 * V - (Y + C2 * (V + C1 * Y))) + FV * V
+    missed = star.diff(V) * push / MASS
+    equations = [
+        s * z1 - (z2 - C1 * z1),
+        s * z2 - (z3 / MASS - z1 - C2 * z2 + push / MASS),
+        s * z3 - (-MASS * z2 - C3 * z3 - missed),
+    ]
+    return sp.simplify(push / sp.solve(equations, [z1, z2, z3], dict=True)[0][z1])
+
+
+A2, A1, A0 = C1 + C2 + C3, C1 * C2 + C1 * C3 + C2 * C3 + 2, C1 + C3 + C1 * C2 * C3
+
+
+def test_impedance_of_the_error_dynamics() -> None:
+    """Z(s) = m (s^3 + a2 s^2 + a1 s + a0) / (s + a2 - phi), and K, B are its first two terms at s = 0."""
+    s = sp.symbols("s")
+    assert sp.simplify(impedance() - MASS * (s**3 + A2 * s**2 + A1 * s + A0) / (s + A2 - FV / MASS)) == 0
+    stiffness, damping = impedance().subs(s, 0), impedance().diff(s).subs(s, 0)
+    pole = A2 - FV / MASS
+    assert sp.simplify(stiffness - MASS * A0 / pole) == 0
+    assert sp.simplify(damping - MASS * (A1 / pole - A0 / pole**2)) == 0
+    symbols = [C1, C2, C3, MASS, FV]
+    of_stiffness, of_damping = sp.lambdify(symbols, stiffness), sp.lambdify(symbols, damping)
     rng = np.random.default_rng(0)
-    formula = sp.lambdify([C1, C2, C3, MASS, FV], kcl())
     for _ in range(100):
         args = (*rng.uniform(20, 200, 3), rng.uniform(1, 20), rng.uniform(0, 50))
-        assert closed_loop_stiffness(*args) == pytest.approx(formula(*args), rel=1e-12)
+        assert closed_loop_stiffness(*args) == pytest.approx(of_stiffness(*args), rel=1e-12)
+        assert closed_loop_damping(*args) == pytest.approx(of_damping(*args), rel=1e-12)
+
+
+def test_the_cubic_of_c2() -> None:
+    """With c1 + c3 = a2 - c2 and a1, a0 as they are, c2 solves c2^3 - a2 c2^2 + (a1 - 3) c2 + a2 - a0 = 0."""
+    assert sp.expand(C2**3 - A2 * C2**2 + (A1 - 3) * C2 + A2 - A0) == 0
+
+
+def test_gains_of_one_polynomial_are_one_law() -> None:
+    """dF/dt as a feedback of y, v and F has coefficients of a2, a1, a0 (and the friction) alone."""
+    rate = sp.expand(wanted_rate((WEIGHT - FV * V + F) / MASS))
+    phi = FV / MASS
+    assert sp.expand(rate.coeff(F) + A2 - phi) == 0
+    assert sp.expand(rate.coeff(V).subs(F, 0) + MASS * A1 - FV * A2 + FV * phi) == 0
+    assert sp.expand(rate.coeff(Y) + MASS * A0) == 0
 
 
 def rigs(count: int, seed: int) -> list[tuple[float, float]]:
@@ -129,3 +176,15 @@ def test_gains_without_static_stiffness_are_refused(drag_share: float) -> None:
     with pytest.raises(ValueError, match=r"c1 \+ c2 \+ c3 = .* allowed: more than Fv/m_e = 20 1/s"):
         closed_loop_stiffness(*[20 * drag_share / 3] * 3, 3.0, 60.0)
     assert closed_loop_stiffness(6.7, 6.7, 6.7, 3.0, 60.0) > 0
+
+
+def test_equal_gains_are_refused_below_the_least_stiffness() -> None:
+    for mass, viscous in rigs(200, 10):
+        least = least_stiffness(mass, viscous)
+        assert equal_gain_misses(least * (1 - 1e-6), mass, viscous) == 1
+        assert equal_gain_misses(least * (1 + 1e-6), mass, viscous) == 0
+        c = gains_for(least * 1.2, mass, viscous)
+        assert c[0] == c[1] == c[2] == equal_gain(least * 1.2, mass, viscous)
+        with pytest.raises(ValueError, match=rf"stiffness = .* N/m has no equal gains .* allowed: more than {least:g} N/m"):
+            gains_for(least * 0.9, mass, viscous)
+    assert equal_gain_misses(np.nan, 3.0, 35.0) == 0, "a state out of range is not the setpoint's fault"
