@@ -1,6 +1,7 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy for about two minutes and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow
-# make lint   ruff and mypy; make bench prints speeds; make pictures redraws the README's pictures
+# make lint   ruff and mypy; make bench prints speeds
+# make compare compares all controllers (some 15 minutes); it and make pictures redraw the README's pictures
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,7 +10,7 @@ OUT := out
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 
-.PHONY: run test test-slow lint bench pictures golden clean
+.PHONY: run test test-slow lint bench compare pictures golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -41,6 +42,11 @@ bench: $(READY)
 pictures: $(READY)
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
+
+compare: $(READY)
+	$(BIN)/birthsim-evaluate --all --out $(OUT)/comparison
+	$(BIN)/birthsim-stability --out $(OUT)/stability
+	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make

@@ -37,8 +37,9 @@ class AdmittanceBackstepping:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
             gain, c in 1/s while the reference moves, and rest_gain once it rests; bandwidth, 1/s, of the observer;
-            dead_zone, m, of a resting piston's error; lead_time, s, in which a spool follows; oscillation, m/s, of the speed
-            error above which sustained half waves each lower the gain to yielding times itself.
+            friction_share, how much of the believed friction is fed forward along the reference; dead_zone, m, of a resting
+            piston's error; lead_time, s, in which a spool follows; oscillation, m/s, of the speed error above which sustained
+            half waves each lower the gain to yielding times itself.
 
     ``gain_share`` (N,) says how much of the gain is left. Raises ``ValueError`` for unknown gains and values out of range.
     """
@@ -47,6 +48,7 @@ class AdmittanceBackstepping:
         "gain": (30.0, 100.0),
         "rest_gain": (25.0, 100.0),
         "bandwidth": (30.0, 120.0),
+        "friction_share": (0.0, 1.0),
         "dead_zone": (0.0, 5e-5),
         "lead_time": (5e-4, 5e-3),
         "oscillation": (0.02, 0.2),
@@ -57,6 +59,7 @@ class AdmittanceBackstepping:
             "gain": 80.0,
             "rest_gain": 80.0,
             "bandwidth": 60.0,
+            "friction_share": 1.0,
             "dead_zone": 0.0,
             "lead_time": 0.0015,
             "oscillation": 0.06,
@@ -66,6 +69,7 @@ class AdmittanceBackstepping:
             "gain": 60.0,
             "rest_gain": 39.0,
             "bandwidth": 72.0,
+            "friction_share": 1.0,
             "dead_zone": 1e-5,
             "lead_time": 0.00125,
             "oscillation": 0.08,
@@ -77,8 +81,9 @@ class AdmittanceBackstepping:
         for name, value in gains.items():
             if name not in self.TUNABLE:
                 raise ValueError(f"{name} = {value!r} is no gain of {type(self).__name__}; allowed: {', '.join(self.TUNABLE)}")
-            if not (math.isfinite(value) and (value > 0 or (name == "dead_zone" and value == 0))):
-                raise ValueError(f"{name} = {value!r}; allowed: a positive number")
+            zero = self.TUNABLE[name][0] == 0
+            if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+                raise ValueError(f"{name} = {value!r}; allowed: {'zero or a positive number' if zero else 'a positive number'}")
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         self.parameters = load_parameters(parameters)
@@ -120,7 +125,8 @@ class AdmittanceBackstepping:
             self._memory[admittance_law.GAIN_SHARE] = 1.0
         force = np.ascontiguousarray(measurement.user_force)
         motion = self._admittance.update(measurement, reference)
-        believed = -self._friction.update(motion)
+        g = self._gains["lab" if measurement.sampled else "ideal"]
+        believed = -g["friction_share"] * self._friction.update(motion)
         moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
         if measurement.sampled:
             joints = np.ascontiguousarray(self._by_samples.update(measurement, force, believed, moving))
@@ -128,7 +134,7 @@ class AdmittanceBackstepping:
         else:
             joints = self._by_speed.update(measurement, force, believed)
             disturbance, rest = np.ascontiguousarray(self._by_speed.disturbance), np.zeros((2, lanes))
-        openings, g = np.empty((4, lanes)), self._gains["lab" if measurement.sampled else "ideal"]
+        openings = np.empty((4, lanes))
         quickness = 1.0 - math.exp(-self._period / g["lead_time"])
         admittance_law.command(
             joints, measurement.pressures, motion, reference.rows, force, believed, disturbance, rest, moving, self._p,

@@ -25,7 +25,7 @@ class Controller(Protocol):
 
 def lanes_of(measurement: Measurement, reference: Reference) -> int:
     """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
-    lanes = measurement.position.shape[1]
+    lanes = int(measurement.position.shape[1])
     for name, signal, rows in (
         ("measurement.position", measurement.position, 2),
         ("measurement.velocity", measurement.velocity, 2),

@@ -13,7 +13,8 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.controller import Controller
-from baselines.metrics import UNITS, EpisodeMetrics, summarize
+from baselines.metrics import UNITS, EpisodeMetrics
+from baselines.statistics import in_words, judged, number, summarize
 from birthsim_env.lanes import Array
 
 LANES = 64
@@ -35,16 +36,16 @@ class Evaluation:
     traces: list[Array] = field(default_factory=list)
 
     def summary(self) -> dict[str, dict[str, float]]:
-        """Metric -> median, mean, 95 % and maximum over the episodes."""
-        return {name: summarize(np.array(values)) for name, values in self.metrics.items()}
+        """Metric -> median, mean, 95 % and maximum over the episodes, of which a lost one is infinitely bad."""
+        return {name: summarize(judged(values, self.lost)) for name, values in self.metrics.items()}
 
     def to_dict(self) -> dict[str, Any]:
-        """What goes into the JSON file."""
+        """What goes into the JSON file; ``summary`` says "lost" where a figure is infinite."""
         return {
             "controller": self.controller,
             "seeds": self.seeds,
             "units": UNITS,
-            "summary": self.summary(),
+            "summary": in_words(self.summary()),
             "lost_episodes": int(sum(self.lost)),
             "cost_us_per_lane_and_call": self.cost,
             "episodes": self.metrics,
@@ -63,7 +64,8 @@ def evaluate(
 ) -> Evaluation:
     """Run ``episodes`` episodes, seeded seed, seed + 1, ..., of a registered id under a controller at the control rate.
 
-    ``arguments`` go to the environment. An episode that terminates is lost: its figures are those up to that moment.
+    ``arguments`` go to the environment. An episode that terminates is lost: ``metrics`` holds its figures up to that moment,
+    ``summary`` counts them as infinite.
     After an interrupt (Ctrl-C) the episodes that are complete are returned.
     """
     if episodes < 1:
@@ -98,8 +100,8 @@ def _run_batch(
     metrics = EpisodeMetrics(len(seeds), period)
     alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
     lost = np.zeros_like(alive)
-    trace: list[Array] = []
     every = max(1, round(TRACE / period))
+    trace: Array = np.full((-(-env.steps // every), len(seeds), 2), np.nan)
     bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
     for step in range(env.steps):
         started = time.perf_counter()
@@ -107,10 +109,12 @@ def _run_batch(
         spent.append((time.perf_counter() - started) * 1e6 / len(seeds))
         metrics.add(info, command, alive)
         if step % every == 0:
-            trace.append(np.where(alive[:, None], info["tracking_error"], np.nan))
+            trace[step // every, alive] = info["tracking_error"][alive]
         _, _, terminated, _, info = env.step(command.T)
         lost |= alive & terminated
         alive &= ~terminated
+        if not alive.any():
+            break
         if terminated.any():
             controller.reset(terminated)
         if step % 250 == 249:
@@ -121,30 +125,29 @@ def _run_batch(
         result.metrics[name] += [float(value) for value in values]
     result.seeds += seeds
     result.lost += [bool(value) for value in lost]
-    result.traces.append(np.stack(trace))
+    result.traces.append(trace)
 
 
 def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
-    """A Markdown table: a row per metric that says something; per controller its ``statistic``, 95 % and largest value."""
+    """A Markdown table: a row per metric that says something; per controller its ``statistic``, 95 % and largest value.
+
+    "lost" stands where a lost episode makes a figure infinite.
+    """
     head = ["metric", "unit"]
     for evaluation in evaluations:
         head += [f"{evaluation.controller}: {statistic}", "95 %", "max"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     summaries = [evaluation.summary() for evaluation in evaluations]
     for name, unit in UNITS.items():
-        if not any(np.isfinite(summary[name]["max"]) for summary in summaries):
+        if all(np.isnan(summary[name]["max"]) for summary in summaries):
             continue
         row = [name, unit]
         for summary in summaries:
-            row += [_number(summary[name][key]) for key in (statistic, "q95", "max")]
+            row += [number(summary[name][key]) for key in (statistic, "q95", "max")]
         lines.append("| " + " | ".join(row) + " |")
     lost = ["lost episodes", ""]
     cost = ["control cost per lane and call", "us"]
     for evaluation in evaluations:
         lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
-        cost += [_number(evaluation.cost), "", ""]
+        cost += [number(evaluation.cost), "", ""]
     return "\n".join([*lines, "| " + " | ".join(lost) + " |", "| " + " | ".join(cost) + " |"])
-
-
-def _number(value: float) -> str:
-    return "-" if not np.isfinite(value) else f"{value:.3g}"

@@ -12,13 +12,19 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.evaluation import TRACE, Evaluation
 from birthsim_env.lanes import Array
 
 DARK, MIDDLE, LIGHT, ACCENT = "#1b2a41", "#c1440e", "#7a9cc6", "#2e8b57"
 """Colours of different luminance; line styles differ too."""
+
+COLOURS = (DARK, MIDDLE, ACCENT, LIGHT, "#b8860b", "#8e5ea2")
+LINES = ("-", "--", "-.", ":")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">", "h", "p")
 
 STYLE: Any = {
     "font.size": 9,
@@ -30,6 +36,36 @@ STYLE: Any = {
     "legend.fontsize": 8,
     "svg.hashsalt": "birthsim",
 }
+
+
+def look(k: int) -> dict[str, Any]:
+    """Colour, line style and marker of the k-th of several controllers: twelve that a grey print tells apart by marker."""
+    return {
+        "color": COLOURS[k % len(COLOURS)], "linestyle": LINES[(k + k // len(COLOURS)) % len(LINES)],
+        "marker": MARKERS[k % len(MARKERS)],
+    }  # fmt: skip
+
+
+def log_ticks(axis: Axis) -> None:
+    """Labels 1, 2 and 5 of every decade as plain numbers, on an axis that is already logarithmic."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+def label_of(controller: str) -> str:
+    """A controller's name for a picture: a file without its folders, at most 36 letters."""
+    name = controller.rpartition("/")[2]
+    return name if len(name) <= 36 else f"{name[:35]}…"
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """A legend under all panels, in as many columns as fit its longest label."""
+    if labels:
+        # Inches: of the handle with its spaces, and of a letter of the legend's size.
+        column = 0.65 + 0.068 * max(len(label) for label in labels)
+        columns = max(1, min(4, int(figure.get_figwidth() / column)))
+        figure.legend(handles, labels, loc="outside lower center", ncol=columns)
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
@@ -119,7 +155,7 @@ def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
         lowest = np.inf
-        colours, styles = (DARK, MIDDLE, ACCENT, LIGHT), ("-", "--", "-.", ":")
+        colours, styles = (DARK, MIDDLE, ACCENT, LIGHT), LINES
         for k, evaluation in enumerate(evaluations):
             # The fifth controller has the first one's colour and another style.
             colour, style = colours[k % 4], styles[(k + k // 4) % 4]

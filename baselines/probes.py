@@ -20,7 +20,7 @@ from birthsim_env.seeding import stream
 from birthsim_env.sensors import SENSORS
 from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
 
-REST, RISE, HOLD = 1.0, 1.0, 3.0
+REST, RISE, HOLD = 2.0, 1.0, 3.0
 """s, assumed: before the push, of the ramp, and at full force."""
 
 WINDOW = 1.0
@@ -33,13 +33,13 @@ POSES = ((0.5, 0.0), (0.4, 0.05), (0.6, 0.05), (0.4, -0.08), (0.62, -0.1))
 @dataclass(frozen=True)
 class Probes:
     """N cases: ``position`` (2, N) m, ``force`` (2, N) N, ``stiffness`` (3, N) N/m as Kclx, Kcly, Kclxy, pneumatic stiffness
-    ``pneumatic`` (2, N) N/m, and ``rigs``, the plant for all or one per lane."""
+    ``pneumatic`` (2,) or (2, N) N/m, and ``rigs``, the plant for all or one per lane."""
 
     position: Array
     force: Array
     stiffness: Array
     rigs: Parameters | Sequence[Parameters]
-    pneumatic: tuple[float, float] = (4400.0, 2200.0)
+    pneumatic: tuple[float, float] | Array = (4400.0, 2200.0)
 
     @property
     def size(self) -> int:
@@ -50,7 +50,7 @@ class Probes:
         """What is asked for: a resting target."""
         rows = np.zeros((REFERENCES, self.size))
         rows[0:2], rows[8:10], rows[14] = self.position, self.stiffness[:2], self.stiffness[2]
-        rows[10:12] = np.array(self.pneumatic)[:, None]
+        rows[10:12] = np.reshape(self.pneumatic, (2, -1))
         return Reference(rows)
 
 
@@ -58,12 +58,14 @@ class Probes:
 class Answers:
     """What the rigs did: the mean ``displacement`` (2, N), m, of the last second at full force from the last second at rest;
     ``expected`` (2, N), m, what the stiffness asked for gives; ``hunting`` (2, N), m, largest peak to peak in these seconds;
-    ``lost`` (N,), the lanes that left the range of numbers or ran into an end stop."""
+    ``lost`` (N,), the lanes that left the range of numbers or ran into an end stop; ``offset`` (2, N), m, the mean of the last
+    second at rest from the target."""
 
     displacement: Array
     expected: Array
     hunting: Array
     lost: Mask
+    offset: Array
 
     def stiffness_error(self, force: Array) -> Array:
         """Rendered stiffness along the force over the one asked for, less 1, (N,)."""
@@ -104,9 +106,8 @@ def run_probes(
         np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
     displacement = held.mean() - rest.mean()
     lost = ~np.isfinite(displacement).all(axis=0) | (impacts > board_limit(rigs))
-    return Answers(
-        displacement, reference.compliant_target(probes.force) - probes.position, np.maximum(held.span(), rest.span()), lost
-    )
+    expected, hunting = reference.compliant_target(probes.force) - probes.position, np.maximum(held.span(), rest.span())
+    return Answers(displacement, expected, hunting, lost, rest.mean() - probes.position)
 
 
 def board_limit(rigs: Parameters | Sequence[Parameters]) -> float:
@@ -133,4 +134,4 @@ class Window:
 
     def span(self) -> Array:
         """Peak to peak, m, (2, N)."""
-        return self._high - self._low
+        return np.asarray(self._high - self._low)

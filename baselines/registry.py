@@ -8,12 +8,16 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from baselines.admittance_backstepping import AdmittanceBackstepping
 from baselines.backstepping import BacksteppingController
+from baselines.cartesian_backstepping import CartesianBackstepping
 from baselines.controller import Controller
+from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from birthsim_env.parameters import Parameters
 
 Factory = Callable[..., Controller]
@@ -30,7 +34,31 @@ def _backstepping_weight(parameters: Parameters) -> Controller:
     return BacksteppingController(parameters, weight_compensation=True)
 
 
-CONTROLLERS: dict[str, Factory] = {"backstepping": _backstepping, "backstepping-weight": _backstepping_weight}
+def _nmpc(parameters: Parameters, **gains: float) -> Controller:
+    try:
+        from baselines.rivals.nmpc import NonlinearPredictive
+    except ModuleNotFoundError as error:
+        if error.name != "casadi":
+            raise
+        raise ValueError("controller = 'nmpc' needs CasADi; allowed: with it, pip install 'birthsim[mpc]'") from error
+    return NonlinearPredictive(parameters, **gains)
+
+
+CONTROLLERS: dict[str, Factory] = {
+    "backstepping": _backstepping,
+    "backstepping-weight": _backstepping_weight,
+    "backstepping-frozen": partial(BacksteppingController, weight_compensation=True, frozen_friction=True),
+    "backstepping-one-valve": partial(BacksteppingController, weight_compensation=True, valves="one_valve"),
+    "backstepping-cartesian": CartesianBackstepping,
+    "admittance-backstepping": AdmittanceBackstepping,
+    "pid": PositionPID,
+    "lqr": LinearQuadratic,
+    "sliding-mode": SlidingMode,
+    "nmpc": _nmpc,
+}
+
+SLOW: frozenset[str] = frozenset({"nmpc"})
+"""Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
 
 
 def controller_names() -> list[str]:

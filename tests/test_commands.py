@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from agents.policy_files import CONFIGURATION, WEIGHTS, load_policy
+from baselines import studies
 from baselines.commands.shared import write_json
 from baselines.metrics import UNITS
 
@@ -78,7 +80,13 @@ def test_the_scripts_of_the_package_are_these_commands():
 @pytest.mark.parametrize(
     ("command", "options"),
     [
-        ("evaluate", ("env", "controller", "policy", "episodes", "seed", "sensors", "randomize", "parameters", "out")),
+        (
+            "evaluate",
+            (
+                *("all", "env", "controller", "policy", "episodes", "seed", "sensors", "randomize", "parameters", "jobs"),
+                *("no-studies", "out"),
+            ),
+        ),
         ("figure4", ("controller", "sensors", "parameters", "out")),
         ("train", ("env", "steps", "seed", "sensors", "randomize", "authority", "parameters", "out")),
     ],
@@ -174,6 +182,109 @@ def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_ever
     assert_picture(tmp_path / "out", "error_over_time")
 
 
+FAILING = """
+
+class Fails(Slam):
+    def command(self, measurement, reference):
+        raise RuntimeError("no law at all")
+"""
+NARROW = ("--all", "--env", "BirthSIM/Probe-v0", "--sensors", "ideal", "--episodes", 2)
+
+
+@pytest.fixture
+def small_studies(monkeypatch):
+    """Studies of one pose, which take a second each instead of ten."""
+    pose = ((0.5, 0.0),)
+    for name, options in (
+        ("stiffness", {"setpoints": (2000.0,), "poses": pose, "forces": (20.0,)}),
+        ("polar", {"directions": 4, "poses": pose}),
+        ("ellipses", {"poses": pose}),
+    ):
+        monkeypatch.setitem(studies.STUDIES, name, partial(studies.STUDIES[name], **options))
+    monkeypatch.setattr(studies, "disturbance_study", partial(studies.disturbance_study, amplitudes=(2.0, 20.0), poses=pose))
+
+
+def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
+    (tmp_path / "slam.py").write_text(OWN)
+    slam = f"{tmp_path}/slam.py:Slam"
+    arguments = (*NARROW, "--controllers", "backstepping", slam, "--jobs", 1, "--out")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    assert status == 0, complained
+    assert "Warning" not in complained
+    for title, pieces in (("comparison", 4), ("studies", 8)):
+        assert f"{title}: 100%" in complained
+        assert f"{pieces}/{pieces} " in complained
+    content = strict(tmp_path / "out" / "comparison.json")
+    cells = {(cell["controller"], cell["plant"]): cell for cell in content["cells"]}
+    assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
+    law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
+    assert (law["episodes"], law["lost"], lost["lost"]) == (2, 0, 2)
+    assert 0 < law["metrics"]["stiffness_error"]["median"] < 200
+    assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == "lost"
+    assert set(content["studies"]) == {"stiffness", "polar", "ellipses", "disturbance"}
+    assert set(content["studies"]["polar"]) == {"backstepping", slam}
+    assert content["studies"]["polar"][slam]["stiffness"] == [[None]] * 4
+    assert len(content["studies"]["polar"]["backstepping"]["stiffness"]) == 4
+    assert content["arguments"]["controller"] == ["backstepping", slam]
+    text = (tmp_path / "out" / "comparison.md").read_text()
+    table = text[text.index("| controller |") : text.index("## ")].strip()
+    assert table in printed
+    assert f"| {slam} | lost; lost |" in table
+    for name in (
+        *("settled_error", "air_against_error", "rendered_stiffness", "hunting", "disturbances"),
+        *("stiffness_by_direction", "stiffness_ellipses"),
+    ):
+        assert_picture(tmp_path / "out", name)
+        assert f"{name}.png" in printed
+    # Once more: nothing is computed, and all is the same.
+    written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.json") if path.parent != tmp_path / "out"}
+    assert len(written) == 12
+    status, again, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    assert status == 0
+    assert f"comparison: 4 of 4 are there with these settings, rig and code, and are kept: backstepping 2, {slam} 2" in again
+    assert "studies: 8 of 8 are there" in again
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+    assert (tmp_path / "out" / "comparison.md").read_text() == text
+    assert strict(tmp_path / "out" / "comparison.json") == content
+
+
+def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
+    arguments = (*NARROW, "--controllers", "backstepping", "--no-studies", "--out")
+    line = [
+        *arguments,
+        tmp_path / "out",
+        "--episodes",
+        1,
+        "--jobs",
+        2,
+        "--randomize",
+        "all",
+        "--controllers",
+        "backstepping",
+        "backstepping-weight",
+    ]
+    status, printed = interrupted("evaluate", line, lambda said: "1/2 " in said)
+    assert (status, printed) == (130, "")
+    done = list((tmp_path / "out").rglob("*.json"))
+    assert len(done) == 1
+    status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
+    assert status == 0
+    assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
+    assert "studies" not in strict(tmp_path / "out" / "comparison.json")["arguments"]["out"]
+
+
+def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
+    (tmp_path / "own.py").write_text(OWN + FAILING)
+    fails = f"{tmp_path}/own.py:Fails"
+    arguments = (*NARROW, "--randomize", "scenario", "--no-studies", "--jobs", 1, "--controllers", fails, "backstepping")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
+    assert status == 2
+    assert "| backstepping |" in printed
+    assert "birthsim-evaluate: error: 1 of 2 pieces failed, the first cells/" in complained
+    assert "RuntimeError: no law at all" in complained
+    assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
+
+
 def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_path, monkeypatch, capsys):
     folder, done = trained
     assert done.returncode == 0, done.stderr
@@ -231,7 +342,7 @@ def damaged(trained, tmp_path):
 BAD = [
     ("evaluate", ("--env", "BirthSIM/Square-v0"), "--env 'BirthSIM/Square-v0'; allowed: BirthSIM/Circle-v0, "),
     ("evaluate", ("--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v0, "),
-    ("evaluate", ("--controller", "pid"), "controller = 'pid'; allowed: backstepping, backstepping-weight, "),
+    ("evaluate", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, backstepping-weight, "),
     (
         "evaluate",
         ("--controller", "nowhere.py:Mine"),
@@ -255,6 +366,19 @@ BAD = [
     ("evaluate", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("evaluate", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 (kg)"),
     ("evaluate", ("--out", "{tmp}/own.py"), "own.py'"),
+    ("evaluate", ("--jobs", "2"), "--jobs and --no-studies; allowed: with --all"),
+    ("evaluate", ("--no-studies",), "--jobs and --no-studies; allowed: with --all"),
+    ("evaluate", ("--all", "--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
+    ("evaluate", ("--all", "--env", "CartPole-v1"), "--env 'CartPole-v1' with --all; allowed: BirthSIM/Circle-v0, "),
+    ("evaluate", ("--all", "--env", RESIDUAL), f"--env '{RESIDUAL}' with --all; allowed: BirthSIM/Circle-v0, "),
+    ("evaluate", ("--all", "--randomize", "none"), "--randomize 'none' with --all; allowed: scenario, all"),
+    ("evaluate", ("--all", "--policy", "{tmp}/none"), "--policy with --all; allowed: without it"),
+    ("evaluate", ("--all", "--controllers", "nobody"), "--controller 'nobody' with --all; allowed: backstepping, "),
+    ("evaluate", ("--all", "--controllers", "residual"), "--controller 'residual' with --all; allowed: backstepping, "),
+    ("evaluate", ("--all", "--controllers", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a class with command()"),
+    ("evaluate", ("--all", "--controllers", "nowhere.py:Mine"), "controller file 'nowhere.py' does not exist; allowed: "),
+    ("evaluate", ("--all", "--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
+    ("evaluate", ("--all", "--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: "),
     ("evaluate", ("--episodes", "2", "--colour", "red"), "unrecognized arguments: --colour red"),
     ("figure4", ("--controller", "residual"), "--controller: invalid choice: 'residual' (choose from"),
     ("figure4", ("--sensors", "perfect"), "--sensors: invalid choice: 'perfect' (choose from"),
@@ -302,10 +426,10 @@ def test_the_output_folder_is_asked_for(command, monkeypatch, capsys):
 
 
 def test_bad_input_in_a_shell_leaves_one_line_and_no_traceback(tmp_path):
-    done = run("evaluate", "--controller", "pid", "--out", tmp_path / "out")
+    done = run("evaluate", "--controller", "nobody", "--out", tmp_path / "out")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
-    assert "controller = 'pid'; allowed: " in done.stderr
+    assert "controller = 'nobody'; allowed: " in done.stderr
 
 
 def test_json_is_strict_and_whole_or_not_there(tmp_path):
@@ -339,6 +463,7 @@ def interrupted(command, arguments, seen):
         process.kill()
         process.wait()
     assert b"Traceback" not in said + rest
+    assert b"leaked" not in said + rest
     return process.returncode, printed.decode()
 
 

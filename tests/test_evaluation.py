@@ -199,14 +199,37 @@ def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
     assert np.isnan(trace[seen:, 1]).all()
 
 
-def test_figures_of_a_lost_lane_hold_no_infinity_and_count_nowhere_else():
+def test_a_lost_episode_counts_as_infinitely_bad_though_its_own_figures_end_with_it():
     # Lost in the first half second, the lane runs 4.5 s of another episode, whose push must not be measured.
     result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=5.0)
     assert result.lost == [True, False]
+    summary = result.summary()
     for name in ("stiffness_error", "cross_motion", "hunting_x", "settled_max_x"):
         assert math.isnan(result.metrics[name][0]), name
         assert math.isfinite(result.metrics[name][1]), name
-        assert result.summary()[name]["max"] == abs(result.metrics[name][1])
+        assert summary[name]["median"] == summary[name]["max"] == math.inf
+    assert math.isfinite(result.metrics["air"][0])
+    assert summary["air"]["q95"] == math.inf
+
+
+def test_one_lost_episode_of_three_leaves_the_median_finite_and_worse():
+    kept, lost = run(Slam(lanes=())).summary()["error_rms_x"], run(Slam(lanes=(1,))).summary()["error_rms_x"]
+    assert kept["median"] < lost["median"] < lost["max"] == math.inf
+
+
+def test_nothing_runs_on_once_every_lane_is_lost():
+    class Counting(Slam):
+        calls = 0
+
+        def command(self, measurement, reference):
+            self.calls += 1
+            return super().command(measurement, reference)
+
+    slam = Counting(lanes=(0, 1))
+    result = run(slam, episodes=2, duration=5.0)
+    assert result.lost == [True, True]
+    assert 300 < slam.calls < 1000
+    assert result.traces[0].shape == (500, 2, 2)
 
 
 @pytest.mark.parametrize(("at", "complete"), [(1500, 2), (800, 2), (2399, 4)])
@@ -271,8 +294,8 @@ def test_the_dictionary_is_json_and_says_everything():
         assert len(read["episodes"][name]) == 3
         assert set(read["summary"][name]) == {"median", "mean", "q95", "max"}
     x = read["episodes"]["error_rms_x"]
-    assert read["summary"]["error_rms_x"]["median"] == pytest.approx(sorted(x)[1])
-    assert read["summary"]["error_rms_x"]["max"] == max(x)
+    assert read["summary"]["error_rms_x"]["median"] == pytest.approx(max(x[0], x[2]))
+    assert read["summary"]["error_rms_x"]["max"] == "lost"
 
 
 def example(name, values, lost, cost) -> Evaluation:
@@ -282,19 +305,19 @@ def example(name, values, lost, cost) -> Evaluation:
 
 def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_controller():
     one = example(
-        "law", {"error_rms_x": [1.0, 2.0, 9.87654], "stiffness_error": [-30.0, 1.0, 2.0]}, [False, True, False], 1.23456
+        "law", {"error_rms_x": [1.0, 2.0, 9.87654], "stiffness_error": [-30.0, 1.0, 2.0]}, [False, False, False], 1.23456
     )
-    other = example("mine", {"error_rms_x": [0.5, 0.5, 0.5]}, [False, False, False], 2.0)
+    other = example("mine", {"error_rms_x": [0.5, 0.5, 0.1]}, [False, False, True], 2.0)
     lines = table([one, other]).splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
     assert cells["metric"] == ["unit", "law: median", "95 %", "max", "mine: median", "95 %", "max"]
     assert set(lines[1]) == {"|", "-"}
     assert len({line.count("|") for line in lines}) == 1
-    assert cells["error_rms_x"] == ["mm", "2", f"{np.quantile([1, 2, 9.87654], 0.95):.3g}", "9.88", "0.5", "0.5", "0.5"]
+    assert cells["error_rms_x"] == ["mm", "2", f"{np.quantile([1, 2, 9.87654], 0.95):.3g}", "9.88", "0.5", "lost", "lost"]
     # Tails are of the size: -30 % is as bad as +30 %.
     assert cells["stiffness_error"] == ["%", "1", f"{np.quantile([30, 1, 2], 0.95):.3g}", "30", "-", "-", "-"]
     assert "hunting_x" not in cells, "no controller has anything to say of it"
-    assert cells["lost episodes"] == ["", "1 of 3", "", "", "0 of 3", "", ""]
+    assert cells["lost episodes"] == ["", "0 of 3", "", "", "1 of 3", "", ""]
     assert cells["control cost per lane and call"] == ["us", "1.23", "", "", "2", "", ""]
     assert len(lines) == 2 + 2 + 2
     means = table([one], "mean").splitlines()

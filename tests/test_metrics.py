@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.metrics import NORMAL_DENSITY, UNITS, EpisodeMetrics, summarize
+from baselines.metrics import NORMAL_DENSITY, UNITS, WINDOW, EpisodeMetrics
 
 PERIOD = 4e-3
 """s; four control periods at a time keep the tests short."""
@@ -27,11 +27,16 @@ RESTING = {
 
 
 def measure(steps, lanes=1, period=PERIOD, command=0.0, alive=True, **signals):
-    """Metrics after ``steps`` samples. A signal is (), (T,), (T, lanes) or with a last axis of 2 where it has x and y."""
+    """Metrics after ``steps`` samples. A signal is (), (T,), (T, lanes) or with a last axis of 2 where it has x and y.
+
+    The compliant target is that of uncoupled springs, unless it is given.
+    """
     metrics = EpisodeMetrics(lanes, period)
-    shapes = {name: (steps, lanes) if name in SINGLE else (steps, lanes, 2) for name in RESTING}
     given = {**RESTING, **signals}
-    full = {name: np.broadcast_to(np.asarray(given[name], dtype=float), shape) for name, shape in shapes.items()}
+    compliance = np.asarray(given["user_force"]) / np.asarray(given["stiffness_setpoint"])
+    given.setdefault("compliant_target", np.asarray(given["target"]) + compliance)
+    shapes = {name: (steps, lanes) if name in SINGLE else (steps, lanes, 2) for name in given}
+    full = {name: np.array(np.broadcast_to(np.asarray(given[name], dtype=float), shape)) for name, shape in shapes.items()}
     commands = np.broadcast_to(np.asarray(command, dtype=float), (steps, 4, lanes))
     living = np.broadcast_to(np.asarray(alive, dtype=bool), (steps, lanes))
     for k in range(steps):
@@ -166,14 +171,28 @@ def test_restarts_per_second_count_breaks_from_rest_with_a_dead_band():
     assert measure(len(time), velocity=1.9e-3)["restarts"] == 0
 
 
-def spring(angle, push=20.0, rendered=(2000.0, 2000.0), asked=(2000.0, 2000.0), seconds=5.0, offset=(0.0, 0.0), wobble=0.0):
-    """The stiffness test on a spring: nothing for a second, a ramp of a second, then held."""
+def matrix(stiffness):
+    """(Kx, Ky) or [[Kx, Kxy], [Kxy, Ky]] as the latter."""
+    stiffness = np.asarray(stiffness, dtype=float)
+    return np.diag(stiffness) if stiffness.ndim == 1 else stiffness
+
+
+def spring(
+    angle, push=20.0, rendered=(2000.0, 2000.0), asked=(2000.0, 2000.0), seconds=5.0, offset=(0.0, 0.0), wobble=None, rest=1.0
+):
+    """The stiffness test on a spring: nothing for ``rest`` s, a ramp of a second, then held; ``wobble``(time) on x and y."""
     time = PERIOD * np.arange(round(seconds / PERIOD))
-    force = push * np.clip(time - 1, 0, 1)[:, None] * [math.cos(angle), math.sin(angle)]
-    shift = np.array(offset) * (time > 1)[:, None] + wobble * np.sin(2 * np.pi * 10 * time)[:, None]
-    position = (0.45, 0.02) + force / rendered + shift
+    force = push * np.clip(time - rest, 0, 1)[:, None] * [math.cos(angle), math.sin(angle)]
+    shift = np.array(offset) * (time > rest)[:, None] + (0 if wobble is None else wobble(time)[:, None])
+    position = (0.45, 0.02) + force @ np.linalg.inv(matrix(rendered)) + shift
+    target = np.array((0.452, 0.02))
     return measure(
-        len(time), target=(0.452, 0.02), position=over_time(position), user_force=over_time(force), stiffness_setpoint=asked
+        len(time),
+        target=target,
+        compliant_target=over_time(target + force @ np.linalg.inv(matrix(asked))),
+        position=over_time(position),
+        user_force=over_time(force),
+        stiffness_setpoint=np.diag(matrix(asked)),
     )
 
 
@@ -189,11 +208,31 @@ def test_stiffness_error_is_rendered_over_asked_less_one():
     assert spring(0, rendered=(2500, 1000))["stiffness_error"] == pytest.approx(25, abs=0.02)
     assert spring(math.pi / 2, rendered=(2500, 1000))["stiffness_error"] == pytest.approx(-50, abs=0.02)
     assert spring(0, rendered=(2500, 1000), asked=(4000, 1000))["stiffness_error"] == pytest.approx(-37.5, abs=0.02)
-    # Along a slanted push the springs asked for on x and y both give way.
+    # Along a slanted push the springs asked for on x and y both give way, and the motion across is then asked for.
     unequal = spring(math.pi / 4, rendered=(1000, 4000), asked=(1000, 4000))
     assert unequal["stiffness_error"] == pytest.approx(0, abs=0.02)
-    # 20 N: 14.142 mm and 3.536 mm on the axes, so 7.5 mm across the push.
-    assert unequal["cross_motion"] == pytest.approx(1e3 * 20 / 2 * (1 / 1000 - 1 / 4000), rel=1e-3)
+    assert unequal["cross_motion"] == pytest.approx(0, abs=1e-3)
+    # 20 N: 14.142 mm and 3.536 mm on the axes, so 7.5 mm across the push where none is asked for.
+    across = spring(math.pi / 4, rendered=(1000, 4000), asked=(1600, 1600))
+    assert across["cross_motion"] == pytest.approx(1e3 * 20 / 2 * (1 / 1000 - 1 / 4000), rel=1e-3)
+
+
+COUPLED = ((3000.0, 800.0), (800.0, 1500.0))
+
+
+@pytest.mark.parametrize("angle", [0, math.pi / 2, 2.0])
+def test_a_coupled_setpoint_is_met_by_the_coupled_spring_alone(angle):
+    exact = spring(angle, rendered=COUPLED, asked=COUPLED)
+    assert exact["stiffness_error"] == pytest.approx(0, abs=0.01)
+    assert exact["cross_motion"] == pytest.approx(0, abs=1e-3)
+    # Its diagonal alone: compliances 1/3000 and 1/1500 where 1500/d and 3000/d are asked for, d = 3.86e6 (N/m)^2.
+    diagonal = spring(angle, rendered=(3000, 1500), asked=COUPLED)
+    wanted, given = np.linalg.inv(COUPLED), np.diag([1 / 3000, 1 / 1500])
+    way = np.array([math.cos(angle), math.sin(angle)])
+    assert diagonal["stiffness_error"] == pytest.approx(100 * ((way @ wanted @ way) / (way @ given @ way) - 1), abs=0.02)
+    turned = np.array([-way[1], way[0]]) @ (given - wanted) @ way
+    assert diagonal["cross_motion"] == pytest.approx(1e3 * 20 * abs(turned), rel=1e-3)
+    assert diagonal["cross_motion"] > 1
 
 
 def test_stiffness_is_measured_from_the_place_before_the_push_and_cross_motion_across_it():
@@ -202,8 +241,38 @@ def test_stiffness_is_measured_from_the_place_before_the_push_and_cross_motion_a
     assert result["cross_motion"] == pytest.approx(1.5, rel=1e-3)
 
 
-def test_hunting_is_averaged_out_of_the_displacement():
-    assert spring(0, wobble=0.5e-3)["stiffness_error"] == pytest.approx(0, abs=2)
+def test_hunting_before_the_push_and_during_the_hold_is_averaged_out_of_the_displacement():
+    # 4 Hz, two whole periods in the window, and at its peak as the push begins: 0.5 mm of 10 would be 5 %.
+    result = spring(0, wobble=lambda t: 0.5e-3 * np.cos(2 * np.pi * 4 * t))
+    assert result["stiffness_error"] == pytest.approx(0, abs=0.02)
+    assert result["cross_motion"] == pytest.approx(0, abs=2e-3)
+
+
+def test_displacement_is_from_the_last_half_second_before_the_push_to_the_last_of_the_hold():
+    # 1 mm of drift that is over half a second before the push, and one that is over before the last half second.
+    early = spring(0, rest=2.0, seconds=6.0, wobble=lambda t: np.where(t < 2.0 - WINDOW, 1e-3, 0.0))
+    assert early["stiffness_error"] == pytest.approx(0, abs=0.02)
+    late = spring(0, seconds=6.0, wobble=lambda t: np.where((t > 1.5) & (t < 6.0 - WINDOW - PERIOD), 1e-3, 0.0))
+    assert late["stiffness_error"] == pytest.approx(0, abs=0.02)
+    # Half of the window before the push: a start 0.5 mm off shows as 10 mm of push over 9.5 mm.
+    inside = spring(0, rest=2.0, seconds=6.0, wobble=lambda t: np.where(t < 2.0 - WINDOW / 2, 1e-3, 0.0))
+    assert inside["stiffness_error"] == pytest.approx(100 * (10 / 9.5 - 1), rel=0.02)
+
+
+@pytest.mark.parametrize("again", [3.2, 5.0])
+def test_every_push_is_measured_from_the_rest_before_it_be_it_ever_so_short(again):
+    time = PERIOD * np.arange(round(9 / PERIOD))
+    # Pushed from 1 s to 3 s, left 4 mm further on, and pushed again.
+    force = np.zeros((len(time), 2))
+    force[:, 0] = 20 * np.where(time < 3, np.clip(time - 1, 0, 1), np.clip(time - again, 0, 1))
+    position = (0.5, 0.0) + force / 2500 + np.where(time >= 3, 4e-3, 0.0)[:, None]
+    assert measure(len(time), position=over_time(position), user_force=over_time(force))["stiffness_error"] == pytest.approx(25)
+
+
+def test_a_push_without_rest_before_it_says_nothing():
+    time = PERIOD * np.arange(round(5 / PERIOD))
+    force = over_time(np.stack([20 + np.clip(time - 1, 0, 1), 0 * time], axis=1))
+    assert np.isnan(measure(len(time), user_force=force)["stiffness_error"]).all()
 
 
 def test_rendered_stiffness_needs_a_push_held_for_two_seconds_and_a_resting_reference():
@@ -252,23 +321,11 @@ def test_the_caller_may_reuse_its_arrays():
     # A target that moves all along: no second is quiet, though the array that says so is always the same one.
     steps = round(2 / PERIOD)
     metrics = EpisodeMetrics(1, PERIOD)
-    info = {name: np.zeros(1 if name in SINGLE else (1, 2)) for name in RESTING}
+    resting = {**RESTING, "compliant_target": RESTING["target"]}
+    info = {name: np.zeros(1 if name in SINGLE else (1, 2)) for name in resting}
     for k in range(steps):
-        for name, value in RESTING.items():
+        for name, value in resting.items():
             info[name][:] = value
         info["target"][:] = 0.5 + 0.01 * k
         metrics.add(info, np.zeros((4, 1)), np.ones(1, bool))
     assert np.isnan(metrics.result()["hunting_x"]).all()
-
-
-def test_summarize_takes_tails_by_size_and_ignores_what_says_nothing():
-    values = np.array([1.0, -10.0, 3.0, np.nan, 2.0])
-    result = summarize(values)
-    assert result["median"] == 1.5
-    assert result["mean"] == -1.0
-    assert result["max"] == 10.0
-    assert result["q95"] == pytest.approx(np.quantile([1, 10, 3, 2], 0.95))
-    nothing = summarize(np.array([np.nan, np.nan]))
-    assert set(nothing) == {"median", "mean", "q95", "max"}
-    assert all(math.isnan(value) for value in nothing.values())
-    assert math.isnan(summarize(np.array([]))["max"])

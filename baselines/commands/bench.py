@@ -17,12 +17,15 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
-from baselines.backstepping import BacksteppingController
 from baselines.commands.shared import make_folder, run, write_json
+from baselines.comparison import default_controllers
+from baselines.registry import make_controller
 from birthsim_env import dynamics
 from birthsim_env.lanes import Array
 
 POLICY_PERIOD = 0.01
+PERIODS = 50
+"""Control periods from which a controller's signals are taken: twelve samples of the laboratory's tracker."""
 STEPS_PER_PERIOD = round(POLICY_PERIOD / dynamics.INTEGRATION_STEP)
 
 
@@ -113,11 +116,19 @@ def _vector(environment: str, lanes: int, budget: float) -> float:
     return lanes / seconds_per_call(lambda: env.step(actions), budget)
 
 
-def _law(lanes: int, budget: float) -> float:
-    env: Any = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=lanes)
+def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
+    """us per lane and call of a controller on what it met in the first ``PERIODS`` control periods of its own run."""
+    rig = birthsim_env.Parameters()
+    law = make_controller(name, rig)
+    period = rig.electronics.control_period
+    env: Any = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=lanes, policy_period=period, sensors=sensors)
     env.reset(seed=0)
-    law = BacksteppingController()
-    return seconds_per_call(lambda: law.command(env.measurement, env.reference), budget) / lanes * 1e6
+    met = []
+    for _ in range(PERIODS):
+        met.append((env.measurement, env.reference))
+        env.step(law.command(*met[-1]).T)
+    signals = cycle(met)
+    return seconds_per_call(lambda: law.command(*next(signals)), budget) / lanes * 1e6
 
 
 def _frames(budget: float) -> float:
@@ -148,8 +159,12 @@ def _bench(arguments: argparse.Namespace) -> None:
         ("  ratio", single / reference, "times"),
         ("gym.make_vec step, 128 lanes", _vector("BirthSIM/Circle-v0", 128, budget), "policy steps/s"),
         ("gym.make_vec step, 1024 lanes", _vector("BirthSIM/Circle-v0", 1024, budget), "policy steps/s"),
-        ("law, 1 lane", _law(1, budget), "us per call"),
-        ("law, batch of 256", _law(256, budget), "us per lane and call"),
+        ("backstepping, 1 lane", _control("backstepping", "ideal", 1, budget), "us per call"),
+        *(
+            (f"{name}, {sensors} sensors, batch of 256", _control(name, sensors, 256, budget), "us per lane and call")
+            for name in default_controllers()
+            for sensors in ("ideal", "lab")
+        ),
         ("rgb_array frame, 640 x 480", _frames(budget), "frames/s"),
     ]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread; medians over {budget:g} s each\n")

@@ -1,4 +1,4 @@
-"""birthsim-evaluate: controllers over seeded episodes, a table, JSON and a figure."""
+"""birthsim-evaluate: controllers over seeded episodes, tables, JSON and figures."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 
 import birthsim_env
+from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
 from baselines.evaluation import Evaluation, evaluate, table
 from baselines.registry import controller_names, make_controller
@@ -18,33 +19,56 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim-evaluate",
-        description="Evaluate controllers on one environment: the same seeds, so the same worlds, for each of them.",
-        epilog="Without --policy every named controller runs; with it the trained residual runs beside the law.",
+        description="Evaluate controllers: the same seeds, so the same worlds, for each of them. With --all on every "
+        "environment, with every sensor model, on the rig as given and on rigs drawn at random, and how the stiffness feels.",
+        epilog="Without --policy every named controller runs; with it the trained residual runs beside the law. With --all "
+        "what the output folder holds of the same settings, rig and code is kept, so that an interrupted run goes on.",
     )
-    parser.add_argument("--env", default="BirthSIM/Circle-v0", help="environment id (default: %(default)s)")
+    parser.add_argument(
+        "--all", action="store_true", help="compare under all conditions; --env, --sensors, --randomize narrow them"
+    )
+    parser.add_argument("--env", help="environment id (default: BirthSIM/Circle-v0, with --all every one)")
     parser.add_argument(
         "--controller",
+        "--controllers",
         nargs="+",
-        default=["backstepping"],
         metavar="NAME",
-        help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping)",
+        help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping, with --all "
+        "every one of the registry that is not slow)",
     )
-    parser.add_argument("--policy", type=Path, help="folder of a trained policy, for the controller 'residual'")
-    parser.add_argument("--episodes", type=whole, default=32, help="default: %(default)s")
+    parser.add_argument("--policy", type=Path, help="folder of a trained policy, for the controller 'residual'; not with --all")
+    parser.add_argument("--episodes", type=whole, default=32, help="per controller, with --all per cell (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
+    parser.add_argument("--sensors", choices=("ideal", "lab"), help="default: ideal, with --all both")
     parser.add_argument(
         "--randomize",
-        default="all",
         choices=tuple(RANDOMIZE),
-        help="what differs between episodes: the plant, the scenario, both (default) or nothing",
+        help="what differs between episodes: the plant, the scenario, both (default) or nothing; with --all the default is "
+        "first the scenario and then both",
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for evaluation.json, evaluation.md and figures")
+    parser.add_argument("--jobs", type=whole, help=f"processes side by side, with --all (default: {JOBS})")
+    parser.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        help="folder for evaluation.json, evaluation.md, with --all comparison.*, and figures",
+    )
     run(parser, _evaluate)
 
 
 def _evaluate(arguments: argparse.Namespace) -> None:
+    if arguments.all:
+        if arguments.policy is not None:
+            raise ValueError("--policy with --all; allowed: without it, --all compares controllers that need no policy")
+        evaluate_all(arguments)
+        return
+    if arguments.jobs is not None or arguments.no_studies:
+        raise ValueError("--jobs and --no-studies; allowed: with --all")
+    arguments.env = arguments.env or "BirthSIM/Circle-v0"
+    arguments.controller = arguments.controller or ["backstepping"]
+    arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
         known = ", ".join(

@@ -1,0 +1,97 @@
+"""birthsim-evaluate --all: every controller under all conditions, and the studies of what a hand feels."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import birthsim_env
+from baselines import comparison
+from baselines.commands.shared import make_folder, write_json
+from baselines.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
+from baselines.comparison_tables import full, overview
+from baselines.registry import CONTROLLERS, SLOW
+from baselines.statistics import in_words
+from baselines.studies import study_tasks
+from baselines.tasks import Result, code_stamp, run_tasks
+from birthsim_env.parameters import Parameters
+
+NARROWED = {"scenario": "nominal", "all": "randomised"}
+"""The option --randomize -> the one plant that is then compared."""
+
+JOBS = 2
+"""Processes side by side, unless --jobs says otherwise."""
+
+
+def evaluate_all(arguments: argparse.Namespace) -> None:
+    """Run what ``--out`` does not hold yet, and write comparison.json, comparison.md and the figures."""
+    rig = birthsim_env.parameters.load_parameters(arguments.parameters)
+    names = list(dict.fromkeys(arguments.controller or default_controllers()))
+    for name in names:
+        if name not in CONTROLLERS and not name.rpartition(":")[0].endswith(".py"):
+            raise ValueError(f"--controller {name!r} with --all; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
+    settings = [controller_settings(name, rig) for name in names]
+    conditions = _conditions(arguments)
+    folder, jobs = make_folder(arguments.out), arguments.jobs or JOBS
+    cells = {
+        (own["controller"], where): cell_task(own, where, arguments.episodes, arguments.seed)
+        for own in settings for where in conditions
+    }  # fmt: skip
+    quick = [own for own in settings if own["controller"] not in SLOW]
+    studies = {} if arguments.no_studies else study_tasks(quick, rig)
+    done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison")
+    felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies")
+    figures = comparison.statistics(comparison.gather({key: done[t.name] for key, t in cells.items() if t.name in done}))
+    found = {key: felt[task.name] for key, task in studies.items() if task.name in felt}
+    _write(arguments, rig, figures, found, folder)
+    problems = {**failures, **failed}
+    if problems:
+        name, problem = next(iter(problems.items()))
+        raise ValueError(f"{len(problems)} of {len(cells) + len(studies)} pieces failed, the first {name}: {problem}")
+
+
+def _conditions(arguments: argparse.Namespace) -> list[Conditions]:
+    """All of them, less what --env, --sensors and --randomize leave out."""
+    narrowed: dict[str, Any] = {}
+    if arguments.env is not None:
+        if arguments.env not in comparison.ENVIRONMENTS:
+            raise ValueError(f"--env {arguments.env!r} with --all; allowed: {', '.join(comparison.ENVIRONMENTS)}")
+        narrowed["environments"] = (arguments.env,)
+    if arguments.sensors is not None:
+        narrowed["sensors"] = (arguments.sensors,)
+    if arguments.randomize is not None:
+        if arguments.randomize not in NARROWED:
+            raise ValueError(f"--randomize {arguments.randomize!r} with --all; allowed: {', '.join(NARROWED)}")
+        narrowed["plants"] = (NARROWED[arguments.randomize],)
+    return all_conditions(**narrowed)
+
+
+def _write(
+    arguments: argparse.Namespace, rig: Parameters, figures: list[dict[str, Any]], studies: dict[tuple[str, str], Result],
+    folder: Path,
+) -> None:  # fmt: skip
+    # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
+    from baselines.comparison_figures import draw_comparison
+    from baselines.study_figures import draw_studies
+
+    by_study: dict[str, dict[str, Result]] = {}
+    for (study, label), result in studies.items():
+        by_study.setdefault(study, {})[label] = result
+    shown = {
+        key: value if value is None or isinstance(value, (int, list)) else str(value) for key, value in vars(arguments).items()
+    }
+    content = {
+        "arguments": shown, "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
+        "cells": in_words(figures), "studies": by_study,
+    }  # fmt: skip
+    write_json(folder / "comparison.json", content)
+    text = overview(figures)
+    caption = (
+        f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
+        f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
+    )
+    (folder / "comparison.md").write_text(f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n", encoding="utf-8")
+    drawn = [*draw_comparison(figures, folder), *draw_studies(by_study, folder)]
+    files = ", ".join(["comparison.json", "comparison.md", *sorted({path.stem + ".png" for path in drawn})])
+    print(f"{caption}\n\n{text}\n\nwritten to {folder}/: {files} (each picture as .svg too)")

@@ -1,0 +1,82 @@
+"""birthsim-stability: maps of where a controller is stable, over rigs that are not as believed and over hands that hold it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from baselines import stability
+from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
+from baselines.registry import make_controller
+from baselines.stability import MAPS
+from birthsim_env.parameters import load_parameters
+from birthsim_env.sensors import SENSORS
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-stability",
+        description="Push rigs that are not as the controller believes, and hands that hold them, and map what comes to rest.",
+    )
+    parser.add_argument(
+        "--controller",
+        default="admittance-backstepping",
+        metavar="NAME",
+        help="a name, or path/to/file.py:Class (default: %(default)s)",
+    )
+    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS))
+    parser.add_argument("--map", action="append", choices=tuple(MAPS), help="may be repeated (default: all)")
+    parser.add_argument("--points", type=whole, help="values along each axis (default: those of the map)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
+    parser.add_argument("--parameters", help="TOML file of the rig as the controller believes it (default: the paper's)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for stability.json and the figures")
+    run(parser, _stability)
+
+
+def _stability(arguments: argparse.Namespace) -> None:
+    # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
+    rig, name = load_parameters(arguments.parameters), arguments.controller
+    make_controller(name, rig)
+    from baselines.stability_figures import stability_figure
+
+    folder, chosen = make_folder(arguments.out), list(dict.fromkeys(arguments.map or MAPS))
+    variants, charts = stability.variants_of(name), {}
+    total = len(chosen) * len(variants) * stability.periods(rig)
+    with tqdm(total=total, desc="stability", unit=" periods", leave=False) as bar:
+        for key in chosen:
+            bar.set_postfix_str(key, refresh=False)
+            charts[key] = stability.draw_map(
+                MAPS[key], name, rig, arguments.sensors, arguments.points, arguments.seed, bar.update
+            )
+    setting: dict[str, Any] = {
+        "controller": name, "sensors": arguments.sensors, "seed": arguments.seed, "believed": rig.to_dict(),
+        "limits": {"motion_mm": 1e3 * stability.MOST_MOTION, "force_of_the_hand_n": stability.MOST_FORCE},
+    }  # fmt: skip
+    write_json(folder / "stability.json", {**setting, "maps": charts})
+    heading = f"{name}, {arguments.sensors} sensors"
+    drawn = [path for key in chosen for path in stability_figure(key, charts[key], heading, folder)]
+    print(f"{heading}: stable up to and including, from the left of the map\n")
+    for chart in charts.values():
+        print(_table(chart))
+    pictures = ", ".join(path.name for path in drawn if path.suffix == ".png")
+    print(f"written to {folder}/: stability.json, {pictures} (each picture as .svg too)")
+
+
+def _table(chart: dict[str, Any]) -> str:
+    """Per value of y and variant how far along x all is stable."""
+    labels = list(chart["variants"])
+    limits = [stability.stable_up_to(chart, label) for label in labels]
+    last = chart["x"]["values"][-1]
+    lines = [f"{chart['title']}: {chart['x']['label']}", f"{chart['y']['label']:>40}" + "".join(f"{x:>32}" for x in labels)]
+    for k, value in enumerate(chart["y"]["values"]):
+        cells = ["nowhere" if row[k] is None else ("all, " if row[k] == last else "") + f"{row[k]:.4g}" for row in limits]
+        lines.append(f"{value:>40.4g}" + "".join(f"{cell:>32}" for cell in cells))
+    return "\n".join([*lines, ""])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""birthsim-tune: find the gains of a controller by simulation, the same way for every controller.
+
+A controller says what may be tuned by a class attribute ``TUNABLE: dict[str, tuple[float, float]]``, gain -> (low, high), SI
+units; each is a keyword of its constructor. Where low is positive the gain is searched on a logarithmic scale, else on a
+linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
+
+A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
+the documented ranges: ``Circle-v0``, everything randomised, and the stiffness test of ``baselines.probes``, with each sensor
+model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus the
+hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95 %
+quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
+vary the best so far.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
+from baselines.controller import Controller
+from baselines.evaluation import evaluate
+from baselines.probes import POSES, Probes, run_probes
+from baselines.registry import CONTROLLERS, make_controller
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters, load_parameters
+from birthsim_env.randomization import documented_ranges, draw_parameters
+from birthsim_env.seeding import stream
+from birthsim_env.sensors import SENSORS
+
+WORLDS = 3_000_000
+"""Seed of the first lane; those of evaluations, trainings and validations are lower."""
+
+LOST = 20.0
+"""mm: what a lost lane costs, and the most that any lane does."""
+
+RANDOM = 20
+"""Trials drawn at random before the best is varied."""
+
+SPREAD, WIDER, NARROWER = 0.15, 1.5, 0.92
+"""Standard deviation of the first variation, as a share of a gain's range, and its factors after a success and a failure: it
+stays where one in six succeeds (the 1/5 rule of evolution strategies)."""
+
+Gains = dict[str, float]
+Bounds = dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Gains, their cost in mm, and what it is made of."""
+
+    gains: Gains
+    cost: float
+    parts: dict[str, float]
+
+
+def bounds_of(name: str, rig: Parameters) -> Bounds:
+    """Lowest and highest value to try of a controller's gains; ``ValueError`` where it has no proper table of them."""
+    kind = type(make_controller(name, rig))
+    bounds = getattr(kind, "TUNABLE", None)
+    if not bounds:
+        makers = {other: getattr(factory, "func", factory) for other, factory in CONTROLLERS.items()}
+        known = ", ".join(other for other, maker in makers.items() if getattr(maker, "TUNABLE", None))
+        raise ValueError(f"controller = {name!r} has no gains to tune; allowed: {known}, or path/to/file.py:Class with TUNABLE")
+    for gain, (low, high) in bounds.items():
+        if not 0 <= low < high < math.inf:
+            raise ValueError(f"{kind.__name__}.TUNABLE[{gain!r}] = {(low, high)!r}; allowed: 0 <= low < high, finite")
+    return dict(bounds)
+
+
+def start_of(path: Path | None, bounds: Bounds) -> Gains:
+    """The gains of trial 0: those of a gains.json, or the middle of every range."""
+    if path is None:
+        return from_unit(np.full(len(bounds), 0.5), bounds)
+    try:
+        gains = json.loads(path.read_text(encoding="utf-8"))["gains"]
+        return {name: float(gains[name]) for name in bounds}
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"--start {str(path)!r} lacks {error}; allowed: JSON with gains: {', '.join(bounds)}") from error
+
+
+def from_unit(point: Array, bounds: Bounds) -> Gains:
+    """Gains at a point of the unit cube, to four digits."""
+    gains = {}
+    for share, (name, (low, high)) in zip(point, bounds.items(), strict=True):
+        gains[name] = float(f"{low * (high / low) ** share if low > 0 else high * share:.4g}")
+    return gains
+
+
+def to_unit(gains: Gains, bounds: Bounds) -> Array:
+    """The point of the unit cube nearest to some gains."""
+    shares = [
+        math.log(max(gains[name], low) / low) / math.log(high / low) if low > 0 else gains[name] / high
+        for name, (low, high) in bounds.items()
+    ]
+    return np.clip(shares, 0.0, 1.0)
+
+
+def proposal(trials: list[Trial], start: Gains, bounds: Bounds, seed: int) -> Gains:
+    """The gains to try after ``trials``; it depends on nothing else, so that a search can be taken up again."""
+    count, size = len(trials), len(bounds)
+    if count == 0:
+        return start
+    rng = np.random.default_rng([seed, count])
+    if count <= RANDOM:
+        return from_unit(rng.uniform(size=size), bounds)
+    costs_so_far = np.minimum.accumulate([trial.cost for trial in trials])
+    successes = int(np.sum(np.diff(costs_so_far[RANDOM:]) < 0))
+    spread = min(SPREAD * WIDER**successes * NARROWER ** (count - RANDOM - 1 - successes), SPREAD)
+    best = to_unit(min(trials, key=lambda trial: trial.cost).gains, bounds)
+    varied = rng.uniform(size=size) < 0.5
+    varied[rng.integers(size)] = True
+    return from_unit(np.clip(best + varied * spread * rng.normal(size=size), 0.0, 1.0), bounds)
+
+
+def probes(rig: Parameters, lanes: int) -> Probes:
+    """Stiffness tests on randomised rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
+    rigs = [draw_parameters(rig, documented_ranges(), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
+    rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
+    force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
+    force[lane % 2, lane] = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes)
+    stiffness[:2] = rng.uniform(1000, 4000, lanes)
+    return Probes(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
+
+
+def robust(losses: Array) -> float:
+    """Mean + 95 % quantile of the losses (N,), mm, none of which counts more than ``LOST``."""
+    capped = np.minimum(np.nan_to_num(losses, nan=LOST, posinf=LOST), LOST)
+    return float(capped.mean() + np.quantile(capped, 0.95))
+
+
+def costs(
+    controller: Controller, rig: Parameters, sensors: tuple[str, ...], lanes: int, seconds: float = 8.0
+) -> dict[str, float]:
+    """What a controller costs, mm, part by part; ``seconds`` is that of the circle."""
+    parts = {}
+    periods = round(seconds / rig.electronics.control_period)
+    setting: dict[str, Any] = {"randomize": True, "parameters": rig, "max_episode_steps": periods, "progress": False}
+    for kind in sensors:
+        circle = evaluate("BirthSIM/Circle-v0", controller, "", lanes, WORLDS, sensors=kind, **setting)
+        if len(circle.seeds) < lanes:
+            raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
+        parts[f"circle, {kind}"] = robust(np.where(circle.lost, LOST, circle.metrics["settled_rms"]))
+        answers = run_probes(probes(rig, lanes), controller, kind, WORLDS)
+        missed = np.hypot(*(answers.displacement - answers.expected)) + answers.hunting.max(axis=0)
+        parts[f"stiffness test, {kind}"] = robust(np.where(answers.lost, LOST, 1e3 * missed))
+    return parts
+
+
+def search(
+    name: str, rig: Parameters, bounds: Bounds, start: Gains, sensors: tuple[str, ...], lanes: int, seed: int, count: int,
+    trials: list[Trial],
+) -> Iterator[Trial]:  # fmt: skip
+    """The trials that ``trials`` lack of ``count``, one by one."""
+    trials = list(trials)
+    while len(trials) < count:
+        gains = proposal(trials, start, bounds, seed)
+        parts = costs(make_controller(name, rig, **gains), rig, sensors, lanes)
+        trials.append(Trial(gains, sum(parts.values()), parts))
+        yield trials[-1]
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-tune",
+        description="Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on.",
+    )
+    parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
+    parser.add_argument("--trials", type=whole, default=60, help="sets of gains to try (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of the search (default: %(default)s)")
+    parser.add_argument("--sensors", default="both", choices=("ideal", "lab", "both"), help="default: both")
+    parser.add_argument("--start", type=Path, help="a gains.json, for trial 0 (default: the middle of every range)")
+    parser.add_argument("--lanes", type=whole, default=32, help="rigs of each scenario (default: %(default)s)")
+    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for trials.json and gains.json")
+    run(parser, _tune)
+
+
+def _stored(path: Path, setting: dict[str, Any]) -> list[Trial]:
+    """The trials of an earlier run with the same setting."""
+    if not path.is_file():
+        return []
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        trials = [Trial(**trial) for trial in content["trials"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(
+            f"{path} is no list of trials ({error}); allowed: what birthsim-tune wrote, or another --out"
+        ) from error
+    for key, value in setting.items():
+        if content.get(key) != value:
+            raise ValueError(f"{path} has {key} = {content.get(key)!r}; allowed: {value!r}, or another --out")
+    return trials
+
+
+def _tune(arguments: argparse.Namespace) -> None:
+    rig = load_parameters(arguments.parameters)
+    sensors = tuple(SENSORS) if arguments.sensors == "both" else (arguments.sensors,)
+    bounds = bounds_of(arguments.controller, rig)
+    start = start_of(arguments.start, bounds)
+    setting = {
+        "controller": arguments.controller, "seed": arguments.seed, "sensors": list(sensors), "lanes": arguments.lanes,
+        "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start, "rig": rig.to_dict(),
+    }  # fmt: skip
+    path = arguments.out / "trials.json"
+    trials = _stored(path, setting)[: arguments.trials]
+    make_folder(arguments.out)
+    bar = tqdm(total=arguments.trials, initial=len(trials), desc=f"tuning {arguments.controller}", unit=" trials", leave=False)
+    try:
+        numbers = (arguments.lanes, arguments.seed, arguments.trials)
+        for trial in search(arguments.controller, rig, bounds, start, sensors, *numbers, trials):
+            trials.append(trial)
+            write_json(path, {**setting, "trials": [vars(one) for one in trials]})
+            bar.set_postfix_str(f"best {min(one.cost for one in trials):.3g} mm", refresh=False)
+            bar.update()
+    except KeyboardInterrupt:
+        if not trials:
+            raise
+        print(f"interrupted: {len(trials)} of {arguments.trials} trials are kept; the same command carries on")
+    finally:
+        bar.close()
+    best = min(trials, key=lambda trial: trial.cost)
+    place = {"trial": trials.index(best), "trials": len(trials)}
+    write_json(arguments.out / "gains.json", {**setting, **vars(best), **place})
+    print(f"{arguments.controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
+    print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
+    for part, value in {**best.parts, "sum": best.cost}.items():
+        before = trials[0].cost if part == "sum" else trials[0].parts[part]
+        print(f"{part:28}{before:12.4g}{value:12.4g}")
+    print(f"\n{'gain':28}{'start':>12}{'best':>12}{'lowest':>12}{'highest':>12}")
+    for gain, value in best.gains.items():
+        print(f"{gain:28}{start[gain]:12.4g}{value:12.4g}{bounds[gain][0]:12.4g}{bounds[gain][1]:12.4g}")
+    print(f"\nwritten to {arguments.out}/: gains.json, trials.json")
+
+
+if __name__ == "__main__":
+    main()

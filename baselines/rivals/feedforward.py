@@ -1,0 +1,86 @@
+"""What the rivals know of the motion that they follow: where the pistons should be and the forces that this takes.
+
+In the plane the point mass needs P = m (A + g) - Fu for the acceleration A of the motion; along the cylinders, with the
+Jacobian (16) at the reference pose, F* = J^T P + Fext + Fv vd + share Fc sign(vd). The user's force cancels against the
+part of A that the admittance owes to it, so that dF*/dt needs no rate of that force.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from birthsim_env import geometry
+from birthsim_env import lanes as at
+from birthsim_env.compilation import BLOCK, helper, kernel
+from birthsim_env.dynamics import load, store
+from birthsim_env.inverse_kinematics import piston_motion, piston_reference
+from birthsim_env.lanes import Array
+
+SIGN_WIDTH = 0.01
+"""m/s; assumed: over this REFERENCE speed the Coulomb feedforward goes from rest to sliding, slowly enough for the valves."""
+
+FORCE1, FORCE2, RATE1, RATE2, KAPPA = range(5)
+NEEDED = 5
+"""Rows of what the motion needs: F* (N) and dF*/dt (N/s) of cylinders 1 and 2, and kappa, all at the reference pose."""
+
+
+@helper
+def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: float) -> tuple[float, float]:
+    """Fc vd / sqrt(vd^2 + width^2) + Fv vd, N, and its rate, N/s."""
+    square = speed * speed + SIGN_WIDTH * SIGN_WIDTH
+    root = math.sqrt(square)
+    slope = coulomb * SIGN_WIDTH * SIGN_WIDTH / (square * root) + viscous
+    return coulomb * speed / root + viscous * speed, slope * acceleration
+
+
+@helper
+def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, share: float, needed: Array, n: int) -> None:
+    """Writes ``needed`` (NEEDED, n) for the motion (8, n), its pistons ``wanted`` (8, n) and the user's force (2, n)."""
+    for i in range(n):
+        v1, v2 = wanted[2, i], wanted[3, i]
+        r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
+            wanted[0, i], wanted[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        m = p[at.MASS]
+        px, py = m * motion[4, i] - force[0, i], m * (motion[5, i] + p[at.GRAVITY]) - force[1, i]
+        jx, jy = m * motion[6, i], m * motion[7, i]
+        along, across = sine * px - cosine * py, -cosine * px - sine * py
+        turn = -2.0 * r4 * v1 / root
+        growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
+        along_rate = sine * jx - cosine * jy - turn * across
+        across_rate = -cosine * jx - sine * jy + turn * along
+        drag1, drag1_rate = friction_ahead(v1, wanted[4, i], share * p[at.FC1], p[at.FV1])
+        drag2, drag2_rate = friction_ahead(v2, wanted[5, i], share * p[at.FC2], p[at.FV2])
+        needed[FORCE1, i] = kappa * across + p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1]) + drag1
+        needed[FORCE2, i] = along + p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2]) + drag2
+        needed[RATE1, i] = kappa * (across_rate + growth * across) + drag1_rate
+        needed[RATE2, i] = along_rate + drag2_rate
+        needed[KAPPA, i] = kappa
+
+
+@kernel
+def prepare(
+    seen: Array, sampled: bool, motion: Array, force: Array, p: Array, share: float, joints: Array, wanted: Array, needed: Array
+) -> None:
+    """Writes the pistons' ``joints`` (4, N): y1, y2, v1, v2, their reference ``wanted`` (8, N), and ``needed`` (NEEDED, N).
+
+    ``seen`` (4, N) holds the joints themselves where ``sampled`` (an observer's estimate), else the end effector: x, y, vx, vy.
+    """
+    x, y, r = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((8, BLOCK))
+    f, w, d = np.empty((2, BLOCK)), np.empty((8, BLOCK)), np.empty((NEEDED, BLOCK))
+    for first in range(0, seen.shape[1], BLOCK):
+        n = min(BLOCK, seen.shape[1] - first)
+        load(seen, first, n, x)
+        load(motion, first, n, r)
+        load(force, first, n, f)
+        if sampled:
+            y[:] = x
+        else:
+            piston_motion(x, p, y, n)
+        piston_reference(r, p, w, n)
+        needed_forces(w, r, f, p, share, d, n)
+        store(y, first, n, joints)
+        store(w, first, n, wanted)
+        store(d, first, n, needed)

@@ -1,0 +1,157 @@
+"""Linear-quadratic regulator of each piston about the motion that it follows, with integral action.
+
+With e = y - yd and D = F - F* the control model (5), (10) is, to first order, per piston
+    d/dt (integral of e, e, de/dt, D) = (e, de/dt, (D - Fv de/dt)/m_e, u),   u = dF/dt - dF*/dt,
+and u = -k (integral, e, de/dt, D) minimises the integral of the squares of these, each over its tolerance (Bryson's rule),
+and of u over ``RATE_TOLERANCE``. Tolerances are those at the end effector: lengths count kappa times and forces 1/kappa for
+cylinder 1. Its gains are scheduled with kappa at the reference pose. dF/dt goes to the valves as in the paper, with its
+regulation of the pneumatic stiffness.
+
+The gains are what these commands printed (with ideal, then with lab):
+    birthsim-tune --controller lqr --trials 75 --seed 0 --sensors ideal --out out/tune/lqr-ideal
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+
+from baselines.backstepping import PNEUMATIC_GAIN
+from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
+from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.valve_inverse import two_valve_openings
+from birthsim_env import control_model
+from birthsim_env import lanes as at
+from birthsim_env.compilation import helper, kernel
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters
+
+RATE_TOLERANCE = 1000.0
+"""N/s at the end effector; assumed: what the valves give cylinder 1 with something to spare. Only ratios to it matter."""
+
+SCHEDULE = 33
+"""Values of kappa in the table, over the whole workspace; linear in between."""
+
+
+def error_dynamics(mass: float, viscous: float, scale: float) -> tuple[Array, Array]:
+    """A (4, 4) and B (4, 1) of one piston's errors: integral (m s), position (m), speed (m/s), force (N).
+
+    ``mass`` m in kg, ``viscous`` Fv in N s/m, ``scale`` kappa for cylinder 1 and 1 for cylinder 2: m_e = m scale^2.
+    """
+    apparent = mass * scale**2
+    a = np.zeros((4, 4))
+    a[0, 1] = a[1, 2] = 1.0
+    a[2, 2:] = -viscous / apparent, 1.0 / apparent
+    return a, np.array([[0.0], [0.0], [0.0], [1.0]])
+
+
+def regulator(mass: float, viscous: float, scale: float, tolerances: Array) -> Array:
+    """Gains k (4,), from the Riccati equation for the tolerances (4,) of integral, position, speed and force.
+
+    It is solved in the natural units of the loop, in which the tolerances of integral and input count 1: SI units span
+    too many decades. With time in 1/w the states are w^3 integral, w^2 e, w de/dt and D/m_e.
+    """
+    a, b = error_dynamics(mass, viscous, scale)
+    apparent = mass * scale**2
+    w = (RATE_TOLERANCE / (mass * tolerances[0])) ** 0.25
+    unit = np.array([w**3, w**2, w, 1.0 / apparent])
+    weights = np.array([scale, scale, scale, 1.0 / scale]) / (tolerances * unit) * (scale * RATE_TOLERANCE) / (apparent * w)
+    state, held = unit[:, None] * a / unit / w, unit[:, None] * b * apparent
+    gains = held.T @ solve_continuous_are(state, held, np.diag(weights**2), np.eye(1))
+    return np.asarray(apparent * w * gains[0] * unit)
+
+
+def kappa_range(parameters: Parameters) -> tuple[float, float]:
+    """Least and largest amplification of cylinder 1 over both strokes."""
+    g = parameters.geometry
+    r4 = g.k1 + np.linspace(-0.5, 0.5, 101) * parameters.cylinder1.stroke
+    arm = 2 * r4 / np.sqrt(4 * g.d3**2 * g.d6**2 - (r4**2 - g.d3**2 - g.d6**2) ** 2)
+    half = parameters.cylinder2.stroke / 2
+    return float(arm.min() * (g.k2 - half)), float(arm.max() * (g.k2 + half))
+
+
+@helper
+def scheduled(table: Array, row: int, place: float) -> float:
+    """Entry ``place`` (not necessarily whole) of one row of a table."""
+    last = table.shape[1] - 2
+    left = max(0, min(int(place), last))
+    entry: float = table[row, left] + (place - left) * (table[row, left + 1] - table[row, left])
+    return entry
+
+
+@kernel
+def command(
+    joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, table: Array,
+    lowest: float, step: float, zone: float, c4: float, integral: Array, fresh: Array, openings: Array,
+) -> None:  # fmt: skip
+    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on.
+
+    ``table`` (8, SCHEDULE): the gains of cylinder 1 over kappa = ``lowest`` + ``step`` j, and those of cylinder 2.
+    """
+    for cylinder in range(2):
+        row, gain = 2 * cylinder, 4 * cylinder
+        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
+        for i in range(joints.shape[1]):
+            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
+            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
+            place = (needed[KAPPA, i] - lowest) / step
+            k1, k2 = scheduled(table, gain, place), scheduled(table, gain + 1, place)
+            k3, k4 = scheduled(table, gain + 2, place), scheduled(table, gain + 3, place)
+            error, excess = y - wanted[cylinder, i], pp * ap - pn * an - needed[FORCE1 + cylinder, i]
+            summed = -k4 * excess / k1 if fresh[i] > 0.0 else integral[cylinder, i]
+            wish = k1 * summed + k2 * error + k3 * (v - wanted[2 + cylinder, i]) + k4 * excess
+            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
+            stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
+            stiffness_rate = target[12 + cylinder, i] - c4 * (stiffness - target[10 + cylinder, i])
+            rate = needed[RATE1 + cylinder, i] - wish
+            two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+            slope = beyond(error, zone / scale)
+            integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
+
+
+class LinearQuadratic(Follower):
+    """LQR with integral action about the compliant motion (this module).
+
+    Arguments are those of ``Follower``, with the gains integral_tolerance (m s), position_tolerance (m), speed_tolerance (m/s)
+    and force_tolerance (N): what counts as much as a force that changes by ``RATE_TOLERANCE``; friction_share; dead_zone.
+    """
+
+    KERNEL = staticmethod(command)
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
+        "integral_tolerance": (1e-6, 1e-3),
+        "position_tolerance": (3e-4, 1e-1),
+        "speed_tolerance": (1e-2, 3.0),
+        "force_tolerance": (1.0, 100.0),
+        "friction_share": (0.0, 1.0),
+        "dead_zone": (0.0, 5e-4),
+    }
+    TUNED: ClassVar[dict[str, dict[str, float]]] = {
+        "ideal": {
+            "integral_tolerance": 1.828e-05,
+            "position_tolerance": 0.001036,
+            "speed_tolerance": 0.5142,
+            "force_tolerance": 5.504,
+            "friction_share": 0.7891,
+            "dead_zone": 0.0,
+        },
+        "lab": {
+            "integral_tolerance": 3.304e-05,
+            "position_tolerance": 0.0003,
+            "speed_tolerance": 0.3149,
+            "force_tolerance": 1.596,
+            "friction_share": 1.0,
+            "dead_zone": 0.0002174,
+        },
+    }
+
+    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
+        mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.TUNABLE)[:4]])
+        low, high = kappa_range(self.parameters)
+        grid = np.linspace(low, high, SCHEDULE)
+        first = [regulator(mass, self.parameters.cylinder1.viscous_friction, kappa, tolerances) for kappa in grid]
+        second = regulator(mass, self.parameters.cylinder2.viscous_friction, 1.0, tolerances)
+        table = np.concatenate([np.array(first).T, np.repeat(second[:, None], SCHEDULE, axis=1)])
+        return table, low, float(grid[1] - grid[0]), gains["dead_zone"], PNEUMATIC_GAIN

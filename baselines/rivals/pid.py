@@ -1,0 +1,127 @@
+"""Position PID per piston with a pressure loop inside each chamber.
+
+With e = yd - y and the apparent mass m_e (m kappa^2 of cylinder 1, m of cylinder 2) at the reference pose, the outer loop asks
+for the force
+    F = F* + m_e (w^2 e + 2 zeta w (vd - v)) + I,   dI/dt = m_e w^2 a (e beyond the dead zone)
+within what the supply can give. F and the setpoint of the pneumatic stiffness (9) make two pressures,
+    F = Pp Sp - Pn Sn,   K = k (Pp Sp/Lp + Pn Sn/Ln),
+and each chamber's flow is (6) solved for dP/dt = b (P* - P): proportional, with the piston's speed compensated.
+
+The gains are what these commands printed (with ideal, then with lab):
+    birthsim-tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/tune/pid-ideal
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from baselines.rivals.feedforward import FORCE1, KAPPA
+from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from birthsim_env import lanes as at
+from birthsim_env import valves
+from birthsim_env.compilation import helper, kernel
+from birthsim_env.lanes import Array
+
+
+@helper
+def pressure_setpoints(
+    force: float,
+    stiffness: float,
+    ap: float,
+    an: float,
+    length_p: float,
+    length_n: float,
+    index: float,
+    low: float,
+    high: float,
+) -> tuple[float, float]:
+    """Pressures of chambers P and N, Pa, that hold ``force`` (N) at ``stiffness`` (N/m), between ``low`` and ``high``.
+
+    Where both cannot be had the stiffness gives way; ``force`` must lie within low ap - high an and high ap - low an.
+    """
+    a = (stiffness / index + force / length_n) / (1.0 / length_p + 1.0 / length_n)
+    a = max(max(low * ap, low * an + force), min(min(high * ap, high * an + force), a))
+    return a / ap, (a - force) / an
+
+
+@helper
+def flow_for(rate: float, pressure: float, area: float, length: float, length_rate: float, index: float, gas_t: float) -> float:
+    """The mass flow, kg/s, that gives dP/dt = ``rate`` (Pa/s) in (6)."""
+    return (area * length * rate / index + pressure * area * length_rate) / gas_t
+
+
+@kernel
+def command(
+    joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, bandwidth: float,
+    damping: float, integral_rate: float, pressure_gain: float, zone: float, integral: Array, fresh: Array, openings: Array,
+) -> None:  # fmt: skip
+    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), N, on. The signals are those of ``Follower``."""
+    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+    low, high = p[at.ATMOSPHERE], p[at.SUPPLY]
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    for cylinder in range(2):
+        row = 2 * cylinder
+        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
+        for i in range(joints.shape[1]):
+            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
+            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
+            spring = p[at.MASS] * scale * scale * bandwidth * bandwidth
+            error, error_rate = wanted[cylinder, i] - y, wanted[2 + cylinder, i] - v
+            force = needed[FORCE1 + cylinder, i]
+            summed = pp * ap - pn * an - force if fresh[i] > 0.0 else integral[cylinder, i]
+            force += spring * (error + 2.0 * damping / bandwidth * error_rate) + summed
+            least, most = low * ap - high * an, high * ap - low * an
+            given = max(least, min(most, force))
+            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
+            pp_set, pn_set = pressure_setpoints(given, target[10 + cylinder, i], ap, an, lp, ln, index, low, high)
+            flow_p = flow_for(pressure_gain * (pp_set - pp), pp, ap, lp, v, index, gas_t)
+            flow_n = flow_for(pressure_gain * (pn_set - pn), pn, an, ln, -v, index, gas_t)
+            fill_p = valves.orifice_flow(1.0, high, d, pp, d, p[at.CRITICAL])
+            drain_p = valves.orifice_flow(1.0, pp, d, low, d, p[at.CRITICAL])
+            fill_n = valves.orifice_flow(1.0, high, d, pn, d, p[at.CRITICAL])
+            drain_n = valves.orifice_flow(1.0, pn, d, low, d, p[at.CRITICAL])
+            up = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            un = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            openings[row, i], openings[row + 1, i] = up, un
+            rate = spring * integral_rate * beyond(error, zone / scale) if given == force else 0.0
+            integral[cylinder, i] = carried_on(summed, rate, period, up, un)
+
+
+class PositionPID(Follower):
+    """Position PID with a pressure loop inside (this module), following the compliant motion.
+
+    Arguments are those of ``Follower``, with the gains bandwidth: w, 1/s, of the position loop; damping: zeta, of the speed
+    error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_share; dead_zone.
+    """
+
+    KERNEL = staticmethod(command)
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
+        "bandwidth": (15.0, 100.0),
+        "damping": (0.1, 2.0),
+        "integral_rate": (0.5, 30.0),
+        "pressure_gain": (40.0, 400.0),
+        "friction_share": (0.0, 1.0),
+        "dead_zone": (0.0, 5e-4),
+    }
+    TUNED: ClassVar[dict[str, dict[str, float]]] = {
+        "ideal": {
+            "bandwidth": 64.65,
+            "damping": 0.5503,
+            "integral_rate": 30.0,
+            "pressure_gain": 340.8,
+            "friction_share": 0.751,
+            "dead_zone": 0.0,
+        },
+        "lab": {
+            "bandwidth": 44.27,
+            "damping": 0.5684,
+            "integral_rate": 9.951,
+            "pressure_gain": 340.8,
+            "friction_share": 0.7569,
+            "dead_zone": 6.794e-05,
+        },
+    }
+
+    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
+        return tuple(gains[name] for name in ("bandwidth", "damping", "integral_rate", "pressure_gain", "dead_zone"))

@@ -1,0 +1,94 @@
+"""Sliding mode of each piston about the motion that it follows.
+
+With e = y - yd, its derivatives from the measured pressures by the control model, d2e/dt2 = (F - F* - Fv de/dt)/m_e, and the
+integral E of e beyond a dead zone, the surface is of third order in E,
+    s = (d/dt + r)^3 E = d2e/dt2 + 3 r de/dt + 3 r^2 e + r^3 E.
+By (5) and (10) the equivalent control and the switching term in a boundary layer,
+    dF/dt = dF*/dt + Fv d2e/dt2 - m_e (3 r d2e/dt2 + 3 r^2 de/dt + r^3 dE/dt) - m_e h sat(s/layer),   layer = h/b,
+make ds/dt = -h sat(s/layer): the layer is reached in (|s| - layer)/h, inside s decays at the rate b. s, h and layer are those
+at the end effector (kappa s of cylinder 1). h must beat 3 r times the acceleration by which the model is wrong. dF/dt goes to
+the valves as in the paper, with its regulation of the pneumatic stiffness.
+
+The gains are what these commands printed (with ideal, then with lab):
+    birthsim-tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from baselines.backstepping import PNEUMATIC_GAIN
+from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
+from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.valve_inverse import two_valve_openings
+from birthsim_env import control_model
+from birthsim_env import lanes as at
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import Array
+
+
+@kernel
+def command(
+    joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, r: float,
+    reaching: float, inside: float, zone: float, c4: float, integral: Array, fresh: Array, openings: Array,
+) -> None:  # fmt: skip
+    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on. The signals are those of ``Follower``."""
+    for cylinder in range(2):
+        row = 2 * cylinder
+        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        half, viscous = (p[at.HALF_L1], p[at.FV1]) if cylinder == 0 else (p[at.HALF_L2], p[at.FV2])
+        for i in range(joints.shape[1]):
+            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
+            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
+            mass = p[at.MASS] * scale * scale
+            excess = pp * ap - pn * an - needed[FORCE1 + cylinder, i]
+            error, error_rate = y - wanted[cylinder, i], v - wanted[2 + cylinder, i]
+            second = (excess - viscous * error_rate) / mass
+            summed = -excess / (mass * r * r * r) if fresh[i] > 0.0 else integral[cylinder, i]
+            slope = beyond(error, zone / scale)
+            surface = scale * (second + r * (3.0 * error_rate + r * (3.0 * error + r * summed)))
+            switched = max(-reaching, min(reaching, inside * surface)) / scale
+            turned = viscous / mass * second - r * (3.0 * second + r * (3.0 * error_rate + r * slope)) - switched
+            rate = needed[RATE1 + cylinder, i] + mass * turned
+            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
+            stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
+            stiffness_rate = target[12 + cylinder, i] - c4 * (stiffness - target[10 + cylinder, i])
+            two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+            integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
+
+
+class SlidingMode(Follower):
+    """Third-order sliding mode about the compliant motion (this module).
+
+    Arguments are those of ``Follower``, with the gains surface_rate: r, 1/s, at which errors decay on the surface;
+    reaching_rate: h, m/s3, at which the boundary layer is approached; layer_rate: b, 1/s, at which s decays inside, so that
+    the layer is h/b thick; friction_share; dead_zone.
+    """
+
+    KERNEL = staticmethod(command)
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
+        "surface_rate": (10.0, 100.0),
+        "reaching_rate": (100.0, 10000.0),
+        "layer_rate": (10.0, 200.0),
+        "friction_share": (0.0, 1.0),
+        "dead_zone": (0.0, 5e-4),
+    }
+    TUNED: ClassVar[dict[str, dict[str, float]]] = {
+        "ideal": {
+            "surface_rate": 72.36,
+            "reaching_rate": 2607.0,
+            "layer_rate": 14.79,
+            "friction_share": 0.2856,
+            "dead_zone": 1.763e-05,
+        },
+        "lab": {
+            "surface_rate": 28.38,
+            "reaching_rate": 955.9,
+            "layer_rate": 46.51,
+            "friction_share": 0.7042,
+            "dead_zone": 0.0002013,
+        },
+    }
+
+    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
+        return gains["surface_rate"], gains["reaching_rate"], gains["layer_rate"], gains["dead_zone"], PNEUMATIC_GAIN

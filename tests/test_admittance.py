@@ -1,0 +1,203 @@
+"""The reference motion: square roots of matrices and the mass, damper and spring, held against SciPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm, sqrtm
+
+from baselines.admittance import DAMPING_RATIO, Admittance, square_root
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters
+from birthsim_env.signals import REFERENCES, Measurement, Reference
+
+MASS, PERIOD = 3.0, 1e-3
+COUPLED = np.array([[3000.0, 800.0], [800.0, 1500.0]])
+
+
+def springs(count: int, seed: int = 0) -> Array:
+    """Symmetric positive definite matrices (count, 2, 2), N/m, with eigenvalues from 300 to 6000 and any axes."""
+    rng = np.random.default_rng(seed)
+    turn, values = rng.uniform(0, np.pi, count), np.exp(rng.uniform(np.log(300), np.log(6000), (count, 2)))
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]).transpose(2, 0, 1)
+    return np.asarray(axes * values[:, None] @ axes.transpose(0, 2, 1))
+
+
+def asked(position: Array, stiffness: Array) -> Reference:
+    """A resting target (2, N) with stiffness matrices (N, 2, 2)."""
+    rows = np.zeros((REFERENCES, position.shape[1]))
+    rows[:2], rows[8], rows[9], rows[14] = position, stiffness[:, 0, 0], stiffness[:, 1, 1], stiffness[:, 0, 1]
+    return Reference(rows)
+
+
+def pushed(force: Array) -> Measurement:
+    """Only the force (2, N) is looked at."""
+    nothing = np.full((4, force.shape[1]), np.nan)
+    return Measurement(nothing[0], nothing[:2], nothing[0], nothing[:2], nothing, force, sampled=False)
+
+
+def generator(stiffness: Array, mass: float = MASS, ratio: float = DAMPING_RATIO) -> tuple[Array, Array]:
+    """A (4, 4) and B (4, 2) of d/dt (x, v) = A (x, v) + B F, with the damping 2 ratio (m K)^(1/2)."""
+    damping = 2 * ratio * np.real(sqrtm(mass * stiffness))
+    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness / mass, -damping / mass]])
+    return a, np.vstack([np.zeros((2, 2)), np.eye(2) / mass])
+
+
+def exact_motion(force: Callable[[int], Array], plan: list[Array], ticks: int) -> Array:
+    """Offset, speed, acceleration and jerk (ticks, 8) of one lane under a force that is held for every period: by expm.
+
+    Each stiffness of the plan holds for an equal share of the ticks.
+    """
+    state, motion, share = np.zeros(4), np.empty((ticks, 8)), ticks // len(plan)
+    for tick in range(ticks):
+        if tick % share == 0:
+            a, b = generator(plan[tick // share])
+            held = expm(PERIOD * np.block([[a, b], [np.zeros((2, 6))]]))
+        push = force(tick)
+        first = a @ state + b @ push
+        motion[tick] = np.concatenate([state, first[2:], (a @ first)[2:]])
+        state = held[:4, :4] @ state + held[:4, 4:] @ push
+    return motion
+
+
+def test_square_root_of_matrices() -> None:
+    matrices = np.concatenate([springs(200), [np.eye(2), COUPLED, np.diag([1.0, 5000.0])]])
+    for matrix in matrices:
+        xx, yy, xy = square_root(matrix[0, 0], matrix[1, 1], matrix[0, 1])
+        expected = sqrtm(matrix)
+        np.testing.assert_allclose([[xx, xy], [xy, yy]], expected, rtol=0, atol=1e-12 * np.linalg.norm(expected))
+
+
+def test_motion_is_that_of_mass_damper_and_spring() -> None:
+    """Forces that change from period to period, full stiffness matrices: a lane for each, against the matrix exponential."""
+    ticks, matrices = 400, np.concatenate([springs(7), [COUPLED]])
+    rng = np.random.default_rng(1)
+    levels = rng.uniform(-40, 40, (20, 2, len(matrices)))
+    model, reference = Admittance(Parameters()), asked(np.full((2, len(matrices)), 0.1), matrices)
+    got = np.array([model.update(pushed(levels[tick // 20]), reference) for tick in range(ticks)])
+    got[:, :2] -= 0.1
+    for lane, matrix in enumerate(matrices):
+
+        def force(tick: int, lane: int = lane) -> Array:
+            return np.asarray(levels[tick // 20, :, lane])
+
+        expected = exact_motion(force, [matrix], ticks)
+        for row in range(0, 8, 2):
+            size = np.abs(expected[:, row : row + 2]).max()
+            np.testing.assert_allclose(got[:, row : row + 2, lane], expected[:, row : row + 2], rtol=0, atol=1e-5 * size)
+
+
+def test_a_moving_target_carries_the_motion_along() -> None:
+    """m (xr'' - xt'') + B (xr' - xt') + K (xr - xt) = F in absolute coordinates, integrated by SciPy along a circle."""
+    rate, radius, force = 5.0, 0.05, np.array([12.0, -25.0])
+    a, b = generator(COUPLED)
+
+    def target(time: float) -> Array:
+        """x, y and three derivatives, (4, 2)."""
+        angle = rate * time + np.pi / 2 * np.arange(4)
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius * rate ** np.arange(4)[:, None]
+
+    def slope(time: float, state: Array) -> Array:
+        at = target(time)
+        off = state - np.concatenate([at[0], at[1]])
+        return np.concatenate([state[2:], at[2] + (a @ off + b @ force)[2:]])
+
+    times = PERIOD * np.arange(800)
+    start = np.concatenate([target(0)[0], target(0)[1]])
+    truth = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-10, atol=1e-13).y.T
+    model, got = Admittance(Parameters()), []
+    for time in times:
+        reference = asked(np.zeros((2, 1)), COUPLED[None])
+        reference.rows[:8, 0] = target(time).ravel()
+        got.append(model.update(pushed(force[:, None]), reference)[:, 0])
+    motion = np.array(got)
+    np.testing.assert_allclose(motion[:, :2], truth[:, :2], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(motion[:, 2:4], truth[:, 2:], rtol=0, atol=5e-6)
+    accelerations = np.array([slope(time, state)[2:] for time, state in zip(times, truth, strict=True)])
+    np.testing.assert_allclose(motion[:, 4:6], accelerations, rtol=0, atol=2e-4)
+    # With a force that stays, row by row the derivative of the one above: central differences are exact to period^2.
+    for row in (0, 2, 4):
+        slopes = (motion[2:, row : row + 2] - motion[:-2, row : row + 2]) / (2 * PERIOD)
+        size = np.abs(motion[:, row + 2 : row + 4]).max()
+        np.testing.assert_allclose(slopes, motion[1:-1, row + 2 : row + 4], rtol=0, atol=1e-3 * size)
+
+
+def test_a_jump_of_the_setpoint_moves_nothing_at_once() -> None:
+    """Position and speed go on from where they are, with the new spring, also while the motion is under way."""
+    ticks, force = 300, np.array([30.0, 10.0])
+    plan = [np.diag([2000.0, 2000.0]), COUPLED, np.diag([800.0, 4000.0])]
+    model, got = Admittance(Parameters()), []
+    for tick in range(ticks):
+        got.append(model.update(pushed(force[:, None]), asked(np.zeros((2, 1)), plan[tick // 100][None]))[:, 0])
+    expected = exact_motion(lambda tick: force, plan, ticks)
+    np.testing.assert_allclose(np.array(got)[:, :2], expected[:, :2], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(np.array(got)[:, 2:4], expected[:, 2:4], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 1e-2])
+def test_at_rest_it_stands_on_the_compliant_target(period: float) -> None:
+    """(19), whatever the control period, and without a creep."""
+    matrices, rng = np.concatenate([springs(30), [COUPLED]]), np.random.default_rng(2)
+    force, position = rng.uniform(-40, 40, (2, 31)), rng.uniform(-0.1, 0.6, (2, 31))
+    model = Admittance(Parameters().replace({"electronics.control_period": period}))
+    reference = asked(position, matrices)
+    for _ in range(round(4.0 / period)):
+        motion = model.update(pushed(force), reference)
+    expected = position + np.linalg.solve(matrices, force.T[..., None])[..., 0].T
+    np.testing.assert_allclose(motion[:2], expected, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(motion[:2], reference.compliant_target(force), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(motion[2:], 0, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.7, 1.5])
+def test_damping_ratio_and_mass_are_those_asked_for(ratio: float) -> None:
+    """A step of force overshoots by exp(-pi zeta / sqrt(1 - zeta^2)) after pi / (w sqrt(1 - zeta^2)), or not at all."""
+    mass, stiffness = 5.0, 2000.0
+    model = Admittance(Parameters().replace({"mechanics.mass": mass}), ratio)
+    reference = asked(np.zeros((2, 1)), stiffness * np.eye(2)[None])
+    path = np.array([model.update(pushed(np.array([[20.0], [0.0]])), reference)[:2, 0] for _ in range(2000)])
+    assert np.all(path[:, 1] == 0)
+    peak = path[:, 0].max() / (20.0 / stiffness)
+    if ratio < 1:
+        root = np.sqrt(1 - ratio**2)
+        assert peak - 1 == pytest.approx(np.exp(-np.pi * ratio / root), rel=1e-3)
+        assert PERIOD * path[:, 0].argmax() == pytest.approx(np.pi / (np.sqrt(stiffness / mass) * root), abs=2 * PERIOD)
+    else:
+        assert peak <= 1 + 1e-12
+
+
+def test_reset_of_some_lanes_starts_only_those_on_the_target() -> None:
+    reference, force = asked(np.full((2, 3), 0.2), springs(3)), np.full((2, 3), 20.0)
+    model, kept = Admittance(Parameters()), Admittance(Parameters())
+    fresh = np.array([False, True, False])
+    for tick in range(300):
+        if tick == 100:
+            model.reset(fresh)
+        got, expected = model.update(pushed(force), reference), kept.update(pushed(force), reference)
+        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
+        if tick == 100:
+            assert np.array_equal(got[:4, 1], [0.2, 0.2, 0.0, 0.0])
+            assert np.abs(expected[:2, 1] - 0.2).max() > 1e-3
+    model.reset()
+    kept = Admittance(Parameters())
+    assert np.array_equal(model.update(pushed(force), reference), kept.update(pushed(force), reference))
+    # Another number of lanes is another run.
+    fewer = asked(np.full((2, 2), 0.2), springs(2))
+    assert np.array_equal(model.update(pushed(force[:, :2]), fewer)[:2], fewer.position)
+
+
+@pytest.mark.parametrize("ratio", [0.0, -0.5, np.nan, np.inf])
+def test_impossible_damping_ratios_are_refused(ratio: float) -> None:
+    with pytest.raises(ValueError, match=r"damping_ratio = .*; allowed: a positive number"):
+        Admittance(Parameters(), ratio)
+
+
+@pytest.mark.parametrize("matrix", [[[2000, 2500], [2500, 2000]], [[-100, 0], [0, 2000]], [[2000, 0], [0, 0]]])
+def test_a_spring_that_is_not_positive_definite_is_refused(matrix: list[list[float]]) -> None:
+    """The lane is named; it would push the reference away without end."""
+    both = np.array([COUPLED, matrix], dtype=float)
+    with pytest.raises(ValueError, match=r"stiffness setpoint .* N/m in lane 1; allowed: more than 0 N/m in every direction"):
+        Admittance(Parameters()).update(pushed(np.zeros((2, 2))), asked(np.zeros((2, 2)), both))

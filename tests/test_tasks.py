@@ -1,0 +1,138 @@
+"""Long work in pieces: what is kept, what is computed anew, and that an interrupted run ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from baselines import tasks
+from baselines.tasks import Task, code_stamp, run_tasks
+
+
+def square(log, number):
+    """Writes down that it ran, and squares."""
+    with open(log, "a", encoding="utf-8") as file:
+        file.write(f"{number}\n")
+    return {"square": number**2, "nothing": math.nan}
+
+
+def interrupt(log, number):
+    if number == 3 and not Path(log).with_suffix(".again").exists():
+        raise KeyboardInterrupt
+    return square(log, number)
+
+
+def fail(log, number):
+    if number == 3:
+        raise RuntimeError("three is not for me")
+    return square(log, number)
+
+
+def die(log, number):
+    os._exit(1)
+
+
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "log"
+
+
+def made(log, work=square, numbers=range(5)):
+    return [Task(f"deep/{k}", f"group {k % 2}", work, {"log": str(log), "number": k}) for k in numbers]
+
+
+def ran(log):
+    return [int(line) for line in log.read_text().split()] if log.exists() else []
+
+
+def test_results_are_written_piece_by_piece_and_come_back_as_written(log, tmp_path):
+    results, failures = run_tasks(made(log), tmp_path / "out", 1, "work")
+    assert failures == {}
+    assert results == {f"deep/{k}": {"square": k * k, "nothing": None} for k in range(5)}
+    content = json.loads((tmp_path / "out" / "deep" / "3.json").read_text())
+    assert content["result"] == {"square": 9, "nothing": None}
+    assert content["code"] == code_stamp()
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped_and_ends_like_an_uninterrupted_one(log, tmp_path, capsys):
+    whole, _ = run_tasks(made(tmp_path / "other"), tmp_path / "whole", 1, "work")
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(made(log, interrupt), tmp_path / "out", 1, "work")
+    assert ran(log) == [0, 1, 2]
+    assert "are kept" not in capsys.readouterr().out
+    log.with_suffix(".again").touch()
+    results, _ = run_tasks(made(log, interrupt), tmp_path / "out", 1, "work")
+    assert ran(log) == [0, 1, 2, 3, 4]
+    assert results == whole
+    assert (
+        "work: 3 of 5 are there with these settings, rig and code, and are kept: group 0 2, group 1 1"
+        in capsys.readouterr().out
+    )
+    assert run_tasks(made(log), tmp_path / "out", 1, "work")[0] == whole
+    assert len(ran(log)) == 5
+
+
+def test_pieces_of_other_settings_or_other_code_are_computed_anew(log, tmp_path, capsys, monkeypatch):
+    run_tasks(made(log), tmp_path / "out", 1, "work")
+    moved = [Task(task.name, task.group, square, {**task.settings, "number": 7}) for task in made(log, numbers=[2])]
+    results, _ = run_tasks([*made(log, numbers=[0, 1]), *moved], tmp_path / "out", 1, "work")
+    assert ran(log)[5:] == [7]
+    assert results["deep/2"]["square"] == 49
+    assert "work: 1 are there with other settings, rig or code, and are computed anew" in capsys.readouterr().out
+    monkeypatch.setattr(tasks, "code_stamp", lambda: {"version": "other"})
+    run_tasks(made(log, numbers=[0, 1]), tmp_path / "out", 1, "work")
+    assert ran(log)[6:] == [0, 1]
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"code": 1}'])
+def test_a_damaged_piece_is_computed_anew(log, tmp_path, damage):
+    run_tasks(made(log, numbers=[1]), tmp_path / "out", 1, "work")
+    (tmp_path / "out" / "deep" / "1.json").write_text(damage)
+    results, _ = run_tasks(made(log, numbers=[1]), tmp_path / "out", 1, "work")
+    assert ran(log) == [1, 1]
+    assert results["deep/1"]["square"] == 1
+
+
+def test_a_piece_that_fails_costs_no_other_and_is_tried_again(log, tmp_path):
+    results, failures = run_tasks(made(log, fail), tmp_path / "out", 1, "work")
+    assert failures == {"deep/3": "RuntimeError: three is not for me"}
+    assert sorted(results) == ["deep/0", "deep/1", "deep/2", "deep/4"]
+    run_tasks(made(log, square), tmp_path / "out", 1, "work")
+    assert ran(log) == [0, 1, 2, 4, 3]
+
+
+def test_two_processes_give_what_one_gives(log, tmp_path):
+    alone = run_tasks(made(log, fail), tmp_path / "one", 1, "work")
+    assert run_tasks(made(tmp_path / "second", fail), tmp_path / "two", 2, "work") == alone
+    assert sorted(ran(tmp_path / "second")) == [0, 1, 2, 4]
+
+
+def test_a_process_that_dies_is_reported(log, tmp_path):
+    with pytest.raises(OSError, match="a process that computed has died"):
+        run_tasks(made(log, die, [0, 1]), tmp_path / "out", 2, "work")
+
+
+def test_the_stamp_follows_what_computes_and_not_what_shows(tmp_path, monkeypatch):
+    for name in ("birthsim_env/plant.py", "birthsim_env/rendering.py", "baselines/gains.json", "baselines/study_figures.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1")
+    monkeypatch.setattr(tasks, "_ROOT", tmp_path)
+    anew = code_stamp.__wrapped__
+    stamp = anew()
+    assert {"version", "sources", "numpy", "numba"} <= set(stamp)
+    for name, counts in (("plant.py", True), ("rendering.py", False)):
+        (tmp_path / "birthsim_env" / name).write_text("2")
+        assert (anew() != stamp) == counts, name
+        stamp = anew()
+    for name, counts in (("gains.json", True), ("study_figures.py", False), ("new.py", True)):
+        (tmp_path / "baselines" / name).write_text("2")
+        assert (anew() != stamp) == counts, name
+        stamp = anew()
+
+
+def test_every_source_that_is_left_out_of_the_stamp_exists():
+    assert [name for name in tasks._SHOWN_ONLY if not (tasks._ROOT / name).exists()] == []

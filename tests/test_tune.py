@@ -1,0 +1,234 @@
+"""birthsim-tune: its search on costs that are known, its files, its costs on the plant, plain errors."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from baselines.commands import tune
+from baselines.registry import make_controller
+from birthsim_env import Parameters
+from birthsim_env.randomization import documented_ranges
+
+OWN = """
+import numpy as np
+
+class Own:
+    TUNABLE = {"stiff": (1.0, 10000.0), "share": (0.0, 2.0)}
+
+    def __init__(self, parameters, stiff=2.0, share=2.0):
+        self.gains = stiff, share
+
+    def reset(self, lanes=None):
+        pass
+
+    def command(self, measurement, reference):
+        return np.zeros((4, measurement.position.shape[1]))
+
+class Upside(Own):
+    TUNABLE = {"stiff": (5.0, 1.0)}
+
+class Mute(Own):
+    TUNABLE = {}
+"""
+BOUNDS = {"stiff": (1.0, 10000.0), "share": (0.0, 2.0)}
+BEST = (400.0, 0.6)
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A controller in a file."""
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    return f"{path}:Own"
+
+
+@pytest.fixture
+def trial_costs(monkeypatch):
+    """Replaces the simulation by a bowl with its bottom at ``BEST``; what was tried; interrupts after ``limit`` trials."""
+    tried, limit = [], [10**6]
+
+    def bowl(controller, rig, sensors, lanes):
+        if len(tried) == limit[0]:
+            limit[0] = 10**6
+            raise KeyboardInterrupt
+        stiff, share = controller.gains
+        tried.append((stiff, share))
+        return {"stiff": abs(np.log(stiff / BEST[0])), "share": 3 * abs(share - BEST[1]), "floor": 0.1 * len(sensors)}
+
+    monkeypatch.setattr(tune, "costs", bowl)
+    return tried, limit
+
+
+def call(monkeypatch, capsys, *arguments):
+    """Exit status, what was printed and what was complained about."""
+    monkeypatch.setattr(sys, "argv", ["birthsim-tune", *map(str, arguments)])
+    status = 0
+    try:
+        tune.main()
+    except SystemExit as end:
+        status = end.code
+    return status, *capsys.readouterr()
+
+
+def read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def test_gains_are_searched_by_decades_where_they_must_be_positive():
+    for share, stiff, linear in ((0.0, 1.0, 0.0), (0.25, 10.0, 0.5), (0.5, 100.0, 1.0), (1.0, 10000.0, 2.0)):
+        gains = tune.from_unit(np.array([share, share]), BOUNDS)
+        assert gains == {"stiff": pytest.approx(stiff), "share": pytest.approx(linear)}
+        np.testing.assert_allclose(tune.to_unit(gains, BOUNDS), share)
+    assert tune.from_unit(np.array([0.123456, 0.5]), BOUNDS)["stiff"] == 3.118, "four digits: what is printed is what ran"
+    np.testing.assert_array_equal(tune.to_unit({"stiff": 0.01, "share": 7.0}, BOUNDS), [0, 1])
+
+
+def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_costs, monkeypatch, capsys):
+    start = tmp_path / "bad.json"
+    start.write_text('{"gains": {"stiff": 1.5, "share": 1.9, "other": 3}}')
+    out = tmp_path / "out"
+    status, printed, _ = call(monkeypatch, capsys, "--controller", own, "--trials", 80, "--start", start, "--out", out)
+    assert status == 0
+    assert trial_costs[0][0] == (1.5, 1.9)
+    trials, best = read(out / "trials.json")["trials"], read(out / "gains.json")
+    assert len(trials) == 80 == len(trial_costs[0])
+    assert best["cost"] == min(trial["cost"] for trial in trials) == sum(best["parts"].values())
+    assert trials[0]["cost"] > 9
+    assert best["cost"] < 0.2 + 0.5, "both sensors have a floor of 0.1 each"
+    assert best["gains"] == trials[best["trial"]]["gains"]
+    assert best["gains"]["stiff"] == pytest.approx(BEST[0], rel=0.4)
+    assert best["gains"]["share"] == pytest.approx(BEST[1], abs=0.1)
+    table = {line.split()[0]: line.split()[1:] for line in printed.splitlines() if line.split()}
+    for name, value in best["gains"].items():
+        assert [float(word) for word in table[name]] == pytest.approx(
+            [trials[0]["gains"][name], value, *BOUNDS[name]], rel=1e-3
+        )
+    random, varied = trials[1 : tune.RANDOM + 1], trials[tune.RANDOM + 1 :]
+    assert np.mean([trial["cost"] for trial in varied[20:]]) < 0.5 * np.mean([trial["cost"] for trial in random])
+    assert np.ptp([np.log10(trial["gains"]["stiff"]) for trial in random]) > 2.5, "the random ones cover the range"
+
+
+def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_costs, monkeypatch, capsys):
+    tried, limit = trial_costs
+    options = ("--controller", own, "--trials", 40, "--seed", 5)
+    assert call(monkeypatch, capsys, *options, "--out", tmp_path / "whole")[0] == 0
+    whole = list(tried)
+    tried.clear()
+    limit[0] = 27
+    status, printed, _ = call(monkeypatch, capsys, *options, "--out", tmp_path / "parts")
+    assert status == 0
+    assert "interrupted: 27 of 40 trials are kept; the same command carries on" in printed
+    assert read(tmp_path / "parts" / "gains.json")["trials"] == 27
+    assert call(monkeypatch, capsys, *options, "--out", tmp_path / "parts")[0] == 0
+    assert tried == whole
+    for name in ("trials.json", "gains.json"):
+        assert read(tmp_path / "parts" / name) == read(tmp_path / "whole" / name)
+    more = ("--controller", own, "--trials", 50, "--seed", 5, "--out", tmp_path / "parts")
+    assert call(monkeypatch, capsys, *more)[0] == 0
+    assert len(tried) == 50
+    assert tried[:40] == whole
+
+
+def test_an_interrupt_before_the_first_trial_ends_with_status_130(own, tmp_path, trial_costs, monkeypatch, capsys):
+    trial_costs[1][0] = 0
+    status, printed, complained = call(monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
+    assert (status, printed) == (130, "")
+    assert complained.endswith("birthsim-tune: interrupted\n")
+    assert not (tmp_path / "out" / "gains.json").exists()
+
+
+def test_the_seed_is_all_that_a_search_depends_on(own, tmp_path, trial_costs, monkeypatch, capsys):
+    found = []
+    for folder, seed in (("a", 0), ("b", 0), ("c", 1)):
+        trial_costs[0].clear()
+        call(monkeypatch, capsys, "--controller", own, "--trials", 30, "--seed", seed, "--out", tmp_path / folder)
+        found.append(list(trial_costs[0]))
+    assert found[0] == found[1]
+    assert found[0][0] == found[2][0] == (100.0, 1.0), "the middle of the ranges"
+    assert found[0][1:] != found[2][1:]
+
+
+def test_the_robust_statistic():
+    losses = np.array([1.0, 2.0, 3.0, np.nan, np.inf, 500.0])
+    capped = [1, 2, 3, tune.LOST, tune.LOST, tune.LOST]
+    assert tune.robust(losses) == pytest.approx(np.mean(capped) + np.quantile(capped, 0.95))
+
+
+def test_probes_are_pushed_rigs_of_the_documented_ranges():
+    probes = tune.probes(Parameters(), 40)
+    for name, (low, high) in documented_ranges().items():
+        section, field = name.split(".")
+        values = [getattr(getattr(rig, section), field) for rig in probes.rigs]
+        assert low <= min(values) < low + 0.2 * (high - low)
+        assert high - 0.2 * (high - low) < max(values) <= high
+    size = np.abs(probes.force).max(axis=0)
+    assert np.all((size >= 5) & (size <= 40))
+    assert np.all((probes.force == 0).sum(axis=0) == 1)
+    assert len(np.unique(np.sign(probes.force), axis=1).T) == 4
+    assert np.all((probes.stiffness[:2] >= 1000) & (probes.stiffness[:2] <= 4000))
+    assert len(np.unique(probes.position, axis=1).T) == 5
+    again = tune.probes(Parameters(), 20)
+    assert np.array_equal(again.position, probes.position[:, :20])
+    assert again.rigs == probes.rigs[:20]
+
+
+def test_costs_on_the_plant_tell_good_gains_from_bad_ones(own):
+    """The same gains cost the same; a slack PID costs more, valves that stay shut much more."""
+    rig = Parameters()
+    good = tune.costs(make_controller("pid", rig), rig, ("ideal", "lab"), 3, 1.0)
+    assert set(good) == {f"{what}, {kind}" for what in ("circle", "stiffness test") for kind in ("ideal", "lab")}
+    again = tune.costs(make_controller("pid", rig), rig, ("ideal",), 3, 1.0)
+    assert again == {part: good[part] for part in ("circle, ideal", "stiffness test, ideal")}
+    slack = tune.costs(make_controller("pid", rig, bandwidth=12.0, integral_rate=0.3), rig, ("ideal",), 3, 1.0)
+    assert all(slack[part] > 1.2 * good[part] for part in slack)
+    shut = tune.costs(make_controller(own, rig), rig, ("ideal",), 3, 1.0)
+    assert shut["circle, ideal"] > 10 * good["circle, ideal"]
+    assert shut["stiffness test, ideal"] > 10 * good["stiffness test, ideal"]
+
+
+BAD = [
+    (("--controller", "backstepping"), "controller = 'backstepping' has no gains to tune; allowed: "),
+    (("--controller", "{own}:Mute"), "has no gains to tune"),
+    (("--controller", "{own}:Upside"), "Upside.TUNABLE['stiff'] = (5.0, 1.0); allowed: 0 <= low < high, finite"),
+    (("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping"),
+    (("--controller", "pid", "--trials", "0"), "--trials: '0'; allowed: a whole number >= 1"),
+    (("--controller", "pid", "--sensors", "none"), "--sensors: invalid choice: 'none'"),
+    (("--controller", "pid", "--start", "{tmp}/nowhere.json"), "nowhere.json'"),
+    (
+        ("--controller", "pid", "--start", "{tmp}/other.json"),
+        "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
+    ),
+    (("--controller", "pid", "--parameters", "nowhere.toml"), "'nowhere.toml'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD)
+def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own, tmp_path, monkeypatch, capsys):
+    (tmp_path / "other.json").write_text('{"gains": {"damping": 1.0}}')
+    given = [argument.format(tmp=tmp_path, own=own.removesuffix(":Own")) for argument in arguments]
+    status, printed, complained = call(monkeypatch, capsys, *given, "--out", tmp_path / "out")
+    assert (status, printed) == (2, "")
+    assert message in complained.strip().splitlines()[-1]
+    assert not (tmp_path / "out").exists()
+
+
+def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, monkeypatch, capsys):
+    out = tmp_path / "out"
+    assert call(monkeypatch, capsys, "--controller", own, "--trials", 3, "--out", out)[0] == 0
+    before = (out / "trials.json").read_text()
+    for changed, said in (
+        (("--seed", 9), "seed = 0; allowed: 9"),
+        (("--sensors", "lab"), "sensors = ['ideal', 'lab']; allowed: ['lab']"),
+    ):
+        status, _, complained = call(monkeypatch, capsys, "--controller", own, "--trials", 5, *changed, "--out", out)
+        assert status == 2
+        assert f"{out}/trials.json has {said}, or another --out" in complained
+    assert (out / "trials.json").read_text() == before
+    (out / "trials.json").write_text("{}")
+    status, _, complained = call(monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
+    assert status == 2
+    assert "trials.json is no list of trials" in complained
