@@ -45,7 +45,7 @@ pictures: $(READY)
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --out $(OUT)/comparison
-	$(BIN)/birthsim-stability --out $(OUT)/stability
+	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 golden: $(READY)

@@ -34,16 +34,6 @@ def _backstepping_weight(parameters: Parameters) -> Controller:
     return BacksteppingController(parameters, weight_compensation=True)
 
 
-def _nmpc(parameters: Parameters, **gains: float) -> Controller:
-    try:
-        from baselines.rivals.nmpc import NonlinearPredictive
-    except ModuleNotFoundError as error:
-        if error.name != "casadi":
-            raise
-        raise ValueError("controller = 'nmpc' needs CasADi; allowed: with it, pip install 'birthsim[mpc]'") from error
-    return NonlinearPredictive(parameters, **gains)
-
-
 CONTROLLERS: dict[str, Factory] = {
     "backstepping": _backstepping,
     "backstepping-weight": _backstepping_weight,
@@ -54,10 +44,9 @@ CONTROLLERS: dict[str, Factory] = {
     "pid": PositionPID,
     "lqr": LinearQuadratic,
     "sliding-mode": SlidingMode,
-    "nmpc": _nmpc,
 }
 
-SLOW: frozenset[str] = frozenset({"nmpc"})
+SLOW: frozenset[str] = frozenset()
 """Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
 
 

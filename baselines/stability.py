@@ -38,7 +38,7 @@ PUSHED, RELEASED, JUDGED, END = 0.5, 0.8, 5.0, 6.0
 """s, assumed: the push begins and ends, judgement begins and ends."""
 
 MOST_MOTION, MOST_FORCE = 5e-4, 5.0
-"""m and N, assumed: peak to peak, more is an oscillation; the force is the hand's, which feels small motions when it is stiff."""
+"""m and N, assumed: peak to peak, more is an oscillation; the force is that of the hand, a stiff one feels small motions."""
 
 SETPOINT = 2000.0
 """N/m, of the closed-loop stiffness where it does not vary."""
@@ -64,7 +64,7 @@ MASS = Axis("mass at the end effector (kg)", 1.5, 6.0, 10)
 LAG = Axis("time constant of the valves (ms)", 1.0, 12.0, 12)
 HAND = Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 16, logarithmic=True)
 ASKED = Axis("closed-loop stiffness asked for (N/m)", 1000.0, 4000.0, 7)
-FRICTION = Axis("dry friction over the believed one", 0.0, 1.5, 7)
+FRICTION = Axis("dry friction, share of the believed one", 0.0, 1.5, 13)
 
 
 @dataclass(frozen=True)
@@ -92,18 +92,14 @@ def _mass_cases(rig: Parameters, hand: Array, mass: Array) -> Cases:
 def _friction_cases(rig: Parameters, hand: Array, scale: Array) -> Cases:
     changed = []
     for share in scale:
-        names = {f"cylinder{i}.coulomb_friction": share * own.coulomb_friction for i, own in enumerate(_cylinders(rig), 1)}
-        changed.append(rig.replace(names))
+        levels = share * rig.cylinder1.coulomb_friction, share * rig.cylinder2.coulomb_friction
+        changed.append(rig.replace({f"cylinder{i}.coulomb_friction": level for i, level in enumerate(levels, 1)}))
     return Cases(changed, hand, np.full(len(hand), SETPOINT))
-
-
-def _cylinders(rig: Parameters) -> tuple[Any, Any]:
-    return rig.cylinder1, rig.cylinder2
 
 
 @dataclass(frozen=True)
 class Map:
-    """Two axes and what they mean: ``cases`` of a rig for values (N,) along both; ``believed`` is the controller's own place."""
+    """Two axes; ``cases`` of a rig for values (N,) along both, and where on them its controller believes to be."""
 
     title: str
     x: Axis
@@ -118,7 +114,9 @@ MAPS: dict[str, Map] = {
         LAG, MASS, _rig_cases, lambda rig: (1e3 * rig.valves.time_constant, rig.mechanics.mass),
     ),
     "hand": Map("The rig as believed, held by a hand", HAND, ASKED, _hand_cases, lambda rig: (None, None)),
-    "hand_friction": Map("Other friction than believed, held by a hand", HAND, FRICTION, _friction_cases, lambda rig: (None, 1.0)),
+    "hand_friction": Map(
+        "Other friction than believed, held by a hand", HAND, FRICTION, _friction_cases, lambda rig: (None, 1.0)
+    ),
     "hand_mass": Map(
         "Another mass than believed, held by a hand", HAND, MASS, _mass_cases, lambda rig: (None, rig.mechanics.mass)
     ),
@@ -201,7 +199,7 @@ def draw_map(
     tick: Callable[[], object] = lambda: None,
 ) -> dict[str, Any]:  # fmt: skip
     """One map as JSON: the values along ``x`` and ``y``, where the controller believes itself, and per variant rows over y of
-    ``motion_mm`` (None where lost) and ``stable``. ``points`` is the number of values along each axis."""
+    ``motion_mm`` (NaN where lost) and ``stable``. ``points`` is the number of values along each axis."""
     x, y = chart.x.values(points), chart.y.values(points)
     across, up = (side.ravel() for side in np.meshgrid(x, y))
     cases, shape, found = chart.cases(rig, across, up), (len(y), len(x)), {}

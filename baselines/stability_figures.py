@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
 
-from baselines.figures import ACCENT, DARK, STYLE, label_of, legend_below, log_ticks, save
+from baselines.figures import ACCENT, DARK, STYLE, label_of, legend_below, save
 from birthsim_env.lanes import Array
 
 RANGE = (0.01, 100.0)
@@ -22,26 +23,30 @@ LOST_COLOUR = "#303030"
 
 
 def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Path) -> list[Path]:
-    """One map, as ``baselines.stability.draw_map`` gives it, a panel per variant; ``heading`` says who and with what sensors."""
+    """One map, as ``baselines.stability.draw_map`` gives it, a panel per variant; ``heading`` names controller and sensors."""
     count = len(chart["variants"])
     with plt.rc_context({**STYLE, "axes.grid": False}):
         width = max(4.6, 3.7 * count)
         figure, panels = plt.subplots(1, count, figsize=(width, 4.3), layout="constrained", sharey=True, squeeze=False)
         x, y = (np.array(chart[side]["values"]) for side in "xy")
-        edges = tuple(_edges(values, chart[side]["logarithmic"]) for values, side in ((x, "x"), (y, "y")))
+        across, up = _edges(x, chart["x"]["logarithmic"]), _edges(y, chart["y"]["logarithmic"])
+        lost = False
         for axes, (label, found) in zip(panels[0], chart["variants"].items(), strict=True):
             motion, stable = np.array(found["motion_mm"], dtype=float), np.array(found["stable"])
             axes.set_facecolor(LOST_COLOUR)
+            lost |= bool(np.isnan(motion).any())
             drawn = axes.pcolormesh(
-                *edges, np.clip(motion, *RANGE), norm=LogNorm(*RANGE), cmap="YlOrBr", edgecolors="white", linewidth=0.3
+                across, up, np.clip(motion, *RANGE), norm=LogNorm(*RANGE), cmap="YlOrBr", edgecolors="white", lw=0.3
             )
-            _border(axes, *edges, stable)
+            _border(axes, across, up, stable)
             _believed(axes, chart["believed"])
             for side, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
                 if chart[side]["logarithmic"]:
                     getattr(axes, f"set_{side}scale")("log")
-                    log_ticks(axis)
-            axes.set(xlabel=chart["x"]["label"], xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+                    axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+                    axis.set_major_formatter("{x:g}")
+                    axis.set_minor_formatter(NullFormatter())
+            axes.set(xlabel=chart["x"]["label"], xlim=across[[0, -1]], ylim=up[[0, -1]])
             axes.set_title(f"{label_of(label)}\n{100 * stable.mean():.0f} % of the cells stable", loc="left", fontsize=8.5)
         panels[0, 0].set_ylabel(chart["y"]["label"])
         bar = figure.colorbar(drawn, ax=panels, pad=0.015, extend="both")
@@ -49,8 +54,9 @@ def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Pat
         bar.ax.yaxis.set_major_formatter("{x:g}")
         handles: list[Any] = [Line2D([], [], color=DARK, lw=2, label="border of what is stable")]
         if any(place is not None for place in chart["believed"]):
-            handles.append(Line2D([], [], color=ACCENT, marker="*", ms=9, ls="--", lw=1, label="what the controller believes"))
-        if any(None in row for found in chart["variants"].values() for row in found["motion_mm"]):
+            look = {"ls": "--"} if None in chart["believed"] else {"ls": "", "marker": "*", "ms": 11}
+            handles.append(Line2D([], [], color=ACCENT, label="what the controller believes", **look))
+        if lost:
             handles.append(Patch(color=LOST_COLOUR, label="lost: ran into a stop"))
         legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
         figure.suptitle(f"{chart['title']}: {heading}", fontsize=9.5)

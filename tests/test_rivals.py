@@ -426,6 +426,37 @@ def test_integrals_rest_while_a_valve_is_full(rival: type[Follower]) -> None:
     np.testing.assert_allclose(law.command(near, reference), first, atol=1e-12)
 
 
+def test_the_integral_of_the_pid_rests_while_the_supply_gives_no_more() -> None:
+    """Full chambers need no open valve: the limit of the force itself holds the integral."""
+    rig, law = Parameters(), PositionPID(integral_rate=10.0)
+    reference = closed_loop.holding(np.array([[0.5], [0.0]]), 2000.0)
+    full, empty = rig.air.supply_pressure, rig.air.atmospheric_pressure
+    start = closed_loop.ideal(closed_loop.resting_at(reference, rig), 0.0, np.zeros((2, 1)))
+    for offset, pressures in ((-0.06, [empty, full, full, empty]), (0.06, [full, empty, empty, full])):
+        changes = {"position": start.position + offset * np.array([[1.0], [1.0]]), "pressures": np.array(pressures)[:, None]}
+        law.reset()
+        law.command(dataclasses.replace(start, position=changes["position"]), reference)
+        before = law._integral.copy()
+        for _ in range(10):
+            openings = law.command(dataclasses.replace(start, **changes), reference)
+        assert np.abs(openings).max() < 1
+        assert np.array_equal(law._integral, before)
+
+
+@every_rival
+def test_the_observer_is_told_what_is_known(rival: type[Follower], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The measured force, and in which lanes the compliant motion is faster than 1 mm/s."""
+    told, law = [], rival()
+    update = law._observer.update
+    monkeypatch.setattr(law._observer, "update", lambda m, f, moving: told.append((f, moving)) or update(m, f, moving=moving))
+    ((measured, reference),) = signals(2, 1, True)
+    reference.rows[2] = [2e-3, 5e-4]
+    law.command(measured, reference)
+    force, moving = told[0]
+    assert np.array_equal(force, measured.user_force)
+    assert moving.tolist() == [1, 0]
+
+
 def test_the_dead_zone_is_continuous() -> None:
     errors = np.linspace(-3, 3, 61)
     kept = np.array([beyond.py_func(error, 1.0) for error in errors])

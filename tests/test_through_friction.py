@@ -203,6 +203,7 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
         ({"bandwidth": np.nan}, r"bandwidth = nan; allowed: a positive number"),
         ({"lead_time": np.inf}, r"lead_time = inf; allowed: a positive number"),
         ({"dead_zone": -1e-6}, r"dead_zone = -1e-06; allowed: zero or a positive number"),
+        ({"friction_share": -0.1}, r"friction_share = -0.1; allowed: zero or a positive number"),
         ({"yielding": 1.1}, r"yielding = 1.1; allowed: at most 1"),
     ],
 )

@@ -73,9 +73,18 @@ def _table(chart: dict[str, Any]) -> str:
     last = chart["x"]["values"][-1]
     lines = [f"{chart['title']}: {chart['x']['label']}", f"{chart['y']['label']:>40}" + "".join(f"{x:>32}" for x in labels)]
     for k, value in enumerate(chart["y"]["values"]):
-        cells = ["nowhere" if row[k] is None else ("all, " if row[k] == last else "") + f"{row[k]:.4g}" for row in limits]
-        lines.append(f"{value:>40.4g}" + "".join(f"{cell:>32}" for cell in cells))
+        cells = [_limit(row[k], last) for row in limits]
+        lines.append(f"{_number(value):>40}" + "".join(f"{cell:>32}" for cell in cells))
     return "\n".join([*lines, ""])
+
+
+def _limit(value: float | None, last: float) -> str:
+    return "nowhere" if value is None else _number(value) + (" (all)" if value == last else "")
+
+
+def _number(value: float) -> str:
+    """Four digits, without an exponent."""
+    return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
 
 
 if __name__ == "__main__":
