@@ -44,7 +44,7 @@ pictures: $(READY)
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
 
 compare: $(READY)
-	$(BIN)/birthsim-evaluate --all --out $(OUT)/comparison
+	$(BIN)/birthsim-evaluate --all --episodes 16 --out $(OUT)/comparison
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 

@@ -89,31 +89,34 @@ def test_unseen_forces_are_believed_up_to_a_limit() -> None:
     assert np.array_equal(openings[:, 0], openings[:, 1])
 
 
-def test_what_rests_is_left_alone_within_the_dead_zone() -> None:
-    """Errors of a resting piston's direction within the zone change nothing; beyond it they count twice; moving, all count."""
+@pytest.mark.parametrize("cylinder", [0, 1])
+def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int) -> None:
+    """Errors along a resting piston within the zone change nothing; beyond it they count twice; moving, all count."""
     rig, zone = Parameters(), 1e-4
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
     sizes = np.array([0.0, 0.5, 0.99, 1.5])
     now = rigid_body.Instant(*(np.repeat(part, len(sizes), axis=1) for part in now))
     nothing = np.zeros((2, len(sizes)))
     motion, _ = near(now, rig, nothing, seed=1, share=0.0)
-    beam = rigid_body.pose_of(now.piston, rig).beam
-    motion[:2] -= zone * sizes * beam  # along cylinder 2
-    rest = np.repeat([[0.0], [1.0]], len(sizes), axis=1)
+    pose = rigid_body.pose_of(now.piston, rig)
+    along = pose.beam if cylinder == 1 else pose.across
+    motion[:2] -= zone * sizes * along
+    rest = np.zeros((2, len(sizes)))
+    rest[cylinder] = 1.0
 
     def jerks(**changes: Array) -> Array:
         openings = Law(rig, 50.0, 50.0, zone).command(now, motion, nothing, nothing, nothing, **changes)
         assert np.abs(openings).max() < 1
         a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)
         assert np.abs(a).max() < 1e-9
-        return np.asarray((jerk * beam).sum(axis=0))
+        return np.asarray((jerk * along).sum(axis=0))
 
     stiffness = 50.0**3 + 2 * 50.0
     np.testing.assert_allclose(jerks(), -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
     expected = -admittance_law.REST_PUSH * stiffness * zone * np.maximum(sizes - 1, 0)
     np.testing.assert_allclose(jerks(rest=rest), expected, rtol=0, atol=1e-4 * stiffness * zone)
-    still = jerks(rest=rest[::-1].copy())
-    np.testing.assert_allclose(still, -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
+    other = jerks(rest=rest[::-1].copy())
+    np.testing.assert_allclose(other, -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
 
 
 def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
@@ -157,6 +160,27 @@ def test_the_spool_follows_with_the_lead_time(tau: float, lead_time: float) -> N
     np.testing.assert_allclose(path[-1], spool, rtol=0, atol=1e-6, err_msg="what it believes of the spool")
     left = np.exp(-PERIOD / lead_time * np.arange(1, 13))[:, None]
     np.testing.assert_allclose(1 - np.array(path) / wanted, np.repeat(left, 4, axis=1), rtol=0, atol=1e-4)
+
+
+def test_the_law_knows_where_the_spools_are() -> None:
+    """Its memory of them is the plant's own spools, full openings included, while errors and commands change."""
+    rig, lanes, rng = Parameters(), 3, np.random.default_rng(0)
+    now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.0, push=30.0)
+    nothing, memory, openings = np.zeros((2, lanes)), np.zeros((admittance_law.MEMORY, lanes)), np.empty((4, lanes))
+    memory[admittance_law.GAIN_SHARE], target = 1.0, np.zeros((REFERENCES, lanes))
+    target[10:12] = now.stiffness
+    plant, full = Plant(rig, lanes), False
+    for _ in range(30):
+        motion, _ = near(now, rig, nothing, seed=int(rng.integers(100)), share=3.0)
+        admittance_law.command(
+            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, nothing, nothing, nothing, nothing,
+            np.ones(lanes), parameter_column(rig), PERIOD, 60.0, 60.0, 0.0, 0.5, 0.06, 0.9, LEAST_SHARE, 30.0, memory, openings,
+        )  # fmt: skip
+        plant.advance(openings, np.zeros((2, lanes)), PERIOD)
+        full |= bool((np.abs(openings) == 1).any())
+        np.testing.assert_allclose(memory[:4], plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
+    assert full
+    assert np.ptp(memory[:4]) > 0.1
 
 
 def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
