@@ -33,7 +33,7 @@ RESIDUAL = "BirthSIM/ProbeResidual-v0"
 def run(command, *arguments):
     """The finished process of a command, in the words of a shell."""
     line = [sys.executable, "-m", COMMANDS[command], *map(str, arguments)]
-    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=120)
+    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
 
 
 def call(command, monkeypatch, capsys, *arguments):
