@@ -5,9 +5,11 @@ The law of ``cartesian_law`` with one gain c for all directions, with the measur
     L_i = F_i - Fext_i - Fv v_i + believed_i + m_e d_i
 with the believed force of ``reference_friction`` and the disturbance d of an observer.
 
-- While pistons rest (``observers``) errors within ``dead_zone`` move nothing, and once the reference rests the loop has a gain
-  of its own, softer: what noise a slow average leaves must not wear the friction down.
-- ``watch`` lowers c where the loop oscillates: the rig is then slower, lighter or held more stiffly than believed.
+- While pistons rest (``observers``) position errors weigh ``rest_push`` times as much, since stiction, not inertia, has to be
+  overcome, and those within ``dead_zone`` move nothing. Once the reference rests the loop has a gain of its own, softer: what
+  noise a slow average leaves must not wear the friction down.
+- ``watch`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower, lighter
+  or held more stiffly than believed.
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
@@ -24,23 +26,22 @@ from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 
 MEMORY_NAMES = (
-    *("spool1P", "spool1N", "spool2P", "spool2N", "gain_share", "motion_share"),
-    *("extreme_t", "since_t", "last_peak_t", "extreme_n", "since_n", "last_peak_n"),
+    *("gain_share_t", "extreme_t", "since_t", "last_peak_t"),
+    *("gain_share_n", "extreme_n", "since_n", "last_peak_n"),
+    "motion_share",
 )
-"""Rows of what a lane remembers: spools as believed, the share of c that oscillations have left, how far the reference was
-moving of late, and across and along cylinder 2 the largest speed error of this half wave (m/s), the time (s) since it
-began and the size of the last one."""
+"""Rows of what a lane remembers: across and along cylinder 2 the share of c that oscillations have left, the largest speed
+error of this half wave (m/s), the time (s) since it began and the size of the last one; how far the reference was moving of
+late."""
 MEMORY = len(MEMORY_NAMES)
-SPOOL, GAIN_SHARE, MOTION_SHARE, WATCH_T, WATCH_N = 0, 4, 5, 6, 9
+WATCH_T, WATCH_N, MOTION_SHARE = 0, 4, 8
+GAIN_SHARES = [WATCH_T, WATCH_N]
 
 BELIEVED_LIMIT = 120.0
 """N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
-
-REST_PUSH = 2.0
-"""Weight of the position error while a piston rests: stiction, not inertia, has to be overcome. Found by trial."""
 
 HALF_WAVE = 0.2
 """s: a longer half wave of the speed error is no oscillation of the loop."""
@@ -50,18 +51,20 @@ SUSTAINED = 0.75
 
 
 @helper
-def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> None:
-    """Lowers the gain share, by ``fall`` down to ``least``, at each sustained half wave of a speed error beyond ``level``."""
-    extreme = memory[row, i]
-    memory[row + 1, i] += period
+def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> float:
+    """The gain share, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``."""
+    share: float = memory[row, i]
+    extreme = memory[row + 1, i]
+    memory[row + 2, i] += period
     if error * extreme < 0.0:
-        peak = abs(extreme) if memory[row + 1, i] < HALF_WAVE else 0.0
-        last = memory[row + 2, i]
+        peak = abs(extreme) if memory[row + 2, i] < HALF_WAVE else 0.0
+        last = memory[row + 3, i]
         if peak > level and last > 0.0 and peak > SUSTAINED * last:
-            memory[GAIN_SHARE, i] = max(least, fall * memory[GAIN_SHARE, i])
-        memory[row, i], memory[row + 1, i], memory[row + 2, i] = error, 0.0, peak
+            share = max(least, fall * share)
+        memory[row, i], memory[row + 1, i], memory[row + 2, i], memory[row + 3, i] = share, error, 0.0, peak
     elif abs(error) > abs(extreme):
-        memory[row, i] = error
+        memory[row + 1, i] = error
+    return share
 
 
 @helper
@@ -88,13 +91,14 @@ def beyond(error: float, zone: float) -> float:
 @kernel
 def command(
     joints: Array, pressures: Array, motion: Array, target: Array, force: Array, believed: Array, disturbance: Array,
-    rest: Array, moving: Array, p: Array, period: float, gain: float, rest_gain: float, dead_zone: float, quickness: float,
-    level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
+    rest: Array, moving: Array, spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float,
+    dead_zone: float, quickness: float, level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
 ) -> None:  # fmt: skip
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
     ``joints`` (4, N): y1, y2, v1, v2; ``motion`` (8, N) to follow; ``target`` (15, N) the reference; ``force`` (2, N) the
-    user's, N; ``believed`` (2, N), N, and ``disturbance`` (2, N), m/s2, along the pistons; ``rest`` (2, N); ``moving`` (N,).
+    user's, N; ``believed`` (2, N), N, and ``disturbance`` (2, N), m/s2, along the pistons; ``rest`` (2, N); ``moving`` (N,);
+    ``spools`` (4, N) as believed.
     """
     u, kept = np.empty((4, 1)), math.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
@@ -120,15 +124,14 @@ def command(
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(motion[4, i], motion[5, i], sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(motion[4, i], motion[5, i], sine, cosine)
 
-        watch(memory, WATCH_T, i, dt, period, level, fall, least)
-        watch(memory, WATCH_N, i, dn, period, level, fall, least)
+        share_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
+        share_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
         memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * math.exp(-period / MOTION_TIME))
-        share = memory[GAIN_SHARE, i]
-        c = share * (rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i])
-        et = (1.0 + (REST_PUSH - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
-        en = (1.0 + (REST_PUSH - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
-        jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, c)
-        jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, c)
+        c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
+        et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
+        en = (1.0 + (rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
+        jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, share_t * c)
+        jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, share_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
         rate1 += p[at.FV1] * mechanics.acceleration1(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity
@@ -141,7 +144,4 @@ def command(
             u, 0, 2, rate2, target[11, i], target[13, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.HALF_L2], y2, v2, p
         )
         for valve in range(4):
-            spool = memory[SPOOL + valve, i]
-            opening = lead(u[valve, 0], spool, kept, quickness)
-            memory[SPOOL + valve, i] = kept * spool + (1.0 - kept) * opening
-            openings[valve, i] = opening
+            openings[valve, i] = lead(u[valve, 0], spools[valve, i], kept, quickness)

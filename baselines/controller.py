@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+import math
+from collections.abc import Mapping
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -38,6 +40,24 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
                 f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
             )
     return lanes
+
+
+class Tunable(Protocol):
+    """A controller whose gains ``birthsim-tune`` finds: ``TUNABLE`` is gain -> (lowest, highest) to try, SI units."""
+
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]]
+
+
+def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
+    """Raises ``ValueError`` for gains that the controller has not, and for those that are not positive (or zero where the
+    lowest to try is)."""
+    known = controller.TUNABLE
+    for name, value in gains.items():
+        if name not in known:
+            raise ValueError(f"{name} = {value!r} is no gain of {type(controller).__name__}; allowed: {', '.join(known)}")
+        zero = known[name][0] == 0
+        if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+            raise ValueError(f"{name} = {value!r}; allowed: {'zero or a positive number' if zero else 'a positive number'}")
 
 
 def require_stiffness(reference: Reference, least: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
@@ -11,13 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.admittance import Admittance
-from baselines.admittance_backstepping import MOVING_SPEED
+from baselines.awareness import MOVING_SPEED
+from baselines.controller import check_gains, lanes_of
 from baselines.observers import PistonObserver
 from baselines.rivals.feedforward import NEEDED, prepare
 from birthsim_env.compilation import helper
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference, one_lane
+from birthsim_env.signals import Mask, Measurement, Reference, one_lane
 
 LEAST_LENGTH = 0.002
 """m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""
@@ -58,12 +58,7 @@ class Follower(ABC):
     TUNED: ClassVar[dict[str, dict[str, float]]]
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
-        for name, value in gains.items():
-            if name not in self.TUNABLE:
-                raise ValueError(f"{name} = {value!r} is no gain of {type(self).__name__}; allowed: {', '.join(self.TUNABLE)}")
-            zero = self.TUNABLE[name][0] == 0
-            if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
-                raise ValueError(f"{name} = {value!r}; allowed: {'zero or a positive number' if zero else 'a positive number'}")
+        check_gains(self, gains)
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
         self._period = self.parameters.electronics.control_period
@@ -94,18 +89,7 @@ class Follower(ABC):
         """
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference))[:, 0]
-        lanes = measurement.position.shape[1]
-        for name, signal, rows in (
-            ("measurement.position", measurement.position, 2),
-            ("measurement.velocity", measurement.velocity, 2),
-            ("measurement.pressures", measurement.pressures, 4),
-            ("measurement.user_force", measurement.user_force, 2),
-            ("reference.rows", reference.rows, REFERENCES),
-        ):
-            if signal.shape != (rows, lanes):
-                raise ValueError(
-                    f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
-                )
+        lanes = lanes_of(measurement, reference)
         if self._integral.shape[1] != lanes:
             self._integral, self._fresh = np.zeros((2, lanes)), np.ones(lanes)
         force = np.ascontiguousarray(measurement.user_force)

@@ -1,0 +1,97 @@
+"""What a controller with a force sensor knows at one instant: the motion that the hand should find, and the state of the rig.
+
+A Cartesian ``Admittance`` turns the measured force into the motion. What is not known of the rig, friction above all, is fed
+forward along it and observed for the rest: by ``DisturbanceObserver`` where speeds are measured, and by ``PistonObserver`` and
+``ChamberObserver`` from sampled positions and noisy pressures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from baselines.admittance import Admittance
+from baselines.chamber_observer import ChamberObserver
+from baselines.controller import lanes_of
+from baselines.disturbance_observer import DisturbanceObserver
+from baselines.observers import PistonObserver
+from baselines.reference_friction import ReferenceFriction
+from birthsim_env.lanes import Array, parameter_column
+from birthsim_env.parameters import Parameters
+from birthsim_env.signals import Mask, Measurement, Reference
+
+MOVING_SPEED = 1e-3
+"""m/s; assumed: a slower reference lets the pistons rest."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """N lanes at one instant. ``motion`` (8, N): x and y that are wanted and three derivatives, SI; ``force`` (2, N), N, the
+    user's; ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
+    ``believed`` (2, N), N, what acts along the pistons besides, and ``disturbance`` (2, N), m/s2, what still accelerates them
+    unexplained; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N) how far each piston is taken to rest, 0 to 1."""
+
+    motion: Array
+    force: Array
+    joints: Array
+    pressures: Array
+    spools: Array
+    believed: Array
+    disturbance: Array
+    moving: Array
+    rest: Array
+
+
+class Awareness:
+    """The ``Situation`` of N lanes, one control period at a time, for one kind of sensors.
+
+    Arguments: the rig as believed; ``sampled``, whether positions are samples; ``gains`` with bandwidth, 1/s, of the observer
+    of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_share, how much of the
+    believed friction is fed forward along the motion.
+    """
+
+    def __init__(self, parameters: Parameters, sampled: bool, gains: Mapping[str, float]) -> None:
+        p, period = parameter_column(parameters), parameters.electronics.control_period
+        self.admittance = Admittance(parameters)
+        self._friction, self._friction_share = ReferenceFriction(period, p), gains["friction_share"]
+        self._chambers = ChamberObserver(period, p, gains["pressure_bandwidth"] if sampled else math.inf)
+        self._pistons = (
+            PistonObserver(parameters, p, gains["bandwidth"]) if sampled else DisturbanceObserver(period, p, gains["bandwidth"])
+        )
+        self._joints: Array = np.empty((4, 0))
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        for part in (self.admittance, self._friction, self._chambers, self._pistons):
+            part.reset(lanes)
+
+    def update(self, measurement: Measurement, reference: Reference) -> Situation:
+        """Take one control period's signals over N lanes.
+
+        Raises ``ValueError`` for signals over different numbers of lanes, and a stiffness that is not positive definite.
+        """
+        lanes = lanes_of(measurement, reference)
+        if self._joints.shape[1] != lanes:
+            self._joints = np.zeros((4, lanes))
+        pressures = self._chambers.update(measurement.pressures, self._joints)
+        measurement = replace(measurement, pressures=pressures)
+        force = np.ascontiguousarray(measurement.user_force)
+        motion = self.admittance.update(measurement, reference)
+        believed = -self._friction_share * self._friction.update(motion)
+        moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
+        pistons = self._pistons
+        if isinstance(pistons, PistonObserver):
+            self._joints, rest = np.ascontiguousarray(pistons.update(measurement, force, believed, moving)), pistons.rest
+        else:
+            self._joints, rest = pistons.update(measurement, force, believed), np.zeros((2, lanes))
+        disturbance = np.ascontiguousarray(pistons.disturbance)
+        return Situation(
+            motion, force, self._joints, pressures, self._chambers.spools, believed, disturbance, moving, rest
+        )  # fmt: skip
+
+    def commanded(self, openings: Array) -> None:
+        """What the valves are told until the next ``update``: openings (4, N)."""
+        self._chambers.openings[:] = openings
