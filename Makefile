@@ -14,7 +14,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,mpc,dev]'
 	touch $(READY)
 
 run: $(READY)

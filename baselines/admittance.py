@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baselines.controller import require_stiffness
 from birthsim_env.compilation import helper, kernel
@@ -30,6 +31,40 @@ def square_root(xx: float, yy: float, xy: float) -> tuple[float, float, float]:
     return (xx + root) / trace, (yy + root) / trace, xy / trace
 
 
+@helper
+def damping(kxx: float, kyy: float, kxy: float, ratio: float) -> tuple[float, float, float]:
+    """B/m, 1/s, of the spring K/m (1/s2): entries xx, yy, xy."""
+    bxx, byy, bxy = square_root(kxx, kyy, kxy)
+    return 2.0 * ratio * bxx, 2.0 * ratio * byy, 2.0 * ratio * bxy
+
+
+@helper
+def derivatives(
+    offset: Array, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
+) -> tuple[float, float, float, float]:
+    """Acceleration and jerk of the offset (4, N) of lane ``i`` under a held force; all over the mass."""
+    # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
+    x, y, vx, vy = offset[0, i], offset[1, i], offset[2, i], offset[3, i]
+    ax, ay = fx - bxx * vx - bxy * vy - kxx * x - kxy * y, fy - bxy * vx - byy * vy - kxy * x - kyy * y
+    jx, jy = -bxx * ax - bxy * ay - kxx * vx - kxy * vy, -bxy * ax - byy * ay - kxy * vx - kyy * vy
+    return ax, ay, jx, jy
+
+
+@helper
+def advance(
+    offset: Array, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
+    kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float,
+) -> None:  # fmt: skip
+    """Carries the offset (4, N) of lane ``i`` on by one period."""
+    vx, vy = offset[2, i], offset[3, i]
+    sx, sy = -bxx * jx - bxy * jy - kxx * ax - kxy * ay, -bxy * jx - byy * jy - kxy * ax - kyy * ay
+    # Taylor's series to the third order: the system is linear and w x period is below 0.06.
+    offset[0, i] += period * (vx + period * (ax / 2.0 + period * jx / 6.0))
+    offset[1, i] += period * (vy + period * (ay / 2.0 + period * jy / 6.0))
+    offset[2, i] += period * (ax + period * (jx / 2.0 + period * sx / 6.0))
+    offset[3, i] += period * (ay + period * (jy / 2.0 + period * sy / 6.0))
+
+
 @kernel
 def _update(
     offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, fresh: Array, motion: Array
@@ -37,25 +72,44 @@ def _update(
     """``offset`` (4, N): xr - xt and its rate, carried on by one period where ``fresh`` (N,) is 0. ``motion`` (8, N)."""
     for i in range(offset.shape[1]):
         kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
-        bxx, byy, bxy = square_root(kxx, kyy, kxy)
-        bxx, byy, bxy = 2.0 * ratio * bxx, 2.0 * ratio * byy, 2.0 * ratio * bxy
-        fx, fy = force[0, i] / mass, force[1, i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
         if fresh[i] > 0.0:
             offset[0, i], offset[1, i], offset[2, i], offset[3, i] = 0.0, 0.0, 0.0, 0.0
-        x, y, vx, vy = offset[0, i], offset[1, i], offset[2, i], offset[3, i]
-        # The measured force is held: its rate is left out here, and by whoever follows, for whom the two cancel.
-        ax, ay = fx - bxx * vx - bxy * vy - kxx * x - kxy * y, fy - bxy * vx - byy * vy - kxy * x - kyy * y
-        jx, jy = -bxx * ax - bxy * ay - kxx * vx - kxy * vy, -bxy * ax - byy * ay - kxy * vx - kyy * vy
-        motion[0, i], motion[1, i] = reference[0, i] + x, reference[1, i] + y
-        motion[2, i], motion[3, i] = reference[2, i] + vx, reference[3, i] + vy
+        ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
+        motion[0, i], motion[1, i] = reference[0, i] + offset[0, i], reference[1, i] + offset[1, i]
+        motion[2, i], motion[3, i] = reference[2, i] + offset[2, i], reference[3, i] + offset[3, i]
         motion[4, i], motion[5, i] = reference[4, i] + ax, reference[5, i] + ay
         motion[6, i], motion[7, i] = reference[6, i] + jx, reference[7, i] + jy
-        sx, sy = -bxx * jx - bxy * jy - kxx * ax - kxy * ay, -bxy * jx - byy * jy - kxy * ax - kyy * ay
-        # Taylor's series to the third order: the system is linear and w x period is below 0.06.
-        offset[0, i] = x + period * (vx + period * (ax / 2.0 + period * jx / 6.0))
-        offset[1, i] = y + period * (vy + period * (ay / 2.0 + period * jy / 6.0))
-        offset[2, i] = vx + period * (ax + period * (jx / 2.0 + period * sx / 6.0))
-        offset[3, i] = vy + period * (ay + period * (jy / 2.0 + period * sy / 6.0))
+        advance(offset, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+
+
+@kernel
+def _forecast(
+    offset: Array,
+    reference: Array,
+    force: Array,
+    mass: float,
+    ratio: float,
+    period: float,
+    ticks: NDArray[np.int64],
+    ahead: Array,
+) -> None:
+    """``offset`` (4, N) one period from now; ``ticks`` (M,) increasing; writes ``ahead`` (M, 4, N): x, y, vx, vy."""
+    z = offset.copy()
+    for i in range(offset.shape[1]):
+        kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
+        tick = 1
+        for k in range(len(ticks)):
+            while tick < ticks[k]:
+                ax, ay, jx, jy = derivatives(z, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
+                advance(z, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+                tick += 1
+            t = tick * period
+            for axis in range(2):
+                v, a, j = reference[2 + axis, i], reference[4 + axis, i], reference[6 + axis, i]
+                ahead[k, axis, i] = reference[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0)) + z[axis, i]
+                ahead[k, 2 + axis, i] = v + t * (a + t * j / 2.0) + z[2 + axis, i]
 
 
 class Admittance:
@@ -91,3 +145,13 @@ class Admittance:
         _update(self._offset, reference.rows, measurement.user_force, *self._numbers, self._fresh, motion)
         self._fresh[:] = 0.0
         return motion
+
+    def forecast(self, reference: Reference, force: Array, ticks: NDArray[np.int64]) -> Array:
+        """x, y (m), vx, vy (m/s) of the motion so many periods after the last ``update``, (M, 4, N), if nothing new happens:
+        the force (2, N), N, and the stiffness stay, and the target goes on with the jerk that it has.
+
+        ``ticks`` (M,) are increasing whole numbers from 1 on.
+        """
+        ahead = np.empty((len(ticks), 4, reference.rows.shape[1]))
+        _forecast(self._offset, reference.rows, force, *self._numbers, ticks, ahead)
+        return ahead

@@ -73,9 +73,9 @@ class AdmittanceBackstepping:
             "rest_gain": 39.0,
             "rest_push": 2.0,
             "bandwidth": 72.0,
-            "pressure_bandwidth": 150.0,
+            "pressure_bandwidth": 70.0,
             "friction_share": 1.0,
-            "dead_zone": 1e-5,
+            "dead_zone": 0.0,
             "lead_time": 0.00125,
             "oscillation": 0.08,
             "yielding": 0.9,
@@ -124,8 +124,8 @@ class AdmittanceBackstepping:
         openings = np.empty((4, lanes))
         quickness = 1.0 - math.exp(-self._period / g["lead_time"])
         admittance_law.command(
-            now.joints, now.pressures, now.motion, reference.rows, now.force, now.believed, now.disturbance, now.rest,
-            now.moving, now.spools, self._p, self._period, g["gain"], g["rest_gain"], g["rest_push"], g["dead_zone"],
+            now.joints, now.pressures, now.motion, reference.rows, now.force, now.unseen, now.rest, now.moving,
+            now.spools, self._p, self._period, g["gain"], g["rest_gain"], g["rest_push"], g["dead_zone"],
             quickness, g["oscillation"], g["yielding"], LEAST_SHARE, PNEUMATIC_GAIN, self._memory, openings,
         )  # fmt: skip
         awareness.commanded(openings)

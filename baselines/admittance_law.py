@@ -2,8 +2,8 @@
 
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
-    L_i = F_i - Fext_i - Fv v_i + believed_i + m_e d_i
-with the believed force of ``reference_friction`` and the disturbance d of an observer.
+    L_i = F_i - Fext_i - Fv v_i + unseen_i
+with the unseen forces of ``awareness``: believed friction and what an observer finds besides.
 
 - While pistons rest (``observers``) position errors weigh ``rest_push`` times as much, since stiction, not inertia, has to be
   overcome, and those within ``dead_zone`` move nothing. Once the reference rests the loop has a gain of its own, softer: what
@@ -36,9 +36,6 @@ late."""
 MEMORY = len(MEMORY_NAMES)
 WATCH_T, WATCH_N, MOTION_SHARE = 0, 4, 8
 GAIN_SHARES = [WATCH_T, WATCH_N]
-
-BELIEVED_LIMIT = 120.0
-"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
@@ -90,15 +87,14 @@ def beyond(error: float, zone: float) -> float:
 
 @kernel
 def command(
-    joints: Array, pressures: Array, motion: Array, target: Array, force: Array, believed: Array, disturbance: Array,
-    rest: Array, moving: Array, spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float,
-    dead_zone: float, quickness: float, level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
+    joints: Array, pressures: Array, motion: Array, target: Array, force: Array, unseen: Array, rest: Array, moving: Array,
+    spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float, dead_zone: float,
+    quickness: float, level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
 ) -> None:  # fmt: skip
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
-    ``joints`` (4, N): y1, y2, v1, v2; ``motion`` (8, N) to follow; ``target`` (15, N) the reference; ``force`` (2, N) the
-    user's, N; ``believed`` (2, N), N, and ``disturbance`` (2, N), m/s2, along the pistons; ``rest`` (2, N); ``moving`` (N,);
-    ``spools`` (4, N) as believed.
+    ``joints``, ``pressures``, ``motion``, ``force``, ``unseen``, ``rest``, ``moving`` and ``spools`` are those of
+    ``awareness.Situation``; ``target`` (15, N) is the reference.
     """
     u, kept = np.empty((4, 1)), math.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
@@ -110,10 +106,8 @@ def command(
         )
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
-        unseen1 = believed[0, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, m * kappa * kappa * disturbance[0, i]))
-        unseen2 = believed[1, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, m * disturbance[1, i]))
-        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1 + unseen1
-        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2 + unseen2
+        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1 + unseen[0, i]
+        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2 + unseen[1, i]
 
         # Across (t) and along (n) cylinder 2: errors of position, speed and acceleration.
         ex, ey = r2 * sine - motion[0, i], -r2 * cosine - motion[1, i]

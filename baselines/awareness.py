@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baselines.admittance import Admittance
 from baselines.chamber_observer import ChamberObserver
@@ -19,6 +20,9 @@ from baselines.controller import lanes_of
 from baselines.disturbance_observer import DisturbanceObserver
 from baselines.observers import PistonObserver
 from baselines.reference_friction import ReferenceFriction
+from birthsim_env import geometry
+from birthsim_env import lanes as at
+from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.signals import Mask, Measurement, Reference
@@ -27,12 +31,29 @@ MOVING_SPEED = 1e-3
 """m/s; assumed: a slower reference lets the pistons rest."""
 
 
+BELIEVED_LIMIT = 120.0
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
+
+
+@kernel
+def _unseen(joints: Array, believed: Array, disturbance: Array, p: Array, unseen: Array) -> None:
+    for i in range(joints.shape[1]):
+        kappa = geometry.pose(
+            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )[5]
+        for cylinder in range(2):
+            mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
+            observed = max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, mass * disturbance[cylinder, i]))
+            unseen[cylinder, i] = believed[cylinder, i] + observed
+
+
 @dataclass(frozen=True)
 class Situation:
     """N lanes at one instant. ``motion`` (8, N): x and y that are wanted and three derivatives, SI; ``force`` (2, N), N, the
     user's; ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
-    ``believed`` (2, N), N, what acts along the pistons besides, and ``disturbance`` (2, N), m/s2, what still accelerates them
-    unexplained; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N) how far each piston is taken to rest, 0 to 1."""
+    ``believed`` (2, N), N, what acts along the pistons besides, ``disturbance`` (2, N), m/s2, what still accelerates them
+    unexplained, and ``unseen`` (2, N), N, both together; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N) how far each
+    piston is taken to rest, 0 to 1. The arrays are good until the next ``update``."""
 
     motion: Array
     force: Array
@@ -41,6 +62,7 @@ class Situation:
     spools: Array
     believed: Array
     disturbance: Array
+    unseen: Array
     moving: Array
     rest: Array
 
@@ -54,8 +76,9 @@ class Awareness:
     """
 
     def __init__(self, parameters: Parameters, sampled: bool, gains: Mapping[str, float]) -> None:
-        p, period = parameter_column(parameters), parameters.electronics.control_period
-        self.admittance = Admittance(parameters)
+        self._p = p = parameter_column(parameters)
+        period = parameters.electronics.control_period
+        self._admittance = Admittance(parameters)
         self._friction, self._friction_share = ReferenceFriction(period, p), gains["friction_share"]
         self._chambers = ChamberObserver(period, p, gains["pressure_bandwidth"] if sampled else math.inf)
         self._pistons = (
@@ -65,7 +88,7 @@ class Awareness:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        for part in (self.admittance, self._friction, self._chambers, self._pistons):
+        for part in (self._admittance, self._friction, self._chambers, self._pistons):
             part.reset(lanes)
 
     def update(self, measurement: Measurement, reference: Reference) -> Situation:
@@ -76,10 +99,10 @@ class Awareness:
         lanes = lanes_of(measurement, reference)
         if self._joints.shape[1] != lanes:
             self._joints = np.zeros((4, lanes))
+        motion = self._admittance.update(measurement, reference)
         pressures = self._chambers.update(measurement.pressures, self._joints)
         measurement = replace(measurement, pressures=pressures)
         force = np.ascontiguousarray(measurement.user_force)
-        motion = self.admittance.update(measurement, reference)
         believed = -self._friction_share * self._friction.update(motion)
         moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
         pistons = self._pistons
@@ -88,9 +111,17 @@ class Awareness:
         else:
             self._joints, rest = pistons.update(measurement, force, believed), np.zeros((2, lanes))
         disturbance = np.ascontiguousarray(pistons.disturbance)
-        return Situation(
-            motion, force, self._joints, pressures, self._chambers.spools, believed, disturbance, moving, rest
-        )  # fmt: skip
+        unseen = np.empty((2, lanes))
+        _unseen(self._joints, believed, disturbance, self._p, unseen)
+        spools = self._chambers.spools
+        return Situation(motion, force, self._joints, pressures, spools, believed, disturbance, unseen, moving, rest)
+
+    def forecast(self, now: Situation, reference: Reference, ticks: NDArray[np.int64]) -> tuple[Array, Array]:
+        """The motion's x, y (m), vx, vy (m/s), (M, 4, N), and the forces unseen along it, N, (M, 2, N), so many periods after
+        ``now``, the last situation: friction follows the motion, what was observed besides stays."""
+        ahead = self._admittance.forecast(reference, now.force, ticks)
+        friction = self._friction.forecast(ahead, ticks)
+        return ahead, now.unseen - now.believed - self._friction_share * friction
 
     def commanded(self, openings: Array) -> None:
         """What the valves are told until the next ``update``: openings (4, N)."""

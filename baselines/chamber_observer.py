@@ -30,10 +30,13 @@ def predicted_pressure(
     exhaust = valves.exhaust_conductance(opening, p[at.CONDUCTANCE], p[at.LEAKAGE])
     flow = valves.orifice_flow(supply, p[at.SUPPLY], d, pressure, d, p[at.CRITICAL])
     flow -= valves.orifice_flow(exhaust, pressure, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    whole = max(length, 0.0) + p[at.DEAD_VOLUME] / area
-    return pressure + period * control_model.polytropic_rate_p(
-        pressure, flow, length_rate, area, whole, p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    )
+    whole, gas_t = max(length, 0.0) + p[at.DEAD_VOLUME] / area, p[at.GAS] * p[at.TEMPERATURE]
+    filled = period * control_model.polytropic_rate_p(pressure, flow, 0.0, area, whole, p[at.INDEX], gas_t)
+    pressed = period * control_model.polytropic_rate_p(pressure, 0.0, length_rate, area, whole, p[at.INDEX], gas_t)
+    # However long the period: no flow goes beyond the pressure that drives it, and no stroke empties a chamber.
+    filled = max(min(p[at.ATMOSPHERE] - pressure, 0.0), min(max(p[at.SUPPLY] - pressure, 0.0), filled))
+    expected: float = max(pressure + filled + pressed, 0.5 * pressure)
+    return expected
 
 
 @kernel
@@ -72,6 +75,7 @@ class ChamberObserver:
     def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
         self._p, self._period, self._share = lane_parameters, period, 1.0 - math.exp(-bandwidth * period)
         self.spools: Array = np.empty((4, 0))
+        self.openings: Array = np.empty((4, 0))
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
@@ -81,7 +85,10 @@ class ChamberObserver:
             self._fresh[lanes] = 1.0
 
     def update(self, measured: Array, joints: Array) -> Array:
-        """Pressures (4, N), Pa, after one more period, from those ``measured`` (4, N); ``joints`` (4, N): y1, y2, v1, v2."""
+        """Pressures (4, N), Pa, after one more period, from those ``measured`` (4, N) at its end.
+
+        ``joints`` (4, N): y1, y2 (m), v1, v2 (m/s) at its start.
+        """
         lanes = measured.shape[1]
         if self.spools.shape[1] != lanes:
             self.spools, self.openings = np.zeros((4, lanes)), np.zeros((4, lanes))

@@ -51,8 +51,8 @@ TRUST_TIME = 20.0
 INNOVATION_SHARE = 0.3
 """Of a new innovation in the low-passed one."""
 
-STIR = 1.65
-"""Low-passed innovation, in standard deviations of the position noise, that ends a rest: 3.9 of its own."""
+STIR = 1.9
+"""Low-passed innovation, in standard deviations of the position noise, that ends a rest: 4.5 of its own."""
 
 
 @kernel

@@ -6,6 +6,7 @@ It is there before an observer sees it, and since it never looks at the measured
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from birthsim_env import friction
 from birthsim_env import lanes as at
@@ -36,6 +37,21 @@ def _update(motion: Array, p: Array, period: float, bristles: Array, drag: Array
         drag[0, i], drag[1, i] = p[at.BRISTLE_S0] * bristles[0, i], p[at.BRISTLE_S0] * bristles[1, i]
 
 
+@kernel
+def _forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
+    """``ahead`` (M, 4, N): x, y, vx, vy at the ends of the M ``steps``, s; writes ``drag`` (M, 2, N)."""
+    one, joints = np.empty((4, 1)), np.empty((4, 1))
+    for i in range(ahead.shape[2]):
+        z1, z2 = bristles[0, i], bristles[1, i]
+        for k in range(ahead.shape[0]):
+            for row in range(4):
+                one[row, 0] = ahead[k, row, i]
+            piston_motion(one, p, joints, 1)
+            z1 = bristle(z1, joints[2, 0], p[at.FC1], p[at.FS1], p, steps[k])
+            z2 = bristle(z2, joints[3, 0], p[at.FC2], p[at.FS2], p, steps[k])
+            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z1, p[at.BRISTLE_S0] * z2
+
+
 class ReferenceFriction:
     """Dry friction of both pistons, N, (2, N), along a reference motion. Arguments: control period, s, rig (PARAMETERS,)."""
 
@@ -57,4 +73,10 @@ class ReferenceFriction:
             self._bristles = np.zeros((2, lanes))
         drag = np.empty((2, lanes))
         _update(motion, self._p, self._period, self._bristles, drag)
+        return drag
+
+    def forecast(self, ahead: Array, ticks: NDArray[np.int64]) -> Array:
+        """Friction, N, (M, 2, N), along the motion ``ahead`` (M, 4, N) that ``Admittance.forecast`` gives for these ticks."""
+        drag = np.empty((len(ticks), 2, ahead.shape[2]))
+        _forecast(ahead, self._p, self._period * np.diff(ticks, prepend=0), self._bristles, drag)
         return drag

@@ -17,7 +17,7 @@ from baselines.admittance_backstepping import AdmittanceBackstepping
 from baselines.backstepping import BacksteppingController
 from baselines.cartesian_backstepping import CartesianBackstepping
 from baselines.controller import Controller
-from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
+from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from birthsim_env.parameters import Parameters
 
 Factory = Callable[..., Controller]
@@ -44,9 +44,10 @@ CONTROLLERS: dict[str, Factory] = {
     "pid": PositionPID,
     "lqr": LinearQuadratic,
     "sliding-mode": SlidingMode,
+    "nonlinear-mpc": NonlinearMPC,
 }
 
-SLOW: frozenset[str] = frozenset()
+SLOW = frozenset({"nonlinear-mpc"})
 """Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
 
 

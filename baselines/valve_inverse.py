@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from birthsim_env import control_model, valves
 from birthsim_env import lanes as at
-from birthsim_env.compilation import helper
+from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 
 
@@ -96,3 +98,43 @@ def force_first_openings(
     flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
     u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, c, leak)
     u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, c, leak)
+
+
+@kernel
+def _flow_ranges(pressures: Array, spools: Array, p: Array, least: Array, most: Array, present: Array) -> None:
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
+    for chamber in range(4):
+        for i in range(pressures.shape[1]):
+            fill = valves.orifice_flow(1.0, p[at.SUPPLY], d, pressures[chamber, i], d, p[at.CRITICAL])
+            drain = valves.orifice_flow(1.0, pressures[chamber, i], d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+            shut, spool = leak * (fill - drain), spools[chamber, i]
+            least[chamber, i], most[chamber, i] = shut - c * max(drain, 0.0), shut + c * max(fill, 0.0)
+            present[chamber, i] = shut + c * (max(spool, 0.0) * fill - max(-spool, 0.0) * drain)
+
+
+def flow_ranges(pressures: Array, spools: Array, lane_parameters: Array) -> tuple[Array, Array, Array]:
+    """Least and largest mass flow that valves can send into chambers P1, N1, P2, N2, and that of ``spools``, kg/s, (4, N) each.
+
+    ``pressures`` (4, N), Pa, ``spools`` (4, N) in [-1, 1], one rig's parameters (PARAMETERS,).
+    """
+    least, most, present = np.empty_like(pressures), np.empty_like(pressures), np.empty_like(pressures)
+    _flow_ranges(pressures, spools, lane_parameters, least, most, present)
+    return least, most, present
+
+
+@kernel
+def _openings_for_flows(flows: Array, pressures: Array, p: Array, openings: Array) -> None:
+    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
+    for chamber in range(4):
+        for i in range(pressures.shape[1]):
+            fill = valves.orifice_flow(1.0, p[at.SUPPLY], d, pressures[chamber, i], d, p[at.CRITICAL])
+            drain = valves.orifice_flow(1.0, pressures[chamber, i], d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+            openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p[at.CONDUCTANCE], p[at.LEAKAGE])
+
+
+def openings_for_flows(flows: Array, pressures: Array, lane_parameters: Array) -> Array:
+    """Openings in [-1, 1] at which chambers P1, N1, P2, N2 get ``flows``, kg/s, or come near; (4, N) each."""
+    openings = np.empty_like(flows)
+    _openings_for_flows(flows, pressures, lane_parameters, openings)
+    return openings

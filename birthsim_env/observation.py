@@ -33,9 +33,6 @@ FAILURE_COST = 250.0
 """Cost of leaving the physical range: the capped error for the 50 steps that a discount of 0.98 looks ahead, so that dying
 early never pays."""
 
-JUMP_RATE = 150.0
-"""N/s. A force that changes faster, or any change of a stiffness setpoint, is a jump that tracking cannot follow."""
-
 GRACE = 0.3
 """s after a jump during which the tracking error costs nothing."""
 

@@ -14,7 +14,6 @@ from birthsim_env.compilation import kernel
 from birthsim_env.equilibrium import balanced_state
 from birthsim_env.geometry import end_effector_motion, inverse_geometry, jacobian
 from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.observation import JUMP_RATE
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant, checked
 from birthsim_env.randomization import Ranges, draw_parameters
@@ -121,7 +120,9 @@ class Simulation:
             self.ticks += self._stride
             forces, setpoints = self._forces, self.reference.rows
             self._look()
-            _track_jumps(forces, self._forces, setpoints, self.reference.rows, self.period, self.since_jump)
+            _track_jumps(
+                forces, self._forces, setpoints, self.reference.rows, self.period, self.user_force.jump_rate, self.since_jump
+            )
         self.impacts = impacts
 
     def _look(self) -> None:
@@ -166,15 +167,18 @@ class Simulation:
 
 
 @kernel
-def _track_jumps(forces: Array, later: Array, setpoints: Array, new: Array, period: float, since: Array) -> None:
-    """Adds the held time to ``since`` (N,), starting anew at a jump of the force or of a closed-loop setpoint."""
+def _track_jumps(
+    forces: Array, later: Array, setpoints: Array, new: Array, period: float, jump_rate: float, since: Array
+) -> None:
+    """Adds the held time to ``since`` (N,), starting anew where the force changes faster than ``jump_rate``, N/s, or a
+    closed-loop setpoint changes at all."""
     samples = forces.shape[0]
     for i in range(since.shape[0]):
         for k in range(samples):
             since[i] += period
             for axis in range(2):
                 after = forces[k + 1, axis, i] if k + 1 < samples else later[0, axis, i]
-                if abs(after - forces[k, axis, i]) > JUMP_RATE * period:
+                if abs(after - forces[k, axis, i]) > jump_rate * period:
                     since[i] = 0.0
         if setpoints[8, i] != new[8, i] or setpoints[9, i] != new[9, i] or setpoints[14, i] != new[14, i]:
             since[i] = 0.0

@@ -22,9 +22,12 @@ class UserForce:
     and the end effector's position and velocity at the first of them, (2, N), m and m/s; it returns (K, 2, N), N. Each
     sample is held for one control period. A force that depends on position or velocity sets ``closed_loop = True`` and
     is then asked at every control period (K = 1), and again at the same instant where another lane starts anew.
+    A component that changes faster than ``jump_rate``, N/s, jumps: no tracking can follow, and ``info["since_jump"]`` starts
+    anew.
     """
 
     closed_loop = False
+    jump_rate = 150.0
 
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
@@ -103,6 +106,9 @@ class AlternatingSteps(ForceProfile):
 
     STARTS = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (6.9, 7.7))
     """Assumed: start and end of the four pushes, s; every push ends well before the next."""
+
+    jump_rate = 1.0
+    """N/s: every ramp is a step, however small the push."""
 
     def __init__(self, amplitude: Range = 30.0, ramp: float = 0.1, repeat: float = 8.0, repeats: int = 2) -> None:
         super().__init__()

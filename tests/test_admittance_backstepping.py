@@ -1,4 +1,4 @@
-"""The law behind the admittance: the jerk that it gives, dead zone, gains at rest, valve lead, and gains that yield."""
+"""The law behind the admittance: the jerk that it gives, resting pistons, gains at rest, valve lead, and gains that yield."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from baselines import admittance_law
-from baselines.admittance_backstepping import LEAST_SHARE
+from baselines.admittance_backstepping import LEAST_SHARE, AdmittanceBackstepping
 from birthsim_env.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.signals import REFERENCES, Measurement
-from tests import rigid_body
+from tests import closed_loop, rigid_body
 
 PERIOD = 1e-3
 ANOTHER = Parameters().replace(
@@ -24,28 +24,42 @@ ANOTHER = Parameters().replace(
 )  # fmt: skip
 
 
+def remembered(lanes: int) -> Array:
+    """The memory of a law that has just started."""
+    memory = np.zeros((admittance_law.MEMORY, lanes))
+    memory[admittance_law.GAIN_SHARES] = 1.0
+    return memory
+
+
 @dataclasses.dataclass
 class Law:
-    """The kernel with everything that is not under test at rest; ``command`` gives openings (4, N)."""
+    """The kernel with everything that is not under test at rest; ``command`` gives openings (4, N).
+
+    Without ``lead_time`` and with shut spools they are those that the law wants.
+    """
 
     rig: Parameters
     gain: float = 60.0
     rest_gain: float = 60.0
     dead_zone: float = 0.0
+    rest_push: float = 1.0
+    lead_time: float | None = None
 
     def command(
-        self, now: rigid_body.Instant, motion: Array, user: Array, believed: Array, disturbance: Array,
-        rest: Array | None = None, moving: float = 1.0,
+        self, now: rigid_body.Instant, motion: Array, user: Array, unseen: Array,
+        rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
     ) -> Array:  # fmt: skip
-        lanes, tau = motion.shape[1], self.rig.valves.time_constant
-        target, memory, openings = np.zeros((REFERENCES, lanes)), np.zeros((admittance_law.MEMORY, lanes)), np.empty((4, lanes))
-        target[10:12], memory[admittance_law.GAIN_SHARE] = now.stiffness, 1.0
-        # With a spool that follows as fast as it does by itself the command is the opening that the law wants.
-        quickness = 1 - np.exp(-PERIOD / tau)
+        lanes = motion.shape[1]
+        target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
+        target[10:12] = now.stiffness
+        # A spool that follows as fast as it does by itself is told where to go, no further.
+        quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
         admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, believed, disturbance,
-            np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving), parameter_column(self.rig), PERIOD,
-            self.gain, self.rest_gain, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE, 30.0, memory, openings,
+            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, unseen,
+            np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
+            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD, self.gain,
+            self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE, 30.0,
+            remembered(lanes) if memory is None else memory, openings,
         )  # fmt: skip
         return openings
 
@@ -64,37 +78,27 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> 
     """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with all that is known."""
     lanes, c, rng = 60, 60.0, np.random.default_rng(2)
     now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
-    user, believed, d = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-3, 3, (2, lanes)), rng.uniform(-0.5, 0.5, (2, lanes))
+    user, unseen = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
     motion, measured = near(now, rig, user, seed=1)
-    openings = Law(rig, c).command(now, motion, user, believed, d)
+    openings = Law(rig, c).command(now, motion, user, unseen)
     free = np.abs(openings).max(axis=0) < 1
     assert free.sum() > 0.7 * lanes
-    kappa = np.linalg.norm(rigid_body.jacobians(now.piston, rig)[:, :, 0], axis=1)
-    known = believed + rig.mechanics.mass * np.stack([kappa**2, np.ones(lanes)]) * d
-    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, known, user)
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, unseen, user)
     wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
     wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
     np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
 
 
-def test_unseen_forces_are_believed_up_to_a_limit() -> None:
-    """A disturbance that no friction and no weight explains is cut: the law then answers like at the limit."""
-    rig, lanes = Parameters(), 2
-    now = rigid_body.near_balance(rig, 1, seed=0, speed=0.0, push=0.0)
-    now = rigid_body.Instant(*(np.repeat(part, lanes, axis=1) for part in now))
-    user, d = np.zeros((2, lanes)), np.zeros((2, lanes))
-    motion, _ = near(now, rig, user, seed=1, share=0.0)
-    d[1] = [admittance_law.BELIEVED_LIMIT / rig.mechanics.mass, 1000.0]
-    openings = Law(rig, 20.0).command(now, motion, user, user, d)
-    assert np.array_equal(openings[:, 0], openings[:, 1])
-
-
 @pytest.mark.parametrize("cylinder", [0, 1])
-def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int) -> None:
-    """Errors along a resting piston within the zone change nothing; beyond it they count twice; moving, all count."""
+@pytest.mark.parametrize(("resting", "push"), [(1.0, 3.0), (1.0, 1.0), (0.4, 3.0)])
+def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: float, push: float) -> None:
+    """Errors along a resting piston within the zone change nothing; beyond it they weigh ``rest_push``; moving, all count.
+
+    A piston that half rests has half the zone and half of what ``rest_push`` adds.
+    """
     rig, zone = Parameters(), 1e-4
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
-    sizes = np.array([0.0, 0.5, 0.99, 1.5])
+    sizes = np.array([0.0, 0.3, 0.99, 1.5])
     now = rigid_body.Instant(*(np.repeat(part, len(sizes), axis=1) for part in now))
     nothing = np.zeros((2, len(sizes)))
     motion, _ = near(now, rig, nothing, seed=1, share=0.0)
@@ -102,10 +106,10 @@ def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int) -> None:
     along = pose.beam if cylinder == 1 else pose.across
     motion[:2] -= zone * sizes * along
     rest = np.zeros((2, len(sizes)))
-    rest[cylinder] = 1.0
+    rest[cylinder] = resting
 
     def jerks(**changes: Array) -> Array:
-        openings = Law(rig, 50.0, 50.0, zone).command(now, motion, nothing, nothing, nothing, **changes)
+        openings = Law(rig, 50.0, 50.0, zone, push).command(now, motion, nothing, nothing, **changes)
         assert np.abs(openings).max() < 1
         a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)
         assert np.abs(a).max() < 1e-9
@@ -113,7 +117,8 @@ def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int) -> None:
 
     stiffness = 50.0**3 + 2 * 50.0
     np.testing.assert_allclose(jerks(), -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
-    expected = -admittance_law.REST_PUSH * stiffness * zone * np.maximum(sizes - 1, 0)
+    weight = 1 + (push - 1) * resting
+    expected = -weight * stiffness * zone * np.maximum(sizes - resting, 0)
     np.testing.assert_allclose(jerks(rest=rest), expected, rtol=0, atol=1e-4 * stiffness * zone)
     other = jerks(rest=rest[::-1].copy())
     np.testing.assert_allclose(other, -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
@@ -126,17 +131,10 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
     nothing = np.zeros((2, lanes))
     motion, _ = near(now, rig, nothing, seed=1, share=0.0)
     motion[0] -= error
-    law, memory = Law(rig, 60.0, 30.0), np.zeros((admittance_law.MEMORY, lanes))
-    memory[admittance_law.GAIN_SHARE], target, openings = 1.0, np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
-    target[10:12] = now.stiffness
-    quickness, stiffnesses = 1 - np.exp(-PERIOD / rig.valves.time_constant), []
+    law, memory, stiffnesses = Law(rig, 60.0, 30.0), remembered(lanes), []
     for tick in range(400):
-        memory[:4] = 0.0
-        admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, nothing, nothing, nothing, nothing,
-            np.full(lanes, float(tick in (0, 399))), parameter_column(rig), PERIOD, law.gain, law.rest_gain, 0.0, quickness,
-            0.06, 0.9, LEAST_SHARE, 30.0, memory, openings,
-        )  # fmt: skip
+        moving = float(tick in (0, 399))
+        openings = law.command(now, motion, nothing, nothing, moving=moving, memory=memory)
         stiffnesses.append(-rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1][0, 0] / error)
     decay = np.exp(-PERIOD * np.arange(399) / admittance_law.MOTION_TIME)
     c = 30.0 + 30.0 * decay
@@ -162,25 +160,23 @@ def test_the_spool_follows_with_the_lead_time(tau: float, lead_time: float) -> N
     np.testing.assert_allclose(1 - np.array(path) / wanted, np.repeat(left, 4, axis=1), rtol=0, atol=1e-4)
 
 
-def test_the_law_knows_where_the_spools_are() -> None:
-    """Its memory of them is the plant's own spools, full openings included, while errors and commands change."""
-    rig, lanes, rng = Parameters(), 3, np.random.default_rng(0)
-    now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.0, push=30.0)
-    nothing, memory, openings = np.zeros((2, lanes)), np.zeros((admittance_law.MEMORY, lanes)), np.empty((4, lanes))
-    memory[admittance_law.GAIN_SHARE], target = 1.0, np.zeros((REFERENCES, lanes))
-    target[10:12] = now.stiffness
-    plant, full = Plant(rig, lanes), False
-    for _ in range(30):
-        motion, _ = near(now, rig, nothing, seed=int(rng.integers(100)), share=3.0)
-        admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, nothing, nothing, nothing, nothing,
-            np.ones(lanes), parameter_column(rig), PERIOD, 60.0, 60.0, 0.0, 0.5, 0.06, 0.9, LEAST_SHARE, 30.0, memory, openings,
-        )  # fmt: skip
-        plant.advance(openings, np.zeros((2, lanes)), PERIOD)
-        full |= bool((np.abs(openings) == 1).any())
-        np.testing.assert_allclose(memory[:4], plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
-    assert full
-    assert np.ptp(memory[:4]) > 0.1
+@pytest.mark.parametrize("lead_time", [0.0015, 0.01])
+def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
+    """After one period the plant's spools have gone the share 1 - exp(-T/lead) of their ways to what the law wants."""
+    rig, lanes = ANOTHER, 40
+    now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
+    nothing = np.zeros((2, lanes))
+    motion, _ = near(now, rig, nothing, seed=1)
+    wanted = Law(rig).command(now, motion, nothing, nothing)
+    spools = wanted + np.random.default_rng(3).uniform(-0.1, 0.1, wanted.shape)
+    openings = Law(rig, lead_time=lead_time).command(now, motion, nothing, nothing, spools=spools)
+    free = np.abs(openings) < 1
+    assert free.mean() > 0.7
+    plant = Plant(rig, lanes)
+    plant.state[list(SPOOLS)] = spools
+    plant.advance(openings, nothing, PERIOD)
+    expected = wanted + np.exp(-PERIOD / lead_time) * (spools - wanted)
+    np.testing.assert_allclose(plant.state[list(SPOOLS)][free], expected[free], rtol=0, atol=1e-5)
 
 
 def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
@@ -190,12 +186,8 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 
 def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35) -> Array:
     """The gain share after each of the speed errors (T,), one per period."""
-    memory, share = np.zeros((admittance_law.MEMORY, 1)), []
-    memory[admittance_law.GAIN_SHARE] = 1.0
-    for error in errors:
-        admittance_law.watch(memory, admittance_law.WATCH_T, 0, float(error), PERIOD, level, fall, least)
-        share.append(memory[admittance_law.GAIN_SHARE, 0])
-    return np.array(share)
+    memory, row = remembered(1), admittance_law.WATCH_N
+    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)
@@ -229,3 +221,42 @@ def test_small_or_slow_oscillations_and_one_way_errors_cost_no_gain() -> None:
     growing = watched(0.02 * np.exp(3 * TIMES) * np.sin(2 * np.pi * 10 * TIMES))
     first = TIMES[np.argmax(growing < 1)]
     assert 0.02 * np.exp(3 * first) == pytest.approx(0.06, rel=0.25), "a growing one, as soon as it is beyond the level"
+
+
+@pytest.mark.parametrize("direction", ["across", "along"])
+def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(direction: str) -> None:
+    """After five half waves of the speed error in one direction: c 0.9^3 there, jerk by jerk, and c in the other one."""
+    rig, c, error = Parameters(), 50.0, 5e-5
+    now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
+    nothing, law, memory, pose = np.zeros((2, 1)), Law(rig, 50.0, 50.0), remembered(1), rigid_body.pose_of(now.piston, rig)
+    resting, _ = near(now, rig, nothing, seed=1, share=0.0)
+    shaken = {"across": pose.across, "along": pose.beam}[direction]
+    for time in TIMES[:245]:
+        motion = resting.copy()
+        motion[2:4] += 0.1 * np.sin(2 * np.pi * 10.0 * time) * shaken
+        law.command(now, motion, nothing, nothing, memory=memory)
+    for way in (pose.across, pose.beam):
+        motion = resting.copy()
+        motion[:2] -= error * way
+        openings = law.command(now, motion, nothing, nothing, memory=memory.copy())
+        jerk = (rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1] * way).sum()
+        left = 0.9**3 * c if way is shaken else c
+        assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)
+
+
+def test_the_gain_share_is_that_of_the_direction() -> None:
+    """The end effector shakes by 0.1 m/s and 10 Hz about a resting target: across cylinder 2, along it, both, not at all."""
+    lanes, rig = 4, Parameters()
+    wanted = closed_loop.holding(np.repeat([[0.45], [-0.2]], lanes, axis=1), 2000.0)
+    pressures, nothing = closed_loop.resting_at(wanted, rig).pressures, np.zeros((2, lanes))
+    beam = wanted.position / np.hypot(*wanted.position)
+    across = np.array([-beam[1], beam[0]])
+    way = across * np.array([1.0, 0.0, 1.0, 0.0]) + beam * np.array([0.0, 1.0, 1.0, 0.0])
+    law, rate = AdmittanceBackstepping(rig, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
+    for time in TIMES[:1000]:
+        clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
+        place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
+        law.command(Measurement(clock, place, clock, speed, pressures, nothing, sampled=False), wanted)
+    assert np.array_equal(law.gain_share, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
+    law.reset(np.array([True, False, False, False]))
+    assert np.array_equal(law.gain_share[:, :2], [[1, 1], [1, LEAST_SHARE]])

@@ -336,7 +336,7 @@ def test_a_piston_that_may_not_rest_never_does() -> None:
 
 @pytest.mark.parametrize("speed", [0.01, 0.03, 0.1])
 def test_a_piston_that_slips_is_noticed(speed: float) -> None:
-    """Mostly before it has moved by 0.3 mm, three times the tracker's noise, and 10 ms; from 30 mm/s on its speed is found.
+    """Mostly before it has moved by 0.35 mm, 3.5 times the tracker's noise, and 10 ms; from 30 mm/s on its speed is found.
 
     Slower than the speed's noise it falls back to rest again and again: at 10 mm/s a third of the speed is seen, and the
     position trails by 0.06 mm.
@@ -348,7 +348,7 @@ def test_a_piston_that_slips_is_noticed(speed: float) -> None:
         woken = np.where((time >= 1.0) & (estimator.rest[1] < 0.5) & np.isinf(woken), time - 1.0, woken)
         if time > 1.4:
             errors.append([estimate[1] - STUCK[1] - speed * (time - 1.0), estimate[3] - speed])
-    assert np.median(woken) < 0.0003 / speed + 0.01
+    assert np.median(woken) < 0.00035 / speed + 0.01
     assert woken.max() < 0.001 / speed + 0.01
     position, rate = np.array(errors).mean(axis=(0, 2))
     assert abs(position) < 1e-3

@@ -178,3 +178,13 @@ def test_impossible_profiles_are_refused_by_name(make, words):
     with pytest.raises(ValueError, match="allowed") as refusal:
         gymnasium.make(PROBE, user_force=make()).reset(seed=0)
     assert all(word in str(refusal.value) for word in words), refusal.value
+
+
+def test_every_push_of_the_circle_is_a_jump_however_small():
+    """2 N over 0.1 s change by 20 N/s, less than a forceps' pull of 45 N/s, which is none."""
+    for force, jumps in ((AlternatingSteps(amplitude=2.0), True), (Pulls((90.0,), rate=45.0), False)):
+        env = gymnasium.make("BirthSIM/Circle-v0", user_force=force)
+        env.reset(seed=0)
+        since = [env.step(np.zeros(env.action_space.shape))[4]["since_jump"] for _ in range(115)]
+        assert since[98] == pytest.approx(0.99)
+        assert since[-1] == pytest.approx(0.05 if jumps else 1.15, abs=2e-3)

@@ -1,11 +1,12 @@
-"""The controllers that a control engineer would try first: PID, LQR and sliding mode, piston by piston.
+"""The controllers that a control engineer would try first: PID, LQR and sliding mode, piston by piston, and nonlinear MPC.
 
 All follow the same compliant motion (``baselines.admittance``) and know the same of the rig: its mass, weight and friction and
-the measured user force. What differs is the loop round each piston.
+the measured user force. What differs is the loop round each piston; the MPC plans for both together.
 """
 
 from baselines.rivals.lqr import LinearQuadratic
 from baselines.rivals.pid import PositionPID
+from baselines.rivals.predictive import NonlinearMPC
 from baselines.rivals.sliding_mode import SlidingMode
 
-__all__ = ["LinearQuadratic", "PositionPID", "SlidingMode"]
+__all__ = ["LinearQuadratic", "NonlinearMPC", "PositionPID", "SlidingMode"]

@@ -1,0 +1,169 @@
+"""Nonlinear model predictive control: what could be had with the same knowledge if computing time did not matter.
+
+At every control period the flows into the four chambers are planned over a horizon of ``prediction``, with the least sum of
+squares of its residuals within what the valves can give: one Gauss-Newton step from the plan of the period before (real-time
+iteration), a quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their
+characteristic. Motion, friction and disturbances are those of ``awareness``, as for ``admittance-backstepping``.
+
+The tolerances are what these commands printed (with ideal, then with lab):
+    birthsim-tune --controller nonlinear-mpc --trials 40 --lanes 8 --seed 0 --sensors ideal --out out/tune/nonlinear-mpc-ideal
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from baselines.awareness import Awareness, Situation
+from baselines.controller import check_gains, lanes_of
+from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
+from baselines.valve_inverse import flow_ranges, openings_for_flows
+from birthsim_env.lanes import Array, parameter_column
+from birthsim_env.parameters import Parameters, load_parameters
+from birthsim_env.signals import Mask, Measurement, Reference, one_lane
+
+STEPS = (0.002, 0.003, 0.005, 0.007, 0.010, 0.013, 0.017)
+"""s, assumed: from node to node of the horizon, 57 ms in all; rounded to whole control periods."""
+
+
+class Buffered:
+    """A CasADi function that reads the arrays ``inputs`` and writes the arrays ``outputs``, name -> non-zeros by columns."""
+
+    def __init__(self, function: Any) -> None:
+        self.inputs = {function.name_in(i): np.zeros(function.nnz_in(i)) for i in range(function.n_in())}
+        self.outputs = {function.name_out(i): np.zeros(function.nnz_out(i)) for i in range(function.n_out())}
+        self._buffer, self.call = function.buffer()  # the second needs the first alive
+        for connect, arrays in ((self._buffer.set_arg, self.inputs), (self._buffer.set_res, self.outputs)):
+            for index, array in enumerate(arrays.values()):
+                view: Any = array
+                connect(index, memoryview(view))
+
+
+class Planner:
+    """Improves a plan of one lane by a Gauss-Newton step. Arguments are those of ``residuals``."""
+
+    def __init__(self, parameters: Parameters, steps: Array, tolerances: dict[str, float]) -> None:
+        size = FLOWS * len(steps)
+        self._residuals = Buffered(residuals(parameters, [float(step) for step in steps], tolerances))
+        dense = {"h": symbols().Sparsity.dense(size, size)}
+        self._programme = Buffered(symbols().conic("programme", "daqp", dense))
+
+    def improve(self, plan: Array, given: Array, low: Array, high: Array) -> Array:
+        """A better plan (4 M,) with flows between ``low`` and ``high`` (4,), all in FLOW; no flow in a lane without numbers."""
+        asked, programme = self._residuals.inputs, self._programme.inputs
+        asked["commanded"][:], asked["given"][:] = plan, given
+        self._residuals.call()
+        found = self._residuals.outputs["residuals"]
+        if not np.isfinite(found).all():
+            return np.zeros_like(plan)
+        slopes = self._residuals.outputs["slopes"].reshape(len(plan), -1)
+        curvature = slopes @ slopes.T
+        programme["h"][:], programme["g"][:] = curvature.ravel(), slopes @ found - curvature @ plan
+        programme["lbx"][:], programme["ubx"][:] = np.resize(low, len(plan)), np.resize(high, len(plan))
+        self._programme.call()
+        return self._programme.outputs["x"].copy()
+
+
+class NonlinearMPC:
+    """The law of this module, some milliseconds a lane and call: an upper bound, not a real-time controller.
+
+    Arguments:
+        parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
+        gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
+            speed_tolerance, m/s, stiffness_tolerance, N/m, and flow_tolerance, kg/s, what counts as much as a position error
+            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_share of ``Awareness``.
+
+    Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
+    """
+
+    POSITION_TOLERANCE = 1e-4
+    """m."""
+
+    TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
+        "speed_tolerance": (2e-3, 3e-2),
+        "stiffness_tolerance": (100.0, 1000.0),
+        "flow_tolerance": (2e-4, 5e-3),
+        "bandwidth": (30.0, 120.0),
+        "pressure_bandwidth": (30.0, 300.0),
+        "friction_share": (0.5, 1.0),
+    }
+    TUNED: ClassVar[dict[str, dict[str, float]]] = {
+        "ideal": {
+            "speed_tolerance": 5e-3,
+            "stiffness_tolerance": 300.0,
+            "flow_tolerance": 1e-3,
+            "bandwidth": 60.0,
+            "friction_share": 1.0,
+        },
+        "lab": {
+            "speed_tolerance": 5e-3,
+            "stiffness_tolerance": 300.0,
+            "flow_tolerance": 1e-3,
+            "bandwidth": 72.0,
+            "pressure_bandwidth": 70.0,
+            "friction_share": 1.0,
+        },
+    }
+
+    def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
+        check_gains(self, gains)
+        self.parameters = load_parameters(parameters)
+        self._p, self._period = parameter_column(self.parameters), self.parameters.electronics.control_period
+        chosen = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
+        self._awareness = {kind: Awareness(self.parameters, kind == "lab", own) for kind, own in chosen.items()}
+        periods = np.maximum(np.round(np.array(STEPS) / self._period), 1)
+        self._steps, self._ticks = periods * self._period, np.cumsum(periods).astype(np.int64)
+        self._planners = {kind: self._planner(own) for kind, own in chosen.items()}
+        self._plan: Array = np.empty((0, 0))
+
+    def _planner(self, gains: dict[str, float]) -> Planner:
+        names = ("speed", "stiffness", "flow")
+        tolerances = {"position": self.POSITION_TOLERANCE, **{name: gains[f"{name}_tolerance"] for name in names}}
+        return Planner(self.parameters, self._steps, tolerances)
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        for awareness in self._awareness.values():
+            awareness.reset(lanes)
+        if lanes is None:
+            self._plan = np.empty((0, 0))
+        elif len(self._plan):
+            self._plan[lanes] = 0.0
+
+    def command(self, measurement: Measurement, reference: Reference) -> Array:
+        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
+
+        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness
+        setpoint that is not positive definite.
+        """
+        if measurement.position.ndim == 1:
+            return self.command(*one_lane(measurement, reference))[:, 0]
+        lanes, count = lanes_of(measurement, reference), len(self._steps)
+        kind = "lab" if measurement.sampled else "ideal"
+        awareness, planner = self._awareness[kind], self._planners[kind]
+        now = awareness.update(measurement, reference)
+        if len(self._plan) != lanes:
+            self._plan = np.zeros((lanes, FLOWS * count))
+        low, high, flows = (q / FLOW for q in flow_ranges(now.pressures, now.spools, self._p))
+        given = self._given(now, reference, flows, *awareness.forecast(now, reference, self._ticks))
+        for lane in range(lanes):
+            self._plan[lane] = planner.improve(self._plan[lane], given[:, lane], low[:, lane], high[:, lane])
+        openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), now.pressures, self._p)
+        self._advance_plan()
+        awareness.commanded(openings)
+        return openings
+
+    def _given(self, now: Situation, reference: Reference, flows: Array, ahead: Array, unseen: Array) -> Array:
+        """What ``residuals`` asks for, (G, N)."""
+        times = self._period * self._ticks[:, None, None]
+        asked = reference.pneumatic_stiffness + times * reference.pneumatic_stiffness_rate
+        nodes = [along.reshape(-1, along.shape[2]) for along in (unseen, ahead, asked)]
+        return np.concatenate([now.joints, now.pressures / PRESSURE, flows, now.force, *nodes])
+
+    def _advance_plan(self) -> None:
+        """The plan as the next period will see it: each step's flow moves towards that of the next."""
+        plan = self._plan.reshape(len(self._plan), -1, FLOWS)
+        share = (self._period / self._steps[:-1])[:, None]
+        plan[:, :-1] += share * (plan[:, 1:] - plan[:, :-1])
