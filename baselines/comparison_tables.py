@@ -77,6 +77,19 @@ def overview(figures: Figures) -> str:
     return markdown(rows)
 
 
+def losses(figures: Figures) -> str:
+    """Lost episodes: one row per controller, one column per environment, over all sensor models and plants."""
+    environments = list(dict.fromkeys(cell["environment"] for cell in figures))
+    rows = [["lost episodes", *environments]]
+    for name in controllers_of(figures):
+        row = [name]
+        for environment in environments:
+            own = [cell for cell in figures if (cell["controller"], cell["environment"]) == (name, environment)]
+            row.append(f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}" if own else "-")
+        rows.append(row)
+    return markdown(rows)
+
+
 def full(figures: Figures) -> str:
     """A section per environment, sensor model and plant, with a row per metric and controller."""
     sections = []

@@ -17,7 +17,7 @@ from baselines.metrics import UNITS, EpisodeMetrics
 from baselines.statistics import in_words, judged, number, summarize
 from birthsim_env.lanes import Array
 
-LANES = 64
+LANES = 128
 """Episodes that run side by side."""
 
 TRACE = 0.01

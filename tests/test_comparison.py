@@ -25,7 +25,7 @@ from baselines.comparison import (
     run_cell,
     statistics,
 )
-from baselines.comparison_tables import full, overview
+from baselines.comparison_tables import full, losses, overview
 from birthsim_env import Parameters
 from tests.test_evaluation import OWN
 
@@ -227,6 +227,12 @@ def test_the_overview_has_a_row_per_controller_and_says_lost(figures):
     assert (law[stiffness], other[stiffness], worst[stiffness]) == ("15; 20", "1; 1", "-")
     assert [row[column["lost episodes"]] for row in (law, other, worst)] == ["0 of 6", "1 of 6", "3 of 3"]
     assert [row[column["cost per call, us"]] for row in (law, other, worst)] == ["1", "1.5", "4"]
+
+
+def test_lost_episodes_are_counted_by_environment(figures):
+    table = rows(losses(figures))
+    assert table[0] == ["lost episodes", CIRCLE.environment, PROBE.environment]
+    assert table[1:] == [[REFERENCE, "0 of 3", "0 of 3"], ["other", "1 of 3", "0 of 3"], ["worst", "3 of 3", "-"]]
 
 
 def test_the_full_tables_have_a_section_per_condition_and_a_row_per_metric_and_controller(figures):

@@ -10,7 +10,7 @@ import birthsim_env
 from baselines import comparison
 from baselines.commands.shared import make_folder, write_json
 from baselines.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
-from baselines.comparison_tables import full, overview
+from baselines.comparison_tables import full, losses, overview
 from baselines.registry import CONTROLLERS, SLOW
 from baselines.statistics import in_words
 from baselines.studies import study_tasks
@@ -86,7 +86,7 @@ def _write(
         "cells": in_words(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)
-    text = overview(figures)
+    text = f"{overview(figures)}\n\n{losses(figures)}"
     caption = (
         f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
         f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
