@@ -1,12 +1,13 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy for about two minutes and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow
 # make lint   ruff and mypy; make bench prints speeds
-# make compare compares all controllers (some 15 minutes); it and make pictures redraw the README's pictures
+# make compare compares all controllers (an hour or so); it and make pictures redraw the README's pictures
 
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
+BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 
@@ -44,8 +45,11 @@ pictures: $(READY)
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
 
 compare: $(READY)
-	$(BIN)/birthsim-evaluate --all --episodes 16 --out $(OUT)/comparison
+	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v0 --episodes 8 --no-studies --out $(OUT)/bound
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v0 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
+	cat $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md >docs/bound.md
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 golden: $(READY)

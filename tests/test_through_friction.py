@@ -71,18 +71,14 @@ def test_coupled_setpoints_through_friction() -> None:
 
 
 def test_a_trackers_samples() -> None:
-    """Nominal rig: 95 % within 3 %, worst within 5 % from 10 N on and within 0.15 mm below; hunting below 0.5 mm.
+    """Nominal rig: within 5 % (worst), 95 % within 1 %, though 5 % of 5 N at 4000 N/m is 0.06 mm; hunting below 0.5 mm.
 
-    Over eight sets of noise and both directions, 1920 pushes: median 0.2 %, 95 % 2.0 %, 99 % 4.8 %; from 10 N on at most 4.7 %.
-    Of the 160 pushes of 5 N at 4000 N/m, where 5 % is 0.06 mm under noise of 0.1 mm, 11 are beyond 5 %, the worst 15 %.
+    Over eight sets of noise and both directions, 1920 pushes: median 0.12 %, 95 % 0.61 %, worst 2.3 %; hunting 0.42 mm.
     """
     probes = pushes((5.0, -10.0, 20.0, -40.0))
-    answers = run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11)
-    error, hunting = errors(probes, answers)
-    size = np.abs(probes.force).max(axis=0)
-    assert np.quantile(error, 0.95) < 0.03
-    assert error[size > 5].max() < 0.05
-    assert np.hypot(*(answers.displacement - answers.expected))[size == 5].max() < 1.5e-4
+    error, hunting = errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11))
+    assert np.quantile(error, 0.95) < 0.01
+    assert error.max() < 0.05
     assert hunting.max() < 0.5
 
 
@@ -93,9 +89,8 @@ def test_a_trackers_samples_over_many_seeds() -> None:
     for seed in range(4):
         found.append(errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=100_000 * seed)))
     error, hunting = np.array(found).swapaxes(0, 1)
-    large = np.abs(probes.force).max(axis=0) > 5
-    assert np.quantile(error, 0.98) < 0.05
-    assert error[:, large].max() < 0.06
+    assert np.quantile(error, 0.95) < 0.01
+    assert error.max() < 0.05
     assert hunting.max() < 0.5
 
 
@@ -113,14 +108,14 @@ def test_a_hundred_unknown_rigs_are_held(sensors: str) -> None:
     answers = run_probes(probes, AdmittanceBackstepping(BELIEVED), sensors)
     error, hunting = errors(probes, answers)
     assert not answers.lost.any()
-    assert np.quantile(error, 0.95) < (0.001 if sensors == "ideal" else 0.05)
-    assert np.quantile(hunting, 0.95) < (0.01 if sensors == "ideal" else 1.5)
-    assert hunting.max() < (0.1 if sensors == "ideal" else 5.0)
+    assert np.quantile(error, 0.95) < (0.001 if sensors == "ideal" else 0.02)
+    assert np.quantile(hunting, 0.95) < (0.01 if sensors == "ideal" else 0.7)
+    assert hunting.max() < (0.1 if sensors == "ideal" else 2.5)
 
 
 @pytest.mark.slow
 def test_circles_of_unknown_rigs_against_the_papers_law() -> None:
-    """Settled RMS error, exact sensors, everything randomised: the median at least 85 % below; measured: 91 %."""
+    """Settled RMS error, exact sensors, everything randomised: the median at least 85 % below; measured: 98 %."""
     medians = {}
     for name in ("backstepping", "admittance-backstepping"):
         result = evaluate(

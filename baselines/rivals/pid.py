@@ -7,8 +7,9 @@ within what the supply can give. F and the setpoint of the pneumatic stiffness (
     F = Pp Sp - Pn Sn,   K = k (Pp Sp/Lp + Pn Sn/Ln),
 and each chamber's flow is (6) solved for dP/dt = b (P* - P): proportional, with the piston's speed compensated.
 
-The gains are what these commands printed (with ideal, then with lab):
-    birthsim-tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/tune/pid-ideal
+The gains are what these commands printed (with ideal, then with lab), the second starting from what the first had found:
+    birthsim-tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/first
+    birthsim-tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
 
 from __future__ import annotations
@@ -106,11 +107,11 @@ class PositionPID(Follower):
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
-            "bandwidth": 64.65,
-            "damping": 0.5503,
+            "bandwidth": 73.04,
+            "damping": 0.4617,
             "integral_rate": 30.0,
-            "pressure_gain": 340.8,
-            "friction_share": 0.751,
+            "pressure_gain": 395.6,
+            "friction_share": 0.8704,
             "dead_zone": 0.0,
         },
         "lab": {
@@ -118,8 +119,8 @@ class PositionPID(Follower):
             "damping": 0.5684,
             "integral_rate": 9.951,
             "pressure_gain": 340.8,
-            "friction_share": 0.7569,
-            "dead_zone": 6.794e-05,
+            "friction_share": 0.8328,
+            "dead_zone": 7.737e-06,
         },
     }
 
