@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -187,6 +188,42 @@ def test_reset_of_some_lanes_starts_only_those_on_the_target() -> None:
     # Another number of lanes is another run.
     fewer = asked(np.full((2, 2), 0.2), springs(2))
     assert np.array_equal(model.update(pushed(force[:, :2]), fewer)[:2], fewer.position)
+
+
+@pytest.mark.parametrize("period", [1e-3, 1e-2])
+def test_a_forecast_comes_true_where_nothing_new_happens(period: float) -> None:
+    """Force and stiffness stay, the target goes on with its jerk: what ``update`` says later, in every lane.
+
+    From a motion under way, with a lane that has just been reset; asking changes nothing.
+    """
+    rig, rng, lanes = Parameters().replace({"electronics.control_period": period}), np.random.default_rng(5), 4
+    matrices, ticks = np.concatenate([springs(lanes - 1), [COUPLED]]), np.array([1, 2, 3, 7, 8, 20, 57])
+    target = rng.uniform(-1, 1, (4, 2, lanes)) * np.array([0.5, 0.3, 2.0, 40.0])[:, None, None]
+
+    def at(tick: int) -> Reference:
+        """Position and three derivatives after so many periods of constant jerk."""
+        time, reference = tick * period, asked(np.zeros((2, lanes)), matrices)
+        for order in range(4):
+            terms = [target[k] * time ** (k - order) / math.factorial(k - order) for k in range(order, 4)]
+            reference.rows[2 * order : 2 * order + 2] = np.sum(terms, axis=0)
+        return reference
+
+    model, kept = Admittance(rig), Admittance(rig)
+    for tick in range(-60, 1):
+        force = rng.uniform(-30, 30, (2, lanes))
+        if tick == 0:
+            model.reset(np.array([False, True, False, False]))
+            kept.reset(np.array([False, True, False, False]))
+        motion = model.update(pushed(force), at(tick))
+        kept.update(pushed(force), at(tick))
+    ahead = model.forecast(at(0), force, ticks)
+    assert ahead.shape == (len(ticks), 4, lanes)
+    np.testing.assert_array_equal(model.forecast(at(0), force, ticks[2:]), ahead[2:])
+    for tick in range(1, ticks[-1] + 1):
+        motion = model.update(pushed(force), at(tick))
+        assert np.array_equal(motion, kept.update(pushed(force), at(tick)))
+        for found in ahead[ticks == tick]:
+            np.testing.assert_allclose(found, motion[:4], rtol=1e-11, atol=1e-13)
 
 
 @pytest.mark.parametrize("ratio", [0.0, -0.5, np.nan, np.inf])

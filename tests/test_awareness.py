@@ -257,3 +257,54 @@ def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> Non
     np.testing.assert_allclose(now.unseen[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
     np.testing.assert_allclose(now.unseen[:, 0], force[:, 0], rtol=0.05)
     np.testing.assert_array_equal(now.unseen[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
+
+
+def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:
+    """Two lanes, the rigs held, unseen, where they are, under a push. The targets' speeds turn round soon after tick 400."""
+    time, jerk = max(tick - 400, 0) * PERIOD, np.array([[30.0, -20.0], [-25.0, 15.0]])
+    speed, bend = np.array([[0.05, 0.08], [-0.04, 0.06]]), np.array([[-9.0, -14.0], [8.0, -10.0]])
+    wanted = closed_loop.holding(np.zeros((2, 2)), np.array([[1500.0, 3000.0], [2500.0, 1200.0]]))
+    rows = (
+        speed * time + bend * time**2 / 2 + jerk * time**3 / 6,
+        speed + bend * time + jerk * time**2 / 2,
+        bend + jerk * time,
+    )
+    wanted.rows[:8] = np.concatenate([*rows, jerk])
+    wanted.rows[:2] += end_effector(PISTON)
+    wanted.rows[14] = [600.0, -400.0]
+    pressures = balanced(PISTON)
+    pressures[[0, 3]] += [[3e4], [-2e4]]
+    return seen(tick, PISTON, pressures, push, False), wanted
+
+
+@either
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_of_now(sampled: bool, share: float) -> None:
+    """Both come true where the push stays, the target goes on with its jerk, and what is observed stays as it is.
+
+    Targets turn round on the way, and friction with them. Asking changes nothing.
+    """
+    part, kept = aware(sampled, friction_share=share), aware(sampled, friction_share=share)
+    push, ticks = (
+        np.array([[9.0, -4.0], [-6.0, 7.0]]),
+        np.arange(1, 26),
+    )
+
+    def both(tick: int) -> tuple[Situation, Situation]:
+        measured, wanted = turning(tick, push)
+        measured = dataclasses.replace(measured, sampled=sampled)
+        return part.update(measured, wanted), kept.update(measured, wanted)
+
+    for tick in range(401):
+        now, _ = both(tick)
+    observed, believed = now.unseen - now.believed, now.believed.copy()
+    assert np.abs(observed).min() > 1
+    ahead, unseen = part.forecast(now, turning(400, push)[1], ticks)
+    later = []
+    for k, tick in enumerate(ticks):
+        now, other = both(400 + tick)
+        np.testing.assert_allclose(ahead[k], now.motion[:4], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(unseen[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
+        assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
+        later.append(now.believed - believed)
+    assert np.all(np.abs(later).max(axis=0) >= 10 * share)

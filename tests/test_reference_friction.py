@@ -127,3 +127,57 @@ def test_lanes_and_a_new_start() -> None:
     reset.reset()
     again = ReferenceFriction(1e-3, parameter_column(RIG))
     assert np.array_equal(reset.update(motion[9]), again.update(motion[9]))
+
+
+def two_lanes(times: Array) -> Array:
+    """(T, 4, 2): the ellipse twice, with different pistons turning round at different times."""
+    return np.stack([circle(times).T, circle(times + 0.9).T], axis=2)
+
+
+def under_way(until: float, count: int = 1) -> tuple[list[ReferenceFriction], Array]:
+    """Models that have followed the ellipses for so long, s, and what they said last (2, N)."""
+    models, motion = [ReferenceFriction(1e-3, parameter_column(RIG)) for _ in range(count)], np.zeros((8, 2))
+    for wanted in two_lanes(np.arange(0, until, 1e-3)):
+        motion[:4] = wanted
+        drags = [model.update(motion) for model in models]
+    return models, drags[0]
+
+
+@pytest.mark.parametrize("until", [0.2, 0.29, 0.63, 1.0])
+def test_a_forecast_is_what_updates_say_later(until: float) -> None:
+    """Period by period the same, lane by lane; asking changes nothing."""
+    (model, kept), _ = under_way(until, 2)
+    times = until + 1e-3 * np.arange(80)
+    ahead, motion = two_lanes(times), np.zeros((8, 2))
+    found = model.forecast(ahead, np.arange(1, len(ahead) + 1))
+    assert np.array_equal(model.forecast(ahead[:5], np.arange(1, 6)), found[:5])
+    alone = np.ascontiguousarray(ahead[:, :, 1:])
+    single = ReferenceFriction(1e-3, parameter_column(RIG))
+    for wanted in two_lanes(np.arange(0, until, 1e-3)):
+        motion[:4] = wanted
+        single.update(np.ascontiguousarray(motion[:, 1:]))
+    assert np.array_equal(single.forecast(alone, np.arange(1, len(ahead) + 1))[:, :, 0], found[:, :, 1])
+    for wanted, said in zip(ahead, found, strict=True):
+        motion[:4] = wanted
+        drag = kept.update(motion)
+        assert np.array_equal(model.update(motion), drag)
+        np.testing.assert_allclose(said, drag, rtol=1e-12, atol=1e-12)
+
+
+def test_a_forecast_of_uneven_steps_is_lugre_with_the_speed_at_their_ends() -> None:
+    """z + T (v - s0 |v| z / G(v)), never beyond G(v)/s0, with speeds of the linkage made of points."""
+    ticks, f = np.array([2, 5, 10, 17, 27, 40, 57]), RIG.friction
+    for until in (0.15, 0.27, 0.6, 1.2):
+        (model,), drag = under_way(until)
+        ahead = two_lanes(until + 1e-3 * (ticks - 1))
+        found = model.forecast(ahead, ticks)
+        for lane in range(2):
+            speeds, bristles = piston_speeds(ahead[:, :, lane].T), drag[:, lane] / f.bristle_stiffness
+            for i, cylinder in enumerate((RIG.cylinder1, RIG.cylinder2)):
+                z, coulomb = bristles[i], cylinder.coulomb_friction
+                for k, time in enumerate(1e-3 * np.diff(ticks, prepend=0)):
+                    v = speeds[i, k]
+                    level = coulomb * (1 + (f.static_ratio - 1) / (1 + (v / f.stribeck_speed) ** 2))
+                    z += time * (v - f.bristle_stiffness * abs(v) * z / level)
+                    z = np.clip(z, -level / f.bristle_stiffness, level / f.bristle_stiffness)
+                    assert found[k, i, lane] == pytest.approx(f.bristle_stiffness * z, rel=1e-9, abs=1e-9)

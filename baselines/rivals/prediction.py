@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from baselines.rivals.follower import LEAST_LENGTH
 from birthsim_env import control_model, geometry, mechanics
-from birthsim_env.parameters import Parameters
+from birthsim_env.parameters import Cylinder, Parameters
 
 PRESSURE, FLOW = 1e5, 1e-3
 """Pa and kg/s: units of pressures and flows inside the residuals' arguments, so that all are of like size."""
@@ -65,6 +66,11 @@ class ControlModel:
         angles = (plain(geometry.sin_theta1), plain(geometry.cos_theta1))
         return r4, r2, w, s2, kappa, *(angle(w, root, product, sine, cosine) for angle in angles)
 
+    def lengths(self, cylinder: Cylinder, y: Any) -> tuple[Any, Any]:
+        """Lp and Ln, m, of a piston that an end stop keeps from leaving its stroke: nothing else in the model does."""
+        half = cylinder.stroke / 2
+        return self.casadi.fmax(half + y, LEAST_LENGTH), self.casadi.fmax(half - y, LEAST_LENGTH)
+
     def rates(self, state: Any, flows: Any, force: Any, unseen: Any) -> Any:
         """d(state)/dt; ``force`` (2,), N, is the user's, ``unseen`` (2,), N, acts along the pistons besides."""
         air, mass, gravity = self.rig.air, self.rig.mechanics.mass, self.rig.mechanics.gravity
@@ -81,9 +87,9 @@ class ControlModel:
             qp, qn, ap, an = FLOW * flows[2 * i], FLOW * flows[2 * i + 1], cylinder.area_p, cylinder.area_n
             held = plain(mechanics.piston_force)(pp, pn, ap, an, air.atmospheric_pressure)
             loads.append(held - cylinder.viscous_friction * v[i] + users[i] + unseen[i])
-            dead, half = self.rig.chambers.dead_volume, cylinder.stroke / 2
-            rate_p = plain(control_model.polytropic_rate_p)(pp, qp, v[i], ap, half + y[i] + dead / ap, index, gas_t)
-            rate_n = plain(control_model.polytropic_rate_n)(pn, qn, v[i], an, half - y[i] + dead / an, index, gas_t)
+            dead, lengths = self.rig.chambers.dead_volume, self.lengths(cylinder, y[i])
+            rate_p = plain(control_model.polytropic_rate_p)(pp, qp, v[i], ap, lengths[0] + dead / ap, index, gas_t)
+            rate_n = plain(control_model.polytropic_rate_n)(pn, qn, v[i], an, lengths[1] + dead / an, index, gas_t)
             pressure_rates += [rate_p / PRESSURE, rate_n / PRESSURE]
         a1 = plain(mechanics.acceleration1)(loads[0], *v, r2, r4, w, s2, kappa, sine, mass, gravity)
         a2 = plain(mechanics.acceleration2)(loads[1], v[0], r2, r4, s2, cosine, mass, gravity)
@@ -109,10 +115,9 @@ class ControlModel:
         """(9) of both cylinders, N/m."""
         stiffness = []
         for i, cylinder in enumerate((self.rig.cylinder1, self.rig.cylinder2)):
-            half, index = cylinder.stroke / 2, self.rig.air.polytropic_index
-            pp, pn, y = PRESSURE * state[4 + 2 * i], PRESSURE * state[5 + 2 * i], state[i]
-            areas = cylinder.area_p, cylinder.area_n
-            stiffness.append(plain(control_model.pneumatic_stiffness)(pp, pn, *areas, half + y, half - y, index))
+            pp, pn, lengths = PRESSURE * state[4 + 2 * i], PRESSURE * state[5 + 2 * i], self.lengths(cylinder, state[i])
+            areas, index = (cylinder.area_p, cylinder.area_n), self.rig.air.polytropic_index
+            stiffness.append(plain(control_model.pneumatic_stiffness)(pp, pn, *areas, *lengths, index))
         return stiffness
 
 

@@ -52,7 +52,10 @@ class Planner:
         self._programme = Buffered(symbols().conic("programme", "daqp", dense))
 
     def improve(self, plan: Array, given: Array, low: Array, high: Array) -> Array:
-        """A better plan (4 M,) with flows between ``low`` and ``high`` (4,), all in FLOW; no flow in a lane without numbers."""
+        """A better plan (4 M,) with flows between ``low`` and ``high`` (4,), all in FLOW; no flow in a lane without numbers.
+
+        Where a prediction runs away, so that its programme has no solution, the plan stays as it is.
+        """
         asked, programme = self._residuals.inputs, self._programme.inputs
         asked["commanded"][:], asked["given"][:] = plan, given
         self._residuals.call()
@@ -62,8 +65,12 @@ class Planner:
         slopes = self._residuals.outputs["slopes"].reshape(len(plan), -1)
         curvature = slopes @ slopes.T
         programme["h"][:], programme["g"][:] = curvature.ravel(), slopes @ found - curvature @ plan
-        programme["lbx"][:], programme["ubx"][:] = np.resize(low, len(plan)), np.resize(high, len(plan))
-        self._programme.call()
+        least, most = programme["lbx"], programme["ubx"]
+        least[:], most[:] = np.resize(low, len(plan)), np.resize(high, len(plan))
+        try:
+            self._programme.call()
+        except RuntimeError:
+            return np.clip(plan, least, most)
         return self._programme.outputs["x"].copy()
 
 
