@@ -408,7 +408,7 @@ def test_it_is_known_by_name_and_left_out_of_comparisons_unless_named() -> None:
 
 
 def test_it_comes_back_from_an_end_stop() -> None:
-    """Cylinder 2 at its far and near stop, pressed against it by 7 bar: within 0.7 s the end effector is 1 mm from the target."""
+    """Cylinder 2 at its far and near stop, pressed against it by 7 bar: within 0.7 s it is 1 mm from the target."""
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 2, axis=1), 2000.0)
     plant, nothing = Plant(RIG, 2), np.zeros((2, 2))
     piston = np.array([[0.0, 0.0], [0.199, -0.199]])
