@@ -10,6 +10,7 @@ with the unseen forces of ``awareness``: believed friction and what an observer 
   noise a slow average leaves must not wear the friction down.
 - ``watch`` lowers c across or along cylinder 2 where the loop oscillates in that direction: the rig is then slower, lighter
   or held more stiffly than believed.
+- Position errors count up to ``MOST_ERROR``, so that the loop comes back calmly from a load that was beyond its strength.
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
@@ -39,6 +40,10 @@ GAIN_SHARES = [WATCH_T, WATCH_N]
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
+
+MOST_ERROR = 0.006
+"""m; assumed: no position error counts for more. A larger one, left by a load beyond what the cylinders can hold, is closed at
+a speed of c MOST_ERROR/3, which saturated valves can still stop; else the loop swings between its limits."""
 
 HALF_WAVE = 0.2
 """s: a longer half wave of the speed error is no oscillation of the loop."""
@@ -124,6 +129,7 @@ def command(
         c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
         en = (1.0 + (rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
+        et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
         jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, share_t * c)
         jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, share_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
