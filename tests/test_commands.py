@@ -479,12 +479,12 @@ def test_ctrl_c_during_training_keeps_the_best_policy(tmp_path):
 
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     arguments = ("--env", "BirthSIM/Probe-v0", "--episodes", 6400, "--out", tmp_path)
-    status, printed = interrupted("evaluate", arguments, lambda said: "episodes 64-127" in said)
+    status, printed = interrupted("evaluate", arguments, lambda said: "episodes 128-255" in said)
     assert status == 0
     assert "of 6400 episodes are complete and kept" in printed
     (result,) = strict(tmp_path / "evaluation.json")["results"]
-    assert len(result["seeds"]) >= 64
-    assert len(result["seeds"]) % 64 == 0
+    assert len(result["seeds"]) >= 128
+    assert len(result["seeds"]) % 128 == 0
     assert len(result["episodes"]["settled_rms"]) == len(result["seeds"])
 
 
