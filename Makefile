@@ -2,6 +2,7 @@
 # make test   installs and runs the tests; make test-slow runs those marked slow
 # make lint   ruff and mypy; make bench prints speeds
 # make compare compares all controllers (an hour or so); it and make pictures redraw the README's pictures
+# make policies trains the policies that come with the package (an hour or so); make learned evaluates them
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,18 +12,23 @@ BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 
-.PHONY: run test test-slow lint bench compare pictures golden clean
+SCENARIOS := circle probe descent forceps dystocia
+ON_CIRCLE := circle_lab circle_pure
+POLICIES := agents/policies
+
+.PHONY: run test test-slow lint bench compare pictures policies learned golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,mpc,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,dev]'
 	touch $(READY)
 
 run: $(READY)
 	@echo "== 1 of 3: the experiment of Fig. 4"
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
-	@echo "== 2 of 3: a residual policy on top of the law, about two minutes"
-	$(BIN)/birthsim-train --env BirthSIM/CircleResidual-v0 --seed 0 --out $(OUT)/policy
+	@echo "== 2 of 3: a residual policy on top of the law, two to five minutes"
+	rm -rf $(OUT)/policy
+	$(BIN)/birthsim-train --config circle --seed 0 --out $(OUT)/policy
 	@echo "== 3 of 3: law and residual on 64 episodes that training never saw"
 	$(BIN)/birthsim-evaluate --env BirthSIM/Circle-v0 --controller residual --policy $(OUT)/policy --episodes 64 --seed 10000 --out $(OUT)/evaluation
 
@@ -51,6 +57,23 @@ compare: $(READY)
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	cat $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md >docs/bound.md
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
+
+policies: $(READY)
+	for name in $(SCENARIOS) $(ON_CIRCLE); do \
+	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --resume --out $(OUT)/training/$$name || exit 1; \
+	  for seed in 0 1 2 3 4; do mkdir -p $(POLICIES)/$$name/seed_$$seed && \
+	    cp $(OUT)/training/$$name/seed_$$seed/policy.* $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
+
+learned: $(READY)
+	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
+	for name in $(filter-out circle,$(SCENARIOS)); do scenario=$$(echo $$name | sed 's/./\u&/'); \
+	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v0 --controller residual --policy $$name --episodes 128 --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
+	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 128 --seed 20000 --out $(OUT)/learned/circle_pure
+	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 128 --seed 20000 --out $(OUT)/learned/circle_lab
+	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
+	$(BIN)/birthsim-explain --policy circle --out $(OUT)/learned/explain
+	for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done >docs/learned.md
+	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make

@@ -17,9 +17,10 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from agents.policy_network import PolicyNetwork
-from agents.residual_law import ResidualSettings
+from agents.settings import ResidualSettings
+from baselines.commands.shared import finite
 
-FORMAT = "birthsim-residual-1"
+FORMAT = "birthsim-residual-2"
 WEIGHTS, CONFIGURATION = "policy.safetensors", "policy.json"
 
 
@@ -44,11 +45,13 @@ def save_policy(policy: Policy, folder: Path) -> None:
         "format": FORMAT,
         "environment": policy.environment,
         "settings": policy.settings.to_dict(),
+        "squashed": policy.network.squashed,
         "training": policy.training,
         "sha256": hashlib.sha256(content).hexdigest(),
     }
     # The configuration names the weights by their hash and is written last: a pair that does not belong together is refused.
-    for name, data in ((WEIGHTS, content), (CONFIGURATION, json.dumps(configuration, indent=1).encode())):
+    described = json.dumps(finite(configuration), indent=1, allow_nan=False)
+    for name, data in ((WEIGHTS, content), (CONFIGURATION, described.encode())):
         partial = folder / f"{name}.partial"
         partial.write_bytes(data)
         partial.replace(folder / name)
@@ -77,8 +80,14 @@ def load_policy(folder: str | Path) -> Policy:
         arrays = load(content)
         count = sum(name.endswith(".weight") for name in arrays)
         layers = tuple((arrays[f"{k}.weight"], arrays[f"{k}.bias"]) for k in range(count))
-        network = PolicyNetwork(arrays["mean"], arrays["variance"], layers)
+        network = PolicyNetwork(arrays["mean"], arrays["variance"], layers, _truth(configuration["squashed"]))
         settings = ResidualSettings(**configuration["settings"])
         return Policy(network, str(configuration["environment"]), settings, dict(configuration["training"]))
     except (KeyError, TypeError, ValueError, SafetensorError) as error:
         raise ValueError(f"policy = {str(folder)!r} is damaged ({error}); {allowed}") from error
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"squashed = {value!r}; allowed: true or false")
+    return value

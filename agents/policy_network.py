@@ -24,12 +24,14 @@ class PolicyNetwork:
     """Deterministic part of a policy.
 
     ``mean`` and ``variance`` (D,) of the observations; ``layers`` are (weight (out, in), bias (out,)) pairs with tanh between
-    them and none after the last. Raises ``ValueError`` where shapes do not fit together or a number is not finite.
+    them, and after the last one another where it is ``squashed`` (SAC, TQC), else none. Raises ``ValueError`` where shapes do
+    not fit together or a number is not finite.
     """
 
     mean: Statistics
     variance: Statistics
     layers: tuple[tuple[Weights, Weights], ...]
+    squashed: bool = False
 
     def __post_init__(self) -> None:
         width = self.mean.shape[0] if self.mean.ndim == 1 else -1
@@ -61,4 +63,5 @@ class PolicyNetwork:
         for weight, bias in self.layers[:-1]:
             x = np.tanh(x @ weight.T + bias)
         weight, bias = self.layers[-1]
-        return np.asarray(np.clip(x @ weight.T + bias, -1.0, 1.0), dtype=np.float32)
+        last = x @ weight.T + bias
+        return np.asarray(np.tanh(last) if self.squashed else np.clip(last, -1.0, 1.0), dtype=np.float32)

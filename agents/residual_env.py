@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from agents.residual_law import ResidualActuation, ResidualSettings
+from agents.residual_law import ResidualActuation
+from agents.settings import ResidualSettings
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parameters import load_parameters
 from birthsim_env.vector_env import BirthSIMVectorEnv
@@ -16,9 +17,10 @@ class _LawInside:
     def __init__(
         self,
         scenario: str,
+        law: str = ResidualSettings.law,
+        impedance: str = ResidualSettings.impedance,
         authority: float = ResidualSettings.authority,
-        smoothing: float = ResidualSettings.smoothing,
-        weight_compensation: bool = False,
+        time_constant: float = ResidualSettings.time_constant,
         **arguments: Any,
     ) -> None:
         for name in ("action_mode", "valves", "actuation"):
@@ -26,25 +28,38 @@ class _LawInside:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
         rig = load_parameters(arguments.pop("parameters", None))
         period = arguments.get("policy_period", ResidualSettings.policy_period)
-        settings = ResidualSettings(authority, smoothing, period, weight_compensation)
-        law = ResidualActuation(rig, settings)
-        super().__init__(scenario, parameters=rig, actuation=law, **arguments)  # type: ignore[call-arg]
+        settings = ResidualSettings(law, impedance, authority, time_constant, period)
+        actuation = ResidualActuation(rig, settings)
+        super().__init__(scenario, parameters=rig, actuation=actuation, **arguments)  # type: ignore[call-arg]
 
 
 class ResidualEnv(_LawInside, BirthSIMEnv):
-    """A scenario of ``BirthSIMEnv`` with the paper's backstepping law running inside at 1 kHz.
+    """A scenario of ``BirthSIMEnv`` with a control law running inside at 1 kHz, which a policy corrects.
 
     ## Action space
-    `Box(-1, 1, (2,), float32)`, held for one policy period: a force along cylinders 1 and 2, in units of `authority` (100 N),
-    that is added to what the law believes acts on the piston, after a low-pass (`smoothing` = 0.3 per step, about 28 ms).
-    A zero action is exactly the law.
+    `Box(-1, 1, (n,), float32)`, held for one policy period and smoothed by a low-pass (`time_constant` = 28 ms). Zero is
+    exactly the law. n and the entries depend on `impedance`:
 
-    ## Observation space, reward, start, end and info
-    Those of `BirthSIMEnv`; the observation's last two entries are the last action.
+    | `impedance` | entries |
+    |---|---|
+    | `"fixed"` | a force along cylinders 1 and 2, in units of `authority` (100 N), that the law believes in |
+    | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with |
+    | `"variable"` | and a power of 2 for the damping; less than zero is zero |
+
+    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for.
+    With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
+
+    ## Observation space
+    That of `BirthSIMEnv`, and after the last action the smoothed action, the shares of the authority that are left (they fall
+    where pistons oscillate), and the forces that an observer finds unexplained on pistons 1 and 2, in units of 100 N: now,
+    when they last moved out, and when they last moved in. `observation_names` lists all.
+
+    ## Reward, start, end and info
+    Those of `BirthSIMEnv`.
 
     ## Arguments
-    Those of `BirthSIMEnv` without `action_mode` and `valves`, and `authority` (N), `smoothing` (0 to 1] and
-    `weight_compensation`, which puts (14) back into the law.
+    Those of `BirthSIMEnv` without `action_mode`, `valves` and `actuation`, and `law` (one of `agents.settings.LAWS`),
+    `impedance`, `authority` (N) and `time_constant` (s).
 
     ## Version history
     - v0: first version.

@@ -1,85 +1,137 @@
-"""The law with a residual: a policy tells it about forces on the pistons that it does not know of.
+"""The law with a residual: a policy tells it about forces on the pistons that it does not know of, and how stiff to work.
 
-An action in [-1, 1] per cylinder, times the authority in N, passes a first-order low-pass at the policy rate and is added to
-what the law believes acts on the piston. Zero actions are exactly the law.
+An action in [-1, 1] passes a first-order low-pass at the control rate, z' = (a - z)/T. Its first two entries, times the
+authority in N, are added to what the law believes acts on the pistons; the law knows their rate too. Where the impedance is
+variable, the next two set the stiffness K' = K 4^z that the law works with, about a target moved so that a hand at rest still
+feels K; the last raises the damping. Zero actions are exactly the law. Without a law the actions are the openings.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import math
 from typing import Any
 
 import numpy as np
 
-from baselines.backstepping import BacksteppingController
-from birthsim_env.lanes import Array
+from agents.experience import Experience
+from agents.guard import Guard
+from agents.settings import NO_LAW, ResidualSettings
+from baselines.registry import make_controller
+from birthsim_env.lanes import Array, parameter_column
+from birthsim_env.observation import LIMIT
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.signals import Mask, Measurement, Reference
 
+STIFFEST = 6000.0
+"""N/m; assumed: the law is made no stiffer than that, unless more is asked for: slow valves bear no more."""
 
-@dataclass(frozen=True)
-class ResidualSettings:
-    """What a residual may do.
+STIFFENING = 4.0
+"""Most that the stiffness is multiplied or divided by."""
 
-    ``authority`` (N) bounds the believed force: 100 N, since the weight of 2 kg more than believed is 40 to 57 N along
-    cylinder 1 and friction comes on top; ``smoothing`` in (0, 1] is the share of a new action that the low-pass lets
-    through per policy step (0.3 per 10 ms is a lag of about 28 ms: without it single lanes oscillate); ``policy_period`` (s);
-    ``weight_compensation`` of the law underneath. Raises ``ValueError`` for values outside these limits.
-    """
+MOST_DAMPING = 2.0
+"""Most that the damping is multiplied by."""
 
-    authority: float = 100.0
-    smoothing: float = 0.3
-    policy_period: float = 0.01
-    weight_compensation: bool = False
+FORCE_UNIT = 100.0
+"""N that map to 1 in an observation."""
 
-    def __post_init__(self) -> None:
-        for name, low, high in (("authority", 0.0, 500.0), ("smoothing", 0.0, 1.0), ("policy_period", 0.0, 1.0)):
-            value = getattr(self, name)
-            if not (isinstance(value, (int, float)) and low < value <= high):
-                raise ValueError(f"{name} = {value!r}; allowed: more than {low:g}, at most {high:g}")
+NAMES = (
+    *(f"believed force on cylinder {i}, unit of the authority" for i in (1, 2)),
+    *(f"stiffness Kcl{axis}, power of {STIFFENING:g}" for axis in "xy"),
+    f"damping, power of {MOST_DAMPING:g}",
+)
+"""What the entries of an action say."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON takes it."""
-        return asdict(self)
+VALVE_NAMES = tuple(f"opening of the valve of chamber {chamber}, 1" for chamber in ("P1", "N1", "P2", "N2"))
+"""What they say without a law."""
+
+MET = tuple(
+    f"unexplained force on piston {i}, {when}, {FORCE_UNIT:g} N"
+    for when in ("now", "when last moving out", "when last moving in")
+    for i in (1, 2)
+)
+
+
+def action_names(settings: ResidualSettings) -> tuple[str, ...]:
+    """What each entry of an action says."""
+    return VALVE_NAMES if settings.law == NO_LAW else NAMES[: settings.size]
+
+
+def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
+    """What each row of ``ResidualLaw.memory`` says."""
+    smooth = (f"smoothed action: {name}" for name in action_names(settings))
+    return (*smooth, *(f"share of the authority on cylinder {i}, 1" for i in (1, 2)), *MET)
+
+
+def stiffened(reference: Reference, force: Array, powers: Array) -> Reference:
+    """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'."""
+    rows = reference.rows.copy()
+    asked = reference.stiffness
+    rows[8:10] = np.where(powers == 0, asked, np.minimum(asked * STIFFENING**powers, np.maximum(asked, STIFFEST)))
+    rows[0:2] += force / asked - force / rows[8:10]
+    return Reference(rows)
 
 
 class ResidualLaw:
-    """Backstepping with a residual over N lanes; ``size`` lanes are made room for at the first ``accept``."""
+    """A law with a residual over N lanes; room for them is made by the first ``reset``."""
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         self.settings = settings
-        self._law = BacksteppingController(parameters, weight_compensation=settings.weight_compensation)
-        self._believed: Array = np.zeros((2, 0))
+        # Whichever law it is can be told of forces; those that have an impedance also of a damping factor.
+        self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, parameters)
+        self._experience = Experience(parameters)
+        period = parameters.electronics.control_period
+        self._guard = Guard(period, parameter_column(parameters))
+        self._quickness = 1.0 - math.exp(-period / settings.time_constant)
+        self._action: Array = np.zeros((settings.size, 0))
+        self._smooth: Array = np.zeros((settings.size, 0))
 
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        self._law.reset(lanes)
-        if lanes is None:
-            self._believed = np.zeros((2, 0))
-        elif self._believed.shape[1]:
-            self._believed[:, lanes] = 0.0
+    def reset(self, lanes: Mask) -> None:
+        """Forget the past of the lanes where ``lanes`` (N,) is True."""
+        if self._smooth.shape[1] != len(lanes):
+            self._action, self._smooth = np.zeros((2, self.settings.size, len(lanes)))
+            if self._law is not None:
+                self._law.reset()
+        if self._law is not None:
+            self._law.reset(lanes)
+        self._experience.reset(lanes)
+        self._guard.reset(lanes)
+        self._action[:, lanes], self._smooth[:, lanes] = 0.0, 0.0
 
     def accept(self, actions: Array) -> None:
-        """Take the actions (2, N) of a policy step."""
-        if self._believed.shape[1] != actions.shape[1]:
-            self._believed = np.zeros(actions.shape)
-        self._believed += self.settings.smoothing * (self.settings.authority * actions - self._believed)
+        """Take the actions (size, N) of a policy step."""
+        self._action = np.array(actions)
 
     def command(self, measurement: Measurement, reference: Reference) -> Array:
         """Spool openings (4, N) of one control period."""
-        return self._law.command(measurement, reference, self._believed)
+        self._experience.update(measurement)
+        self._guard.update(self._experience.joints, reference)
+        smooth, settings = self._smooth, self.settings
+        authority = settings.authority * self._guard.share
+        told = [authority * smooth[:2], authority / settings.time_constant * (self._action[:2] - smooth[:2])]
+        if settings.impedance != "fixed":
+            reference = stiffened(reference, measurement.user_force, smooth[2:4])
+        if settings.impedance == "variable":
+            told.append(MOST_DAMPING ** np.maximum(smooth[4], 0.0))
+        self._smooth = smooth + self._quickness * (self._action - smooth)
+        return self._action if self._law is None else np.asarray(self._law.command(measurement, reference, *told))
+
+    def memory(self) -> Array:
+        """What a policy sees of it, (size + 8, N): smoothed action, shares of the authority, forces met in ``FORCE_UNIT``."""
+        met = np.clip(self._experience.met / FORCE_UNIT, -LIMIT, LIMIT)
+        return np.concatenate([self._smooth, self._guard.share, met])
 
 
 class ResidualActuation:
     """``ResidualLaw`` as an actuation of the environments: the law runs inside, at the control rate."""
 
-    size = 2
-    names = ("believed force on cylinder 1, unit of the authority", "believed force on cylinder 2, unit of the authority")
     every_period = True
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         self._law = ResidualLaw(parameters, settings)
+        self.size = settings.size
+        self.names = action_names(settings)
+        self.memory_names = memory_names(settings)
 
     def begin(self, lanes: Mask) -> None:
         self._law.reset(lanes)
@@ -89,3 +141,6 @@ class ResidualActuation:
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         return self._law.command(measurement, reference)
+
+    def memory(self) -> Array:
+        return self._law.memory()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +17,8 @@ class SB3VecEnv(VecEnv):
     """Makes ``gymnasium.make_vec(id, num_envs=N)`` usable by Stable-Baselines3.
 
     Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
-    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it.
+    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in steps of
+    the environment.
     """
 
     def __init__(self, env: Any) -> None:
@@ -24,6 +26,7 @@ class SB3VecEnv(VecEnv):
             raise ValueError(f"env = {env!r}; allowed: a vector environment that resets within the same step")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.seconds = 0.0
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
         self._actions: NDArray[Any] = np.zeros((env.num_envs, *env.single_action_space.shape))
@@ -43,7 +46,9 @@ class SB3VecEnv(VecEnv):
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """One step of all lanes."""
+        started = time.perf_counter()
         observation, rewards, terminated, truncated, info = self.env.step(self._actions)
+        self.seconds += time.perf_counter() - started
         self._returns += rewards
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

@@ -17,7 +17,7 @@ import numpy as np
 from baselines import admittance_law
 from baselines.awareness import Awareness
 from baselines.backstepping import PNEUMATIC_GAIN
-from baselines.controller import check_gains, lanes_of
+from baselines.controller import check_gains, lanes_of, told_of
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
 from birthsim_env.signals import Mask, Measurement, Reference, one_lane
@@ -113,15 +113,25 @@ class AdmittanceBackstepping:
         elif self._memory.shape[1]:
             self._memory[:, lanes] = FRESH
 
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
+    def command(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+    ) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness
-        setpoint that is not positive definite.
+        Called once per control period. ``believed_force`` (2, N), N, along the cylinders, and its rate ``believed_rate``,
+        N/s, are believed in beside what is observed. Raises ``ValueError`` for signals over different numbers of lanes, and for
+        a stiffness setpoint that is not positive definite.
         """
         if measurement.position.ndim == 1:
-            return self.command(*one_lane(measurement, reference))[:, 0]
+            given = (believed_force, believed_rate)
+            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+            return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
+        believed = told_of(lanes, believed_force, believed_rate)
         if self._memory.shape[1] != lanes:
             self._memory = np.repeat(FRESH, lanes, axis=1)
         kind = "lab" if measurement.sampled else "ideal"
@@ -132,7 +142,7 @@ class AdmittanceBackstepping:
         admittance_law.command(
             now.joints, now.pressures, now.motion, reference.rows, now.force, now.unseen, now.rest, now.moving,
             now.spools, self._p, self._period, g["gain"], g["rest_gain"], g["rest_push"], g["dead_zone"],
-            quickness, g["oscillation"], g["yielding"], LEAST_SHARE, PNEUMATIC_GAIN, self._memory, openings,
+            quickness, g["oscillation"], g["yielding"], LEAST_SHARE, PNEUMATIC_GAIN, believed, self._memory, openings,
         )  # fmt: skip
         awareness.commanded(openings)
         return openings

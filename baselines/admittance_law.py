@@ -94,12 +94,13 @@ def beyond(error: float, zone: float) -> float:
 def command(
     joints: Array, pressures: Array, motion: Array, target: Array, force: Array, unseen: Array, rest: Array, moving: Array,
     spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float, dead_zone: float,
-    quickness: float, level: float, fall: float, least: float, c4: float, memory: Array, openings: Array,
+    quickness: float, level: float, fall: float, least: float, c4: float, told: Array, memory: Array, openings: Array,
 ) -> None:  # fmt: skip
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
     ``joints``, ``pressures``, ``motion``, ``force``, ``unseen``, ``rest``, ``moving`` and ``spools`` are those of
-    ``awareness.Situation``; ``target`` (15, N) is the reference.
+    ``awareness.Situation``; ``target`` (15, N) is the reference; ``told`` what
+    ``controller.told_of`` gives.
     """
     u, kept = np.empty((4, 1)), math.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
@@ -111,8 +112,9 @@ def command(
         )
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
-        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1 + unseen[0, i]
-        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2 + unseen[1, i]
+        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1
+        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2
+        load1, load2 = load1 + unseen[0, i] + told[0, i], load2 + unseen[1, i] + told[1, i]
 
         # Across (t) and along (n) cylinder 2: errors of position, speed and acceleration.
         ex, ey = r2 * sine - motion[0, i], -r2 * cosine - motion[1, i]
@@ -137,6 +139,7 @@ def command(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity
         )  # fmt: skip
         rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, m, gravity)
+        rate1, rate2 = rate1 - told[2, i], rate2 - told[3, i]
         pressure_openings(
             u, 0, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p
         )

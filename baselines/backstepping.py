@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from baselines import backstepping_law
-from baselines.controller import lanes_of
+from baselines.controller import lanes_of, told_of
 from baselines.gains import gains_for
 from baselines.observers import PistonObserver, measured_joints
 from birthsim_env.actuation import VALVE_LAYOUTS
@@ -100,17 +100,28 @@ class BacksteppingController:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True. Only the observer has a memory."""
         self._observer.reset(lanes)
 
-    def command(self, measurement: Measurement, reference: Reference, believed_force: Array | None = None) -> Array:
+    def command(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
+    ) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons.
+        ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons;
+        ``believed_rate`` (2, N), N/s, is how fast it changes, which the force then follows without the lag of c3.
+        ``damping_factor`` (N,) is the damping in units of the least there is; up to 1.01 it is that, and where a
+        ``damping_ratio`` is given it says nothing.
         Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that no positive gains render,
         naming the lane and what is allowed there.
         """
         if measurement.position.ndim == 1:
-            told = None if believed_force is None else np.asarray(believed_force, dtype=np.float64)[..., None]
-            return self.command(*one_lane(measurement, reference), told)[:, 0]
-        joints, believed = self._joints(measurement, reference, believed_force)
+            given = (believed_force, believed_rate, damping_factor)
+            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+            return self.command(*one_lane(measurement, reference), *told)[:, 0]
+        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
         openings = np.empty(measurement.pressures.shape)
         misses = backstepping_law.command(
             joints, measurement.pressures, reference.rows, believed, self._p, self._options, openings
@@ -119,12 +130,19 @@ class BacksteppingController:
             self._refuse(joints, reference)
         return openings
 
-    def inspect(self, measurement: Measurement, reference: Reference, believed_force: Array | None = None) -> LawTerms:
+    def inspect(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
+    ) -> LawTerms:
         """What ``command`` would want with the same signals, over N lanes.
 
         Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
         """
-        joints, believed = self._joints(measurement, reference, believed_force)
+        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
         lanes = joints.shape[1]
         wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
         gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
@@ -134,17 +152,15 @@ class BacksteppingController:
         )
         return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
 
-    def _joints(self, measurement: Measurement, reference: Reference, believed_force: Array | None) -> tuple[Array, Array]:
-        """y1, y2, v1, v2 (4, N) and the believed force (2, N) from signals whose shapes are checked."""
+    def _joints(
+        self, measurement: Measurement, reference: Reference, force: Array | None, rate: Array | None, factor: Array | None
+    ) -> tuple[Array, Array]:
+        """y1, y2, v1, v2 (4, N), and what the law is told (TOLD, N), from signals whose shapes are checked."""
         lanes = lanes_of(measurement, reference)
-        believed = np.zeros((2, lanes)) if believed_force is None else np.ascontiguousarray(believed_force, dtype=np.float64)
-        if believed.shape != (2, lanes):
-            raise ValueError(
-                f"believed_force has shape {believed.shape}; allowed: {(2, lanes)}, with the lanes of measurement.position"
-            )
+        told = told_of(lanes, force, rate, factor)
         if measurement.sampled:
-            return np.ascontiguousarray(self._observer.update(measurement)), believed
-        return measured_joints(measurement, self._p), believed
+            return np.ascontiguousarray(self._observer.update(measurement)), told
+        return measured_joints(measurement, self._p), told
 
     def _refuse(self, joints: Array, reference: Reference) -> None:
         """Raises the error of the first lane whose setpoints have no gains."""

@@ -36,6 +36,13 @@ GAINS, INTENTS = 6, 6
 """Rows of gains: c1, c2, c3 of cylinder 1, then of cylinder 2. Rows of what the law wants: dF/dt of cylinders 1 and 2 (N/s),
 dK/dt of both (N/(m s)), F* of both (N)."""
 
+TOLD = 5
+"""Rows of what a law is told: forces that it is to believe in along cylinders 1 and 2 (N), their rates (N/s), and the damping
+in units of that of equal gains."""
+
+LEAST_FACTOR = 1.01
+"""Less damping than so many times that of equal gains is theirs: between the two no positive gains are sure to exist."""
+
 CLEARANCE = 0.002
 """m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no
 meaning."""
@@ -125,13 +132,34 @@ def damped_gains(asked: Array, p: Array, ratio: float, gains: Array, n: int) -> 
 
 
 @helper
-def choose_gains(joints: Array, target: Array, p: Array, ratio: float, asked: Array, gains: Array, n: int) -> int:
+def raise_damping(asked: Array, p: Array, factor: Array, gains: Array, n: int) -> None:
+    """Turns equal ``gains`` (6, n) into those of ``factor`` (n,) times their damping where that is more."""
+    for i in range(n):
+        if factor[i] > LEAST_FACTOR:
+            for cylinder in range(2):
+                row, k = 3 * cylinder, asked[cylinder, i]
+                mass, viscous = (asked[2, i], p[at.FV1]) if cylinder == 0 else (p[at.MASS], p[at.FV2])
+                c = gains[row, i]
+                damping = factor[i] * (mass * (3.0 * c * c + 2.0) - k) / (3.0 * c - viscous / mass)
+                outer = outer_gain(k, damping, mass, viscous)
+                gains[row, i], gains[row + 1, i], gains[row + 2, i] = outer, inner_gain(outer, k, mass, viscous), outer
+
+
+@helper
+def choose_gains(
+    joints: Array, target: Array, p: Array, ratio: float, factor: Array, asked: Array, gains: Array, n: int
+) -> int:  # fmt: skip
     """Writes ``gains`` (6, n) for the setpoints of ``target`` (15, n); returns the number of lanes without any.
 
-    Equal gains where ``ratio`` is 0, else ``damped_gains``. ``asked`` (3, n) is scratch.
+    ``damped_gains`` where ``ratio`` is more than 0, else equal gains with ``factor`` (n,) times their damping. ``asked`` (3, n)
+    is scratch.
     """
     asked_of_cylinders(joints, target, p, asked, n)
-    return damped_gains(asked, p, ratio, gains, n) if ratio > 0.0 else equal_gains(asked, p, gains, n)
+    if ratio > 0.0:
+        return damped_gains(asked, p, ratio, gains, n)
+    misses = equal_gains(asked, p, gains, n)
+    raise_damping(asked, p, factor, gains, n)
+    return misses
 
 
 @helper
@@ -148,7 +176,7 @@ def law(
     """Writes what the law wants, ``intent`` (6, n), for n lanes.
 
     ``joints`` (4, n): y1, y2, v1, v2. ``wanted`` (8, n): the reference in joint coordinates. ``target`` (15, n): the
-    reference. ``believed`` (2, n): forces along the cylinders that the law is told about, N. ``gains`` (6, n).
+    reference. ``believed`` (TOLD, n): what the law is told. ``gains`` (6, n).
     """
     c4, width, compensate, sliding = options[PNEUMATIC_GAIN], options[SIGN_WIDTH], options[WEIGHT], options[COULOMB_RATE]
     for i in range(n):
@@ -186,6 +214,8 @@ def law(
             + (sliding * p[at.FC1] * smooth_sign_slope(v1, width) + p[at.FV1]) * a1
             - m * gravity * kappa * (growth * sine + cosine * turn)
         )
+        # F* takes off what is believed, and dF*/dt its rate.
+        star1_rate -= believed[2, i]
         intent[0, i] = force_rate_command(
             star1_rate, net1, star1, y1, v1, wanted[0, i], wanted[2, i], gains[0, i], gains[2, i], mass1
         )
@@ -198,6 +228,7 @@ def law(
         star2_rate = (
             m * (jerk2 - compensate * neglected_rate) + (sliding * p[at.FC2] * smooth_sign_slope(v2, width) + p[at.FV2]) * a2
         )
+        star2_rate -= believed[3, i]
         intent[1, i] = force_rate_command(
             star2_rate, net2, star2, y2, v2, wanted[1, i], wanted[3, i], gains[3, i], gains[5, i], m
         )
@@ -233,10 +264,11 @@ def command(
 ) -> int:  # fmt: skip
     """Writes ``openings`` (4, N) for N lanes and one rig's parameters (PARAMETERS,); returns how many lanes have no gains.
 
-    ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N); ``reference`` (15, N); ``believed`` (2, N); ``options`` (OPTIONS,).
+    ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N); ``reference`` (15, N); ``believed`` (TOLD, N);
+    ``options`` (OPTIONS,).
     """
     x, air, r = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((REFERENCES, BLOCK))
-    wanted, told, u = np.empty((8, BLOCK)), np.empty((2, BLOCK)), np.empty((4, BLOCK))
+    wanted, told, u = np.empty((8, BLOCK)), np.empty((TOLD, BLOCK)), np.empty((4, BLOCK))
     asked, gains, intent, misses = np.empty((3, BLOCK)), np.empty((GAINS, BLOCK)), np.empty((INTENTS, BLOCK)), 0
     for first in range(0, joints.shape[1], BLOCK):
         n = min(BLOCK, joints.shape[1] - first)
@@ -245,7 +277,7 @@ def command(
         load(reference, first, n, r)
         load(believed, first, n, told)
         piston_reference(r, p, wanted, n)
-        misses += choose_gains(x, r, p, options[DAMPING_RATIO], asked, gains, n)
+        misses += choose_gains(x, r, p, options[DAMPING_RATIO], told[4], asked, gains, n)
         law(x, air, wanted, r, told, gains, p, options, intent, n)
         openings_for(x, air, intent, p, options[ONE_VALVE], u, n)
         store(u, first, n, openings)
@@ -262,8 +294,8 @@ def inspect(
     asked, moved, ahead, behind = np.empty((3, n)), joints.copy(), np.empty((GAINS, n)), np.empty((GAINS, n))
     for share, there in ((1.0, ahead), (-1.0, behind)):
         moved[0:2] = joints[0:2] + share * STEP * joints[2:4]
-        choose_gains(moved, reference, p, options[DAMPING_RATIO], asked, there, n)
+        choose_gains(moved, reference, p, options[DAMPING_RATIO], believed[4], asked, there, n)
     gain_rates[:] = (ahead - behind) / (2.0 * STEP)
     piston_reference(reference, p, wanted, n)
-    choose_gains(joints, reference, p, options[DAMPING_RATIO], asked, gains, n)
+    choose_gains(joints, reference, p, options[DAMPING_RATIO], believed[4], asked, gains, n)
     law(joints, pressures, wanted, reference, believed, gains, p, options, intent, n)

@@ -42,6 +42,24 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
     return lanes
 
 
+def told_of(lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None) -> Array:
+    """What a law is told besides, (5, lanes), zero where nothing: forces to believe in along cylinders 1 and 2, N, their
+    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape."""
+    told = np.zeros((5, lanes))
+    for name, rows, given in (
+        ("believed_force", told[:2], force),
+        ("believed_rate", told[2:4], rate),
+        ("damping_factor", told[4], factor),
+    ):
+        if given is not None:
+            if np.shape(given) != rows.shape:
+                raise ValueError(
+                    f"{name} has shape {np.shape(given)}; allowed: {rows.shape}, with the lanes of measurement.position"
+                )
+            rows[:] = given
+    return told
+
+
 class Tunable(Protocol):
     """A controller whose gains ``birthsim-tune`` finds: ``TUNABLE`` is gain -> (lowest, highest) to try, SI units."""
 

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.controller import Controller
+from baselines.feasibility import demand
 from baselines.metrics import UNITS, EpisodeMetrics
 from baselines.statistics import in_words, judged, number, summarize
 from birthsim_env.lanes import Array
@@ -26,12 +27,16 @@ TRACE = 0.01
 
 @dataclass
 class Evaluation:
-    """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m."""
+    """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
+
+    ``demand`` is the share of the rig's strength that each episode asks for, whatever controls it.
+    """
 
     controller: str
     seeds: list[int] = field(default_factory=list)
     metrics: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in UNITS})
     lost: list[bool] = field(default_factory=list)
+    demand: list[float] = field(default_factory=list)
     cost: float = float("nan")
     traces: list[Array] = field(default_factory=list)
 
@@ -50,6 +55,7 @@ class Evaluation:
             "cost_us_per_lane_and_call": self.cost,
             "episodes": self.metrics,
             "lost": self.lost,
+            "demand": self.demand,
         }
 
 
@@ -97,6 +103,7 @@ def _run_batch(
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, **arguments)
     _, info = env.reset(seed=list(seeds))
     controller.reset()
+    asked = demand(env)
     metrics = EpisodeMetrics(len(seeds), period)
     alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
     lost = np.zeros_like(alive)
@@ -124,6 +131,7 @@ def _run_batch(
     for name, values in metrics.result().items():
         result.metrics[name] += [float(value) for value in values]
     result.seeds += seeds
+    result.demand += [float(value) for value in asked]
     result.lost += [bool(value) for value in lost]
     result.traces.append(trace)
 

@@ -7,6 +7,7 @@ infinite too, and print as "lost". NaN is an episode that says nothing about a m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -73,6 +74,34 @@ def median_interval(values: ArrayLike) -> tuple[float, float]:
     tail = (1 - LEVEL) / 2
     # Without interpolation, which has no meaning between a number and infinity.
     return float(medians[int(tail * RESAMPLES)]), float(medians[int(np.ceil((1 - tail) * RESAMPLES)) - 1])
+
+
+def interquartile_mean(values: ArrayLike) -> float:
+    """Mean of the middle half of the values, those at its edges by their share (Agarwal et al. 2021); NaNs are ignored.
+
+    Infinite where a lost episode falls into the middle half, NaN without values.
+    """
+    said = np.sort(_said(values))
+    if said.size == 0:
+        return float("nan")
+    edges = np.clip(np.arange(said.size + 1), said.size / 4, 3 * said.size / 4)
+    weights = np.diff(edges)
+    return float(said[weights > 0] @ weights[weights > 0] / weights.sum())
+
+
+def crossed_interval(statistic: Callable[[Array], float], values: ArrayLike, resamples: int = 2000) -> tuple[float, float]:
+    """95 % interval of ``statistic`` of ``values`` (seeds, episodes): percentile bootstrap that draws training seeds and
+    episodes anew, both with replacement, since both are a sample. The same at every call.
+    """
+    given = np.asarray(values, dtype=np.float64)
+    rng = np.random.default_rng(given.shape)
+    drawn = np.empty(resamples)
+    for k in range(resamples):
+        seeds, episodes = (rng.integers(count, size=count) for count in given.shape[:2])
+        drawn[k] = statistic(given[seeds][:, episodes])
+    tail = (1 - LEVEL) / 2
+    drawn.sort()
+    return float(drawn[int(tail * resamples)]), float(drawn[int(np.ceil((1 - tail) * resamples)) - 1])
 
 
 def paired_ratios(mine: ArrayLike, reference: ArrayLike) -> Array:

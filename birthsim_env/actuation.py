@@ -26,11 +26,13 @@ class Actuation(Protocol):
 
     ``size`` is the length of an action and ``names`` describes its entries. ``begin(lanes)`` starts new episodes in the
     lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
-    ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on.
+    ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on. ``memory()`` (M, N) is
+    what a policy should see of its state, in units that make it roughly [-1, 1], and ``memory_names`` describes its rows.
     """
 
     size: int
     names: tuple[str, ...]
+    memory_names: tuple[str, ...]
     every_period: bool
 
     def begin(self, lanes: Mask) -> None: ...
@@ -39,8 +41,20 @@ class Actuation(Protocol):
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array: ...
 
+    def memory(self) -> Array: ...
 
-class ValveActuation:
+
+class Forgetful:
+    """An actuation without a memory."""
+
+    memory_names: tuple[str, ...] = ()
+
+    def memory(self) -> Array:
+        """Nothing."""
+        return np.empty((0, 0))
+
+
+class ValveActuation(Forgetful):
     """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
 
     every_period = False
@@ -89,7 +103,7 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
                 openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
 
 
-class FlowActuation:
+class FlowActuation(Forgetful):
     """The action is a net mass flow in units of the choked flow C rho0 Ps sqrt(T0/T) (3.2 g/s by default).
 
     The inverse of the valve characteristic, at the true pressures and with the rig that was drawn, turns it into openings at

@@ -119,7 +119,8 @@ def assemble(
         policy_periods(policy_period, rig),
     )
     limit = observation.LIMIT
-    size = observation.SIZE + chosen.size
+    names = (*(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
+    size = observation.SIZE + len(names)
     return Setup(
         simulation,
         chosen,
@@ -128,7 +129,7 @@ def assemble(
         table.title,
         spaces.Box(-limit, limit, (size,), np.float32),
         spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
-        (*(str(entry) for entry in observation.ENTRIES), *(f"last action: {name}" for name in chosen.names)),
+        (*(str(entry) for entry in observation.ENTRIES), *names),
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import observation
+from birthsim_env import observation, reward
 from birthsim_env.assembly import FRAMES_PER_SECOND, Setup
 from birthsim_env.info import describe
 from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
@@ -55,20 +55,24 @@ class Episodes:
         if not self._seeds:
             raise RuntimeError("step() before reset(): call reset(seed=...) first")
         simulation = self.simulation
+        last_force = simulation.force.copy()
         simulation.step(actions)
         self.elapsed += 1
-        terms, failed = observation.assess(
-            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump,
-            actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
+        terms, failed = reward.assess(
+            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, last_force,
+            simulation.since_jump, actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed,
+            self._setup.policy_period,
         )  # fmt: skip
         self._action = actions
-        return terms.sum(axis=0), dict(zip(observation.REWARD_TERMS, terms, strict=True)), failed
+        return terms.sum(axis=0), dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
 
     def observation(self) -> NDArray[np.float32]:
         """Observations of all lanes now, (N, size)."""
         simulation = self.simulation
         seen = simulation.measurement
-        return observation.observe(seen, simulation.reference, self._action, simulation.nominal)
+        memory = simulation.actuation.memory()
+        beside = np.concatenate([self._action, memory]) if len(memory) else self._action
+        return observation.observe(seen, simulation.reference, beside, simulation.nominal)
 
     def describe(self) -> Array:
         """The fields of ``info`` of all lanes now."""

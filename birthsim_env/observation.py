@@ -1,12 +1,10 @@
-"""What a policy sees and what it is paid: one kernel computes both, one table names and scales every entry.
+"""What a policy sees: one kernel computes it, one table names and scales every entry.
 
-All entries of the observation come from measurements (noisy and late with ``lab`` sensors); the reward and ``info`` come from
-the true state.
+All entries come from measurements (noisy and late with ``lab`` sensors).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,26 +19,6 @@ from birthsim_env.signals import Measurement, Reference, compliance
 
 LIMIT = 10.0
 """Bound of every observation entry, in units of its scale."""
-
-ERROR_UNIT = 2e-3
-"""m. Tracking error that costs one unit of reward per 10 ms."""
-
-ERROR_CAP = 5.0
-"""Largest tracking cost of one 10 ms, in units: beyond 10 mm a policy is lost anyway."""
-
-ACTION_CHANGE_COST = 0.05
-FAILURE_COST = 250.0
-"""Cost of leaving the physical range: the capped error for the 50 steps that a discount of 0.98 looks ahead, so that dying
-early never pays."""
-
-GRACE = 0.3
-"""s after a jump during which the tracking error costs nothing."""
-
-PRESSURE_RANGE = (0.2e5, 20e5)
-"""Pa. A chamber outside it has left what the model describes."""
-
-TEMPERATURE_RANGE = (100.0, 1000.0)
-"""K, likewise."""
 
 
 @dataclass(frozen=True)
@@ -125,64 +103,12 @@ def _observe(
             rows[i, scales.shape[0] + k] = action[k, i]
 
 
-def observe(seen: Measurement, reference: Reference, action: Array, nominal: Array) -> NDArray[np.float32]:
-    """Observations (N, SIZE + length of the action): ``ENTRIES`` over their scales, clipped to +-LIMIT, then the last action.
+def observe(seen: Measurement, reference: Reference, beside: Array, nominal: Array) -> NDArray[np.float32]:
+    """Observations (N, SIZE + M): ``ENTRIES`` over their scales, clipped to +-LIMIT, then what stands beside them.
 
-    ``action`` (size, N); ``nominal`` (PARAMETERS,) is the rig as its owner describes it: a policy does not know what
-    randomisation drew.
+    ``beside`` (M, N): the last action, and what an actuation remembers; ``nominal`` (PARAMETERS,) is the rig as its owner
+    describes it: a policy does not know what randomisation drew.
     """
-    rows = np.empty((seen.position.shape[1], SIZE + action.shape[0]), dtype=np.float32)
-    _observe(seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, action, nominal, _SCALES, rows)
+    rows = np.empty((seen.position.shape[1], SIZE + beside.shape[0]), dtype=np.float32)
+    _observe(seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, beside, nominal, _SCALES, rows)
     return rows
-
-
-@kernel
-def _assess(
-    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array,
-    impacts: Array, impact_speed: float, steps: float, terms: Array, failed: NDArray[np.bool_],
-) -> None:  # fmt: skip
-    for i in range(state.shape[1]):
-        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
-        error_x = motion[0, i] - reference[0, i] - given[0]
-        error_y = motion[1, i] - reference[1, i] - given[1]
-        cost = min((abs(error_x) + abs(error_y)) / ERROR_UNIT, ERROR_CAP)
-        change = 0.0
-        for k in range(action.shape[0]):
-            change += abs(action[k, i] - last_action[k, i])
-        inside = True
-        for k in (at.PP1, at.PN1, at.PP2, at.PN2):
-            inside = inside and PRESSURE_RANGE[0] < state[k, i] < PRESSURE_RANGE[1]
-        for k in (at.TP1, at.TN1, at.TP2, at.TN2):
-            inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
-        inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
-        failed[i] = not inside or max(impacts[0, i], impacts[1, i]) > impact_speed
-        terms[0, i] = -cost * steps if since_jump[i] >= GRACE else 0.0
-        terms[1, i] = -ACTION_CHANGE_COST * change
-        terms[2, i] = -FAILURE_COST if failed[i] else 0.0
-
-
-REWARD_TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
-
-
-def assess(
-    state: Array, motion: Array, reference: Array, force: Array, since_jump: Array, action: Array, last_action: Array,
-    impacts: Array, impact_speed: float, policy_period: float,
-) -> tuple[Array, NDArray[np.bool_]]:  # fmt: skip
-    """Reward terms (3, N) in the order of ``REWARD_TERMS``, and which lanes (N,) have left the physical range."""
-    lanes = state.shape[1]
-    terms, failed = np.empty((3, lanes)), np.empty(lanes, dtype=np.bool_)
-    _assess(
-        state,
-        motion,
-        reference,
-        force,
-        since_jump,
-        action,
-        last_action,
-        impacts,
-        impact_speed,
-        policy_period / 0.01,
-        terms,
-        failed,
-    )
-    return terms, failed

@@ -33,8 +33,9 @@ class Simulation:
 
     After ``begin`` and after every ``step`` the attributes describe the present instant: ``time`` (N,) s since each lane's
     episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``reference`` and ``measurement``; ``since_jump``
-    (N,) s since force or stiffness setpoint jumped; ``impacts`` (2, N) m/s, the fastest collision of each piston with an
-    end stop during the last step.
+    (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded; ``impacts`` (2, N) m/s, the fastest
+    collision of each piston with an end stop during the last step. ``period`` is that of control, s, and ``periods`` how many
+    of them make a policy step.
     """
 
     def __init__(
@@ -63,6 +64,8 @@ class Simulation:
         self.motion: Array = np.zeros((4, num_envs))
         self.since_jump: Array = np.zeros(num_envs)
         self.impacts: Array = np.zeros((2, num_envs))
+        self.openings: Array = np.zeros((4, num_envs))
+        self.periods = periods
         self.reference = Reference(np.zeros((REFERENCES, num_envs)))
         self.measurement: Measurement
         stepwise = actuation.every_period or self.sensors.sampled or user_force.closed_loop
@@ -97,8 +100,10 @@ class Simulation:
         self.ticks[lanes] = 0
         self.since_jump[lanes] = 0.0
         self.impacts[:, lanes] = 0.0
+        # Not in place: an actuation may keep the array that it returned.
+        self.openings = np.where(lanes, 0.0, self.openings)
         self._check_reference(chosen, duration)
-        rows = self._sample_reference(np.zeros(len(lanes)))[:, chosen]
+        rows = self.reference_at(np.zeros(len(lanes))).rows[:, chosen]
         start, speed = rows[0:2], rows[2:4]
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
@@ -114,8 +119,8 @@ class Simulation:
         self.actuation.accept(actions)
         impacts = np.zeros_like(self.impacts)
         for _ in range(self._strides):
-            openings = self.actuation.openings(self.plant, self.measurement, self.reference)
-            self.plant.advance_unchecked(openings, self._forces, self._stride * self.period)
+            self.openings = self.actuation.openings(self.plant, self.measurement, self.reference)
+            self.plant.advance_unchecked(self.openings, self._forces, self._stride * self.period)
             np.maximum(impacts, self.plant.impacts, out=impacts)
             self.ticks += self._stride
             forces, setpoints = self._forces, self.reference.rows
@@ -136,14 +141,15 @@ class Simulation:
         force = self.user_force.force(times, motion[:2], motion[2:])
         # A copy: the hand may fill one array anew each time, and jumps are told from the old samples and the new.
         self._forces = checked("user_force.force(...)", force, self._forces.shape, "N").copy()
-        self.reference = Reference(self._sample_reference(self.time))
+        self.reference = self.reference_at(self.time)
         self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
 
-    def _sample_reference(self, time: Array) -> Array:
+    def reference_at(self, time: Array) -> Reference:
+        """What is asked for at ``time`` (N,) of the present episodes, s."""
         rows = np.empty((REFERENCES, time.shape[0]))
         rows[:8] = self.trajectory.sample(time)
         rows[8:] = self.stiffness.sample(time)
-        return rows
+        return Reference(rows)
 
     def _check_reference(self, chosen: NDArray[np.intp], duration: float) -> None:
         lanes = self.ticks.shape[0]

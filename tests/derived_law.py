@@ -24,6 +24,7 @@ WANTED = sp.symbols("yd1 yd2 vd1 vd2 ad1 ad2 jd1 jd2", real=True)
 GAINS = sp.symbols("c11 c12 c13 c21 c22 c23", positive=True)
 """c1, c2, c3 of cylinder 1, then of cylinder 2."""
 BELIEVED = sp.symbols("b1 b2", real=True)
+BELIEVED_RATE = sp.symbols("db1 db2", real=True)
 RIG = sp.symbols("m g d3 d6 gamma3 k1 k2 Fext1 Fext2 Fc1 Fc2 Fv1 Fv2 width compensate sliding", real=True)
 Y1, Y2, V1, V2, F1, F2 = STATE
 MASS, GRAVITY, D3, D6, GAMMA3, K1, K2, FEXT1, FEXT2, FC1, FC2, FV1, FV2, WIDTH, COMPENSATE, SLIDING = RIG
@@ -64,10 +65,11 @@ def model_13() -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
 
 @cache
 def errors_and_rates() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Numeric functions of all symbols: z1, z2, z3, g of both cylinders; and the wanted dF/dt of both."""
+    """Numeric functions of all symbols but ``BELIEVED_RATE``: z1, z2, z3, g of both cylinders; and of all symbols, with those
+    rates last: the wanted dF/dt of both."""
     f1, g1, f2, g2 = model_13()
     flow = {Y1: V1, Y2: V2, V1: f1 + g1 * F1, V2: f2 + g2 * F2}
-    flow |= dict(zip(WANTED[:6], WANTED[2:], strict=True))
+    flow |= dict(zip(WANTED[:6], WANTED[2:], strict=True)) | dict(zip(BELIEVED, BELIEVED_RATE, strict=True))
     errors, rates = [], []
     for i, (y, v, f, g, coulomb) in enumerate(((Y1, V1, f1, g1, FC1), (Y2, V2, f2, g2, FC2))):
         (yd, vd, ad, _), (c1, c2, c3) = WANTED[i::2], GAINS[3 * i : 3 * i + 3]
@@ -79,7 +81,7 @@ def errors_and_rates() -> tuple[Callable[..., Any], Callable[..., Any]]:
         frozen = (1 - SLIDING) * drag(v, coulomb, 0).diff(v) * flow[v]
         rates.append(along_model - frozen - z2 / g - c3 * z3)
     arguments = [*STATE, *WANTED, *GAINS, *BELIEVED, *RIG]
-    return sp.lambdify(arguments, errors, cse=True), sp.lambdify(arguments, rates, cse=True)
+    return sp.lambdify(arguments, errors, cse=True), sp.lambdify([*arguments, *BELIEVED_RATE], rates, cse=True)
 
 
 def rig_values(rig: Parameters, width: float, compensate: bool, frozen: bool = False) -> list[float]:

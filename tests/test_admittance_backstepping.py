@@ -9,11 +9,13 @@ import pytest
 
 from baselines import admittance_law
 from baselines.admittance_backstepping import LEAST_SHARE, AdmittanceBackstepping
+from birthsim_env.geometry import inverse_geometry
 from birthsim_env.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
-from birthsim_env.signals import REFERENCES, Measurement
+from birthsim_env.signals import REFERENCES, Measurement, Reference
 from tests import closed_loop, rigid_body
+from tests import linkage_by_points as by_points
 
 PERIOD = 1e-3
 ANOTHER = Parameters().replace(
@@ -48,6 +50,7 @@ class Law:
     def command(
         self, now: rigid_body.Instant, motion: Array, user: Array, unseen: Array,
         rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
+        told: Array | None = None,
     ) -> Array:  # fmt: skip
         lanes = motion.shape[1]
         target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
@@ -59,6 +62,7 @@ class Law:
             np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
             np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD, self.gain,
             self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE, 30.0,
+            np.zeros((4, lanes)) if told is None else told,
             remembered(lanes) if memory is None else memory, openings,
         )  # fmt: skip
         return openings
@@ -86,6 +90,25 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> 
     a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, unseen, user)
     wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
     wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
+    np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
+def test_where_what_is_told_is_true_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> None:
+    """Forces along the pistons that grow: the law knows both from what it is told, beside what is unseen."""
+    lanes, c, rng = 60, 60.0, np.random.default_rng(2)
+    now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
+    user, unseen = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
+    told = np.concatenate([rng.uniform(-4, 4, (2, lanes)), rng.uniform(-200, 200, (2, lanes))])
+    motion, measured = near(now, rig, user, seed=1)
+    openings = Law(rig, c).command(now, motion, user, unseen, told=told)
+    free = np.abs(openings).max(axis=0) < 1
+    assert free.sum() > 0.7 * lanes
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, unseen + told[:2], user)
+    growing = by_points.newton_force(rigid_body.pose_of(now.piston, rig), now.piston[1] + rig.geometry.k2, *told[2:])
+    wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
+    wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
+    jerk += growing / rig.mechanics.mass
     np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
 
 
@@ -260,3 +283,71 @@ def test_the_gain_share_is_that_of_the_direction() -> None:
     assert np.array_equal(law.gain_share, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
     law.reset(np.array([True, False, False, False]))
     assert np.array_equal(law.gain_share[:, :2], [[1, 1], [1, LEAST_SHARE]])
+
+
+def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, Array]:
+    """How far the pistons move from a resting target at (0.5, 0), (2, N), m, and where they started, without dry friction:
+    the law is told of the forces ``told`` (2, N), N, along them, and not that a hand pushes with ``unmeasured`` (2, N), N."""
+    rig, lanes = closed_loop.FRICTIONLESS, told.shape[1]
+    wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
+    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceBackstepping(rig)
+    start = plant.piston.copy()
+
+    def blind(plant: Plant, time: float, force: Array) -> Measurement:
+        return closed_loop.ideal(plant, time, np.zeros_like(force))
+
+    def ramp(time: float) -> float:
+        return min(time / 0.5, 1.0)
+
+    def command(measured: Measurement, wanted: Reference) -> Array:
+        share, rate = ramp(float(measured.time[0])), 2.0 if measured.time[0] < 0.5 else 0.0
+        return law.command(measured, wanted, share * told, rate * told)
+
+    for _ in closed_loop.run(plant, command, lambda t: wanted, lambda t: ramp(t) * unmeasured, seconds, blind):
+        pass
+    return plant.piston - start, start
+
+
+def test_a_belief_holds_the_pistons_against_it_whatever_the_observer_finds() -> None:
+    """At rest dF/dt = 0 leaves y = -(b/m_e) (3 c - Fv/m_e)/(c^3 + 2 c): whoever believes in a push outwards, stays inside.
+
+    A force that is really there and unknown is observed anyway, and what is told comes on top: lanes 5 to 7 are told the truth.
+    """
+    rig, c = closed_loop.FRICTIONLESS, AdmittanceBackstepping.TUNED["ideal"]["gain"]
+    told = np.array([[12.0, -12.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 12.0, -12.0, 0.0, 0.0, 0.0, 0.0]])
+    push = np.zeros((2, 8))
+    push[:, 4:] = [[10.0, 10.0, 0.0, -8.0], [0.0, 0.0, 10.0, 5.0]]
+    place = np.repeat([[0.5], [0.0]], 8, axis=1)
+    piston = inverse_geometry(place, rig)
+    told[:, 5:] = (rigid_body.jacobians(piston, rig).transpose(0, 2, 1) @ push.T[..., None])[..., 0].T[:, 5:]
+    moved, start = held(told, push)
+    masses = rig.mechanics.mass * (rigid_body.jacobians(start, rig) ** 2).sum(axis=1).T
+    viscous = np.array([[rig.cylinder1.viscous_friction], [rig.cylinder2.viscous_friction]])
+    expected = -told / masses * (3 * c - viscous / masses) / (c**3 + 2 * c)
+    np.testing.assert_allclose(moved, expected, rtol=0.01, atol=2e-6)
+    assert np.abs(expected).max() > 1e-3
+
+
+def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
+    lanes = 3
+    wanted = closed_loop.holding(np.array([[0.5, 0.45, 0.55], [0.0, 0.05, -0.1]]), 2000.0)
+    plant = closed_loop.resting_at(wanted, Parameters())
+    plain, zero, several, single = (AdmittanceBackstepping() for _ in range(4))
+    rng = np.random.default_rng(0)
+    for tick in range(50):
+        push = rng.uniform(-5, 5, (2, lanes))
+        seen = closed_loop.ideal(plant, tick * PERIOD, push)
+        openings = plain.command(seen, wanted)
+        assert np.array_equal(zero.command(seen, wanted, np.zeros((2, lanes)), np.zeros((2, lanes))), openings)
+        one = Measurement(*(getattr(seen, field.name)[..., 1] for field in dataclasses.fields(seen)[:-1]), sampled=False)
+        force, rate = rng.uniform(-9, 9, (2, 2, lanes))
+        together = several.command(seen, wanted, force, rate)
+        assert not np.array_equal(together, openings)
+        alone = single.command(one, Reference(wanted.rows[:, 1]), force[:, 1], rate[:, 1])
+        assert np.array_equal(alone, together[:, 1])
+        plant.advance(openings, push, PERIOD)
+    for wrong in (np.zeros((2, 2)), np.zeros(3), np.zeros((1, 3))):
+        with pytest.raises(ValueError, match=r"believed_force has shape .*; allowed: \(2, 3\)"):
+            plain.command(seen, wanted, wrong)
+        with pytest.raises(ValueError, match=r"believed_rate has shape .*; allowed: \(2, 3\)"):
+            plain.command(seen, wanted, None, wrong)

@@ -12,6 +12,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from baselines import BacksteppingController
+from baselines.gains import closed_loop_damping, closed_loop_stiffness
 from birthsim_env import mechanics
 from birthsim_env.geometry import joint_force
 from birthsim_env.lanes import Array
@@ -19,6 +20,7 @@ from birthsim_env.parameters import Parameters
 from birthsim_env.signals import Measurement, Reference
 from tests import closed_loop
 from tests import derived_law as derived
+from tests import linkage_by_points as by_points
 
 
 def random_situations(
@@ -47,6 +49,7 @@ def random_situations(
         for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
     ]
     s["pressures"] = np.concatenate(pressures)
+    s["believed_rate"] = rng.normal(0, 100, (2, lanes))
     possible = np.all((s["pressures"] > 1.1e5) & (s["pressures"] < 6.9e5), axis=0)
     return {name: value[:, possible] for name, value in s.items()}
 
@@ -120,11 +123,13 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     compensate, frozen = options.get("weight_compensation", False), options.get("frozen_friction", False)
     s = random_situations(rig, width, compensate, 800, np.random.default_rng(7), options.get("damping_ratio"))
     controller = BacksteppingController(rig, pneumatic_gain=gain, sign_width=width, **options)
-    got = controller.command(*as_signals(s, rig), s["believed"])
+    got = controller.command(*as_signals(s, rig), s["believed"], s["believed_rate"])
     _, wanted_rates = derived.errors_and_rates()
     values = derived.rig_values(rig, width, compensate, frozen)
     force_rate = np.array(
-        wanted_rates(*s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values)
+        wanted_rates(
+            *s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values, *s["believed_rate"]
+        )
     )
     stiffness_rate = s["pneumatic_rate"] - gain * (s["pneumatic"] - s["pneumatic_wanted"])
     expected = np.empty_like(got)
@@ -137,10 +142,99 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     assert unsaturated.sum() >= 60
     assert (~unsaturated).any(), "saturated valves must have been met too"
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-8)
-    terms = controller.inspect(*as_signals(s, rig), s["believed"])
+    terms = controller.inspect(*as_signals(s, rig), s["believed"], s["believed_rate"])
     np.testing.assert_allclose(terms.gains.swapaxes(0, 1).reshape(6, -1), s["gains"], rtol=1e-8)
     np.testing.assert_allclose(terms.force_rate, force_rate, rtol=1e-7, atol=1e-4)
     np.testing.assert_allclose(terms.wanted, s["wanted"], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("compensate", [False, True], ids=["paper", "compensated"])
+def test_the_force_rate_is_the_slope_of_the_wanted_force_along_a_changing_belief(compensate: bool) -> None:
+    """dF/dt = dF*/dt - z2/g - c3 z3 with dF*/dt from F* a little later and sooner: pistons go as the model believes, with b.
+
+    Without viscous friction and with one stiffness on both axes the gains do not follow the pose.
+    """
+    still = {"cylinder1.viscous_friction": 0.0, "cylinder2.viscous_friction": 0.0}
+    rig, step = Parameters().replace(still), 1e-6
+    s = random_situations(rig, 0.01, compensate, 300, np.random.default_rng(11))
+    s["stiffness"] = np.repeat(s["stiffness"][:1], 2, axis=0)
+    law = BacksteppingController(rig, compensate, sign_width=0.01)
+    # What is believed acts like the air: (13) with F + b.
+    moved = derived.accelerations(rig, 0.01, compensate)(*s["piston"], *s["speed"], *(s["force"] + s["believed"]))
+
+    def at(time: float, told: tuple[Array, ...]) -> Any:
+        then = {**s, "piston": s["piston"] + time * s["speed"] + time**2 / 2 * np.array(moved)}
+        then["speed"] = s["speed"] + time * np.array(moved)
+        then["wanted"] = sum(
+            time**k / math.factorial(k) * np.concatenate([s["wanted"][2 * k :], np.zeros((2 * k, s["wanted"].shape[1]))])
+            for k in range(4)
+        )
+        return law.inspect(*as_signals(then, rig), *told)
+
+    rate = 30 * s["believed_rate"]
+    later, sooner = (at(time, (s["believed"] + time * rate,)).wanted_force for time in (step, -step))
+    now = at(0.0, (s["believed"], rate))
+    gains = now.gains.swapaxes(0, 1).reshape(6, -1)
+    errors = derived.errors_and_rates()[0](
+        *s["piston"], *s["speed"], *s["force"], *s["wanted"], *gains, *s["believed"], *derived.rig_values(rig, 0.01, compensate)
+    )
+    for i, (_, z2, z3, g) in enumerate(errors):
+        slope = now.force_rate[i] + z2 / g + gains[3 * i + 2] * z3
+        np.testing.assert_allclose(slope, (later - sooner)[i] / (2 * step), rtol=1e-5, atol=0.02)
+    # Untold of the rate the law's force lags by it: 3000 N/s are no trifle.
+    np.testing.assert_allclose(at(0.0, (s["believed"],)).force_rate - now.force_rate, rate, rtol=1e-9, atol=1e-6)
+    assert np.abs(rate).max() > 3000
+
+
+@pytest.mark.parametrize("rig", [Parameters(), TILTED], ids=["default", "tilted"])
+@pytest.mark.parametrize("factor", [1.02, 1.2, 1.5, 2.0])
+def test_a_damping_factor_multiplies_the_damping_of_equal_gains_and_leaves_the_stiffness(
+    rig: Parameters, factor: float
+) -> None:
+    lanes, rng = 200, np.random.default_rng(4)
+    s = random_situations(rig, 0.01, False, lanes, rng)
+    s["stiffness"] = rng.uniform(500, 6000, s["stiffness"].shape)
+    law, signals = BacksteppingController(rig), as_signals(s, rig)
+    equal, damped = law.inspect(*signals).gains, law.inspect(*signals, None, None, np.full(s["piston"].shape[1], factor)).gains
+    r4, r2 = s["piston"][0] + rig.geometry.k1, s["piston"][1] + rig.geometry.k2
+    pose = by_points.pose_from_lengths(r4, r2, rig.geometry)
+    assert damped.min() > 0
+    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        column, _ = by_points.cartesian_velocity(pose, r2, 1.0 - i, float(i))
+        masses, asked = rig.mechanics.mass * (column**2).sum(axis=0), (s["stiffness"] * column**2).sum(axis=0)
+        for lane, mass in enumerate(masses):
+            rendered = mass, cylinder.viscous_friction
+            for gains in (equal, damped):
+                assert closed_loop_stiffness(*gains[:, i, lane], *rendered) == pytest.approx(asked[lane], rel=1e-8)
+            least = closed_loop_damping(*equal[:, i, lane], *rendered)
+            assert closed_loop_damping(*damped[:, i, lane], *rendered) == pytest.approx(factor * least, rel=1e-8)
+            np.testing.assert_allclose(
+                damped[:, i, lane], derived.damped_gains(asked[lane], factor * least, *rendered), rtol=1e-6
+            )
+
+
+def test_a_damping_factor_up_to_its_least_is_bit_for_bit_the_law() -> None:
+    measured, reference, (believed, rate, _) = many(60)
+    for options in OPTIONS.values():
+        law, factor = BacksteppingController(**options), np.tile([0.0, 0.5, 1.0, 1.01], 15)
+        plain, told = law.command(measured, reference, believed, rate), law.command(measured, reference, believed, rate, factor)
+        assert np.array_equal(told, plain)
+        raised = law.command(measured, reference, believed, rate, np.full(60, 1.5))
+        # A law with a damping ratio has its damping already.
+        assert np.array_equal(raised, plain) == ("damping_ratio" in options)
+        assert np.array_equal(
+            law.inspect(measured, reference, None, None, factor).gains, law.inspect(measured, reference).gains
+        )
+
+
+def test_nothing_told_is_zero_told() -> None:
+    measured, reference, _ = many(40)
+    nothing = np.zeros((2, 40))
+    for options in OPTIONS.values():
+        law = BacksteppingController(**options)
+        assert np.array_equal(
+            law.command(measured, reference, nothing, nothing, np.zeros(40)), law.command(measured, reference)
+        )
 
 
 def moving_target(time: float, rig: Parameters) -> tuple[Array, Reference]:
@@ -225,12 +319,13 @@ def test_errors_decay_as_lyapunovs_function_says(compensate: bool) -> None:
     np.testing.assert_array_less(worst, 1e-7)
 
 
-def many(lanes: int) -> tuple[Measurement, Reference, Array]:
-    """More situations than one block of lanes holds."""
+def many(lanes: int) -> tuple[Measurement, Reference, tuple[Array, Array, Array]]:
+    """More situations than one block of lanes holds, and what the law is told in them: forces, their rates, damping factors."""
     situation = random_situations(Parameters(), 0.01, True, 200, np.random.default_rng(3))
     measured, reference = as_signals(situation, Parameters())
     assert measured.time.size >= lanes
-    return *of_lanes(measured, reference, slice(lanes)), situation["believed"][:, :lanes]
+    told = situation["believed"][:, :lanes], situation["believed_rate"][:, :lanes], np.linspace(0.5, 2.0, lanes)
+    return *of_lanes(measured, reference, slice(lanes)), told
 
 
 def of_lanes(measured: Measurement, reference: Reference, lanes: Any) -> tuple[Measurement, Reference]:
@@ -249,26 +344,26 @@ def of_lanes(measured: Measurement, reference: Reference, lanes: Any) -> tuple[M
 
 
 def test_one_rig_is_one_lane() -> None:
-    measured, reference, believed = many(77)
+    measured, reference, told = many(77)
     law = BacksteppingController(weight_compensation=True)
-    together, without = law.command(measured, reference, believed), law.command(measured, reference)
+    together, without = law.command(measured, reference, *told), law.command(measured, reference)
     assert not np.array_equal(together, without)
     for lane in (0, 31, 32, 76):
-        alone = law.command(*of_lanes(measured, reference, lane), believed[:, lane])
+        alone = law.command(*of_lanes(measured, reference, lane), *(one[..., lane] for one in told))
         assert alone.shape == (4,)
         assert np.array_equal(alone, together[:, lane])
         assert np.array_equal(law.command(*of_lanes(measured, reference, lane)), without[:, lane])
 
 
 def test_lanes_do_not_know_of_each_other() -> None:
-    measured, reference, believed = many(77)
+    measured, reference, told = many(77)
     law = BacksteppingController()
-    together = law.command(measured, reference, believed)
+    together = law.command(measured, reference, *told)
     order = np.random.default_rng(0).permutation(77)
-    shuffled = law.command(*of_lanes(measured, reference, order), np.ascontiguousarray(believed[:, order]))
+    shuffled = law.command(*of_lanes(measured, reference, order), *(one[..., order] for one in told))
     assert np.array_equal(shuffled, together[:, order])
     measured.pressures[:, 40] = 3e5
-    changed = law.command(measured, reference, believed)
+    changed = law.command(measured, reference, *told)
     assert np.array_equal(np.delete(changed, 40, axis=1), np.delete(together, 40, axis=1))
     assert not np.array_equal(changed[:, 40], together[:, 40])
 
@@ -325,7 +420,7 @@ def test_a_rig_that_cannot_be_is_refused() -> None:
 
 def test_signals_over_different_lanes_are_refused() -> None:
     """A compiled loop would read past the shorter array without a word."""
-    measured, reference, believed = many(3)
+    measured, reference, (believed, rate, factor) = many(3)
     law, narrow = BacksteppingController(), slice(1)
     fewer, fewer_wanted = of_lanes(measured, reference, narrow)
     mixed = dataclasses.replace(measured, pressures=fewer.pressures), dataclasses.replace(measured, velocity=fewer.velocity)
@@ -340,4 +435,10 @@ def test_signals_over_different_lanes_are_refused() -> None:
     for wrong in (believed[:, :1], believed[:1], believed[:, 0]):
         with pytest.raises(ValueError, match=r"believed_force has shape .*; allowed: \(2, 3\)"):
             law.command(measured, reference, wrong)
-    assert law.command(measured, reference, believed.tolist()).shape == (4, 3)
+        with pytest.raises(ValueError, match=r"believed_rate has shape .*; allowed: \(2, 3\)"):
+            law.inspect(measured, reference, believed, wrong)
+    for wrong in (factor[:1], factor[None], factor[0]):
+        with pytest.raises(ValueError, match=r"damping_factor has shape .*; allowed: \(3,\)"):
+            law.command(measured, reference, believed, rate, wrong)
+    openings = law.command(measured, reference, believed, rate, factor)
+    assert np.array_equal(law.command(measured, reference, believed.tolist(), rate.tolist(), factor.tolist()), openings)

@@ -62,12 +62,32 @@ def assert_picture(folder, name):
     assert "<svg" in (folder / f"{name}.svg").read_text()[:1000]
 
 
+SMALL = """[training]
+environment = "BirthSIM/ProbeResidual-v0"
+lanes = 32
+rollout = 32
+batch = 256
+epochs = 4
+learning_rate = 2e-3
+hidden = [32, 32]
+validation_lanes = 4
+validations = 2
+"""
+
+
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """A policy folder of birthsim-train, and the process that made it."""
+def small(tmp_path_factory):
+    """A configuration whose trainings take seconds."""
+    path = tmp_path_factory.mktemp("configurations") / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory, small):
+    """A folder of birthsim-train, and the process that made it."""
     folder = tmp_path_factory.mktemp("policies") / "deeper" / "policy"
-    done = run("train", "--env", RESIDUAL, "--steps", "60000", "--seed", "3", "--authority", "60", "--out", folder)
-    return folder, done
+    return folder, run("train", "--config", small, "--steps", 30_000, "--seed", 3, "--authority", 60, "--out", folder)
 
 
 def test_the_scripts_of_the_package_are_these_commands():
@@ -88,7 +108,13 @@ def test_the_scripts_of_the_package_are_these_commands():
             ),
         ),
         ("figure4", ("controller", "sensors", "parameters", "out")),
-        ("train", ("env", "steps", "seed", "sensors", "randomize", "authority", "parameters", "out")),
+        (
+            "train",
+            (
+                *("config", "env", "algorithm", "law", "impedance", "steps", "seed", "seeds", "jobs", "sensors", "randomize"),
+                *("authority", "parameters", "resume", "out"),
+            ),
+        ),
     ],
 )
 def test_help_names_every_option_and_touches_nothing(command, options):
@@ -288,25 +314,79 @@ def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path
 def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_path, monkeypatch, capsys):
     folder, done = trained
     assert done.returncode == 0, done.stderr
-    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS, "training.json"]
-    reached, policy = strict(folder / "training.json"), load_policy(folder)
+    assert [path.name for path in folder.iterdir()] == ["seed_3"]
+    own = folder / "seed_3"
+    assert {path.name for path in own.iterdir()} == {CONFIGURATION, WEIGHTS, "training.json", "checkpoint.pt", "tensorboard"}
+    reached, policy = strict(own / "training.json"), load_policy(own)
+    assert strict(own / CONFIGURATION)["training"]["reached"] == reached["policy"]
     assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 3)
+    assert (reached["settings"]["steps"], reached["settings"]["authority"], reached["settings"]["lanes"]) == (30_000, 60.0, 32)
     assert reached["policy"]["pooled_mm"] < reached["law"]["pooled_mm"]
-    assert f"law         {reached['law']['pooled_mm']:7.2f} mm" in done.stdout
-    assert f"residual    {reached['policy']['pooled_mm']:7.2f} mm" in done.stdout
-    assert "below the law" in done.stdout
-    assert "training:" in done.stderr  # the progress bar
+    assert f"backstepping{reached['law']['pooled_mm']:7.2f} mm{reached['law']['tail_mm']:7.2f} mm" in done.stdout
+    assert f"seed 3      {reached['policy']['pooled_mm']:7.2f} mm" in done.stdout
+    assert "% below" in done.stdout
+    assert f"written to {folder}/" in done.stdout
+    assert "seed 3: " in done.stderr  # the progress bar
+    assert "% better" in done.stderr
+    assert "Warning" not in done.stderr
     medians = []
-    for name, arguments in (("named", ("--controller", "residual")), ("unnamed", ())):
-        options = ("--env", "BirthSIM/Probe-v0", "--policy", folder, "--episodes", 2, "--seed", 900, "--out", tmp_path / name)
+    for name, arguments, place in (("named", ("--controller", "residual"), folder), ("unnamed", (), own)):
+        options = ("--env", "BirthSIM/Probe-v0", "--policy", place, "--episodes", 2, "--seed", 900, "--out", tmp_path / name)
         status, printed, _ = call("evaluate", monkeypatch, capsys, *arguments, *options)
         assert status == 0
         assert "residual: median" in printed
         results = strict(tmp_path / name / "evaluation.json")["results"]
         assert [result["controller"] for result in results] == ["backstepping", "residual"]
         medians.append([result["episodes"]["settled_rms"] for result in results])
+        assert results[0]["demand"] == results[1]["demand"]
     assert medians[0] == medians[1]
     assert not np.array_equal(*medians[0])
+
+
+def test_train_refuses_a_folder_with_a_training_and_resumes_it_where_asked(trained, small, monkeypatch, capsys):
+    folder, _ = trained
+    options = ("--config", small, "--steps", 30_000, "--seed", 3, "--authority", 60, "--out", folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
+    status, printed, complained = call("train", monkeypatch, capsys, *options)
+    assert (status, printed) == (2, "")
+    assert complained.endswith("/seed_3' holds a training; allowed: --resume to go on, or another --out\n")
+    status, printed, _ = call("train", monkeypatch, capsys, *options, "--resume")
+    assert status == 0, "a training that is over is reported once more"
+    assert "seed 3" in printed
+    status, _, complained = call("train", monkeypatch, capsys, *options, "--resume", "--law", "backstepping-weight")
+    assert status == 2
+    assert "is of a training with other law; allowed: the same settings, or a folder of its own" in complained
+    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
+    assert after == before
+
+
+def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(tmp_path, small, monkeypatch, capsys):
+    options = ("--config", small, "--steps", 1024, "--randomize", "plant", "--sensors", "lab", "--impedance", "variable_kp")
+    done = run("train", *options, "--seed", 5, "--seeds", 2, "--jobs", 2, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "leaked" not in done.stderr
+    reached = [strict(tmp_path / "out" / f"seed_{seed}" / "training.json") for seed in (5, 6)]
+    for seed, one in zip((5, 6), reached, strict=True):
+        settings = one["settings"]
+        assert (settings["seed"], settings["randomize"], settings["sensors"]) == (seed, "plant", "lab")
+        assert (settings["impedance"], settings["law"], settings["algorithm"]) == ("variable_kp", "backstepping", "ppo")
+        assert f"seed {seed}      {one['policy']['pooled_mm']:7.2f} mm" in done.stdout
+        assert f"seed {seed}: 100%" in done.stderr
+    assert reached[0]["law"] == reached[1]["law"]
+    assert reached[0]["curve"][-1]["pooled_mm"] != reached[1]["curve"][-1]["pooled_mm"]
+    # A seed trained alone, in this very process, becomes the same policy.
+    status, _, complained = call("train", monkeypatch, capsys, *options, "--seed", 6, "--out", tmp_path / "alone")
+    assert status == 0, complained
+    for name in (WEIGHTS, CONFIGURATION):
+        alone, together = ((tmp_path / place / "seed_6" / name).read_bytes() for place in ("alone", "out"))
+        assert alone == together
+    evaluate = ("--env", "BirthSIM/Probe-v0", "--policy", tmp_path / "out", "--episodes", 1, "--out", tmp_path / "evaluated")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *evaluate)
+    assert status == 0, complained
+    assert "2 training seeds" in printed
+    results = strict(tmp_path / "evaluated" / "evaluation.json")["results"]
+    assert [result["controller"] for result in results] == ["backstepping", "residual seed_5", "residual seed_6"]
+    assert_picture(tmp_path / "evaluated", "learning_curves")
 
 
 def test_figure4_writes_its_figures_the_picture_and_the_numbers(tmp_path):
@@ -332,7 +412,7 @@ def damaged(trained, tmp_path):
     folder = tmp_path / "damaged"
     folder.mkdir()
     for name in (CONFIGURATION, WEIGHTS):
-        (folder / name).write_bytes((trained[0] / name).read_bytes())
+        (folder / name).write_bytes((trained[0] / "seed_3" / name).read_bytes())
     content = bytearray((folder / WEIGHTS).read_bytes())
     content[-1] ^= 1
     (folder / WEIGHTS).write_bytes(content)
@@ -352,10 +432,10 @@ BAD = [
     (
         "evaluate",
         ("--controller", "residual"),
-        "--controller residual needs --policy DIR, the folder that birthsim-train wrote",
+        "--controller residual needs --policy, a folder that birthsim-train wrote",
     ),
-    ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' has no policy.json; allowed: a folder that"),
-    ("evaluate", ("--policy", "{tmp}/none"), "none' has no policy.json; allowed: a folder that birthsim-train wrote"),
+    ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that"),
+    ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim-train wrote"),
     ("evaluate", ("--controller", "residual", "--policy", "{damaged}"), "policy.safetensors is not the file that policy.json"),
     ("evaluate", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
     ("evaluate", ("--episodes", "-3"), "--episodes: '-3'; allowed: a whole number >= 1"),
@@ -390,11 +470,21 @@ BAD = [
     ("train", ("--steps", "1e6"), "--steps: '1e6'; allowed: a whole number >= 1"),
     ("train", ("--seed", "-1"), "--seed: '-1'; allowed: a whole number from 0 to 4294967295"),
     ("train", ("--seed", "4294967296"), "--seed: '4294967296'; allowed: a whole number from 0 to 4294967295"),
+    ("train", ("--config", "square"), "configuration 'square' is no file; allowed: circle, "),
+    ("train", ("--config", "{tmp}/own.py"), "own.py' is no TOML: "),
+    ("train", ("--config", "{tmp}/rig.toml"), "rig.toml': table 'mechanics'; allowed: training, residual"),
+    ("train", ("--algorithm", "dqn"), "--algorithm: invalid choice: 'dqn' (choose from"),
+    ("train", ("--law", "pid"), "--law: invalid choice: 'pid' (choose from"),
+    ("train", ("--impedance", "soft"), "--impedance: invalid choice: 'soft' (choose from"),
+    ("train", ("--law", "none", "--impedance", "variable"), "impedance = 'variable'; allowed: 'fixed', law = 'none' has no"),
+    ("train", ("--seeds", "0"), "--seeds: '0'; allowed: a whole number >= 1"),
+    ("train", ("--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
+    ("train", ("--smoothing", "0.3"), "unrecognized arguments: --smoothing 0.3"),
     ("train", ("--authority", "0"), "authority = 0.0; allowed: more than 0, at most 500"),
     ("train", ("--authority", "nan"), "authority = nan; allowed: more than 0, at most 500"),
     ("train", ("--randomize", "some"), "--randomize: invalid choice: 'some' (choose from"),
     ("train", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 (kg)"),
-    ("train", ("--out", "{tmp}/own.py"), "own.py'"),
+    ("train", ("--out", "{tmp}/own.py"), "own.py/seed_0'"),
 ]
 
 
@@ -467,14 +557,23 @@ def interrupted(command, arguments, seen):
     return process.returncode, printed.decode()
 
 
-def test_ctrl_c_during_training_keeps_the_best_policy(tmp_path):
-    arguments = ("--env", RESIDUAL, "--steps", 10**8, "--out", tmp_path)
-    status, printed = interrupted("train", arguments, lambda said: "steps/s" in said and "16.4k" in said)
-    assert status == 0
+def test_ctrl_c_during_training_keeps_the_best_policy_and_the_checkpoint(tmp_path, small):
+    arguments = ("--config", small, "--steps", 10**8, "--out", tmp_path)
+    status, printed = interrupted("train", arguments, lambda said: "steps/s" in said and "4.10k" in said)
+    assert status == 130
     assert "interrupted after" in printed
-    assert "below the law" in printed
-    assert load_policy(tmp_path).environment == RESIDUAL
-    assert strict(tmp_path / "training.json")["curve"][0]["steps"] == 0
+    assert f"policy and checkpoint are kept in {tmp_path}/seed_0/" in printed
+    assert load_policy(tmp_path / "seed_0").environment == RESIDUAL
+    assert (tmp_path / "seed_0" / "checkpoint.pt").is_file()
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_all_jobs_in_silence(tmp_path, small):
+    arguments = ("--config", small, "--steps", 10**8, "--seeds", 2, "--jobs", 2, "--out", tmp_path)
+    status, _ = interrupted("train", arguments, lambda said: said.count("4.10k") > 1)
+    assert status == 130
+    for seed in (0, 1):
+        load_policy(tmp_path / f"seed_{seed}")
 
 
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):

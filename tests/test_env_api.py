@@ -22,7 +22,7 @@ IDS = tuple(f"BirthSIM/{name}-v0" for name in SECONDS)
 CIRCLE, PROBE = IDS[0], IDS[1]
 FACES = tuple(itertools.product(("valve", "flow"), ("two_valves", "one_valve"), ("ideal", "lab")))
 EXAMPLES = [(i, face) for k, i in enumerate(IDS) for face in (FACES if k == 0 else (FACES[0], FACES[k], FACES[7]))]
-TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
 
 
 def make(name=CIRCLE, **arguments) -> BirthSIMEnv:

@@ -288,6 +288,9 @@ def test_the_dictionary_is_json_and_says_everything():
     assert read["units"] == UNITS
     assert read["lost"] == [False, True, False]
     assert read["lost_episodes"] == 1
+    # A world asks for what it asks, whatever controls it.
+    assert read["demand"] == run(Slam(lanes=())).demand
+    assert len(set(read["demand"])) == 3
     assert read["cost_us_per_lane_and_call"] > 0
     assert set(read["episodes"]) == set(read["summary"]) == set(UNITS)
     for name in UNITS:
@@ -300,7 +303,7 @@ def test_the_dictionary_is_json_and_says_everything():
 
 def example(name, values, lost, cost) -> Evaluation:
     metrics = {metric: [math.nan] * len(lost) for metric in UNITS}
-    return Evaluation(name, list(range(len(lost))), {**metrics, **values}, lost, cost)
+    return Evaluation(name, list(range(len(lost))), {**metrics, **values}, lost, cost=cost)
 
 
 def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_controller():

@@ -9,11 +9,15 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
 import agents
+from agents.experience import Experience
+from agents.guard import Guard
 from agents.residual_env import ResidualEnv, ResidualVectorEnv
-from agents.residual_law import ResidualSettings
+from agents.settings import LAWS, ResidualSettings
 from baselines.backstepping import BacksteppingController
+from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
+from birthsim_env.observation import ENTRIES, SIZE
 from birthsim_env.scenarios import SCENARIOS
 
 assert agents  # importing it registers the ids
@@ -34,23 +38,23 @@ def lanes(count=3, name=CIRCLE, **arguments) -> ResidualVectorEnv:
     return env
 
 
-def random_actions(steps, count, seed=0):
-    return np.random.default_rng(seed).uniform(-1, 1, (steps, count, 2)).astype(np.float32)
+def random_actions(steps, count, size=2, seed=0):
+    return np.random.default_rng(seed).uniform(-1, 1, (steps, count, size)).astype(np.float32)
 
 
-def by_hand(name, steps, seed, believed=lambda step: (0.0, 0.0), weight=False, periods=10, **arguments):
+def by_hand(name, steps, seed, told=None, law="backstepping", periods=10, **arguments):
     """The base environment at 1 kHz, driven by the law from measurements; its state and info after every policy step.
 
-    ``believed(step)`` is the force (2,), N, that the law is told about during policy step ``step``.
+    ``told(tick)`` is what the law is told about in control period ``tick``: a force (2,), N, and its rate (2,), N/s.
     """
     env = gymnasium.make(name.replace("Residual", ""), policy_period=1e-3, **arguments).unwrapped
-    law = BacksteppingController(arguments.get("parameters"), weight_compensation=weight)
+    controller = make_controller(law, arguments.get("parameters") or RIG)
     env.reset(seed=seed)
     rows = []
     for step in range(steps):
-        told = np.asarray(believed(step), dtype=np.float64)
-        for _ in range(periods):
-            _, _, terminated, truncated, info = env.step(law.command(env.measurement, env.reference, told))
+        for tick in range(periods * step, periods * (step + 1)):
+            believed = () if told is None else told(tick)
+            _, _, terminated, truncated, info = env.step(controller.command(env.measurement, env.reference, *believed))
         rows.append((env.simulation.plant.state.copy(), info, terminated, truncated))
     return rows
 
@@ -66,15 +70,15 @@ def assert_follows(env, actions, rows, seed):
             np.testing.assert_array_equal(info[field], expected[field], err_msg=field)
 
 
-@pytest.mark.parametrize("weight", [False, True])
+@pytest.mark.parametrize("law", LAWS[:-1])
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_zero_actions_are_bit_for_bit_the_law(sensors, weight):
+def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
-    rows = by_hand(CIRCLE, 300, 3, weight=weight, **arguments)
-    env = single(weight_compensation=weight, **arguments)
-    assert_follows(env, np.zeros((300, 2), np.float32), rows, seed=3)
-    # It was no standstill: the pushes have begun.
-    assert np.abs(rows[-1][0] - rows[0][0]).max() > 0.01
+    rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
+    env = single(law=law, **arguments)
+    assert_follows(env, np.zeros((140, 2), np.float32), rows, seed=3)
+    # It was no standstill: the first push has come.
+    assert np.abs(rows[-1][1]["user_force"]).max() > 5
 
 
 @pytest.mark.parametrize("name", IDS[1:])
@@ -97,60 +101,102 @@ def test_zero_actions_on_a_rig_of_ones_own_are_the_law_told_of_that_rig():
     assert np.abs(env.simulation.plant.state - rows[-1][0]).max() > 1e-4
 
 
+@pytest.fixture
+def unguarded(monkeypatch):
+    """Nothing that oscillates costs authority."""
+    monkeypatch.setattr(Guard, "share", property(lambda self: np.ones((2, self._memory.shape[1]))))
+
+
 @pytest.mark.parametrize(
-    ("authority", "smoothing", "period"), [(40.0, 0.3, 0.01), (15.0, 1.0, 0.01), (80.0, 0.1, 0.02), (25.0, 0.3, 0.001)]
+    ("law", "authority", "constant", "period"),
+    [
+        ("backstepping", 40.0, 0.028, 0.01),
+        ("backstepping-weight", 15.0, 0.001, 0.01),
+        ("backstepping-frozen", 80.0, 0.1, 0.02),
+        ("admittance-backstepping", 25.0, 0.028, 0.001),
+    ],
 )
-def test_a_held_action_becomes_a_believed_force_through_the_low_pass(authority, smoothing, period):
+def test_a_held_action_becomes_a_believed_force_and_its_rate_through_the_low_pass(law, authority, constant, period, unguarded):
+    """z' = (a - z)/T at 1 kHz: after n periods z = a (1 - exp(-n ms/T)), and the force changes at authority (a - z)/T."""
     steps, periods, action = 40, round(1000 * period), np.array([0.75, -0.5], np.float32)
+    whole = authority * action.astype(np.float64)
 
-    def believed(step):
-        return authority * action.astype(np.float64) * (1 - (1 - smoothing) ** (step + 1))
+    def told(tick):
+        left = np.exp(-1e-3 * tick / constant)
+        return whole * (1 - left), whole * left / constant
 
-    rows = by_hand(CIRCLE, steps, 1, believed, periods=periods)
-    env = single(authority=authority, smoothing=smoothing, policy_period=period)
+    rows = by_hand(CIRCLE, steps, 1, told, law, periods)
+    env = single(law=law, authority=authority, time_constant=constant, policy_period=period)
     env.reset(seed=1)
     for state, expected, _, _ in rows:
         _, _, _, _, info = env.step(action)
         # The closed form and the recursion differ in rounding alone.
         np.testing.assert_allclose(info["position"], expected["position"], rtol=0, atol=1e-9)
         np.testing.assert_allclose(env.simulation.plant.state[6:14], state[6:14], rtol=1e-6)
-    # The force is felt: the law alone goes elsewhere.
-    law = by_hand(CIRCLE, steps, 1, periods=periods)
-    assert np.abs(rows[-1][1]["position"] - law[-1][1]["position"]).max() > 1e-5
+    # Force and rate are felt: the law alone goes elsewhere, and so does one that is told of the force without its rate.
+    for other in (None, lambda tick: told(tick)[:1]):
+        untold = by_hand(CIRCLE, steps, 1, other, law, periods)
+        assert np.abs(rows[-1][1]["position"] - untold[-1][1]["position"]).max() > 1e-7
 
 
 @pytest.fixture
 def told(monkeypatch):
-    """Every force (2, N) that a law inside was told about."""
-    forces, command = [], BacksteppingController.command
+    """Every force (2, N), N, and rate (2, N), N/s, that a law inside was told about."""
+    beliefs, command = [], BacksteppingController.command
 
-    def spied(self, measurement, reference, believed_force=None):
-        forces.append(believed_force.copy())
-        return command(self, measurement, reference, believed_force)
+    def spied(self, measurement, reference, believed_force=None, believed_rate=None, damping_factor=None):
+        assert damping_factor is None
+        beliefs.append((believed_force.copy(), believed_rate.copy()))
+        return command(self, measurement, reference, believed_force, believed_rate)
 
     monkeypatch.setattr(BacksteppingController, "command", spied)
-    return forces
+    return beliefs
 
 
-def test_the_believed_force_never_exceeds_the_authority_and_holds_for_a_policy_period(told):
-    env = lanes(4, authority=25.0)
+def test_the_believed_force_never_exceeds_the_authority_and_changes_at_the_control_rate(told, unguarded):
+    env = lanes(4, authority=25.0, time_constant=0.02)
     env.reset(seed=0)
     actions = np.sign(random_actions(50, 4, seed=4))
     actions[30:] = 1.0
-    expected = np.zeros((2, 4))
     for action in actions:
         env.step(action)
-    forces = np.array(told).reshape(50, 10, 2, 4)
+    forces, rates = np.array(told).swapaxes(0, 1).reshape(2, 50, 10, 2, 4)
+    smooth = np.zeros((2, 4))
     for k, action in enumerate(actions):
-        expected += 0.3 * (25 * action.T - expected)
-        np.testing.assert_allclose(forces[k], np.tile(expected, (10, 1, 1)), rtol=1e-12)
+        for tick in range(10):
+            np.testing.assert_allclose(forces[k, tick], 25 * smooth, rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(rates[k, tick], 25 / 0.02 * (action.T - smooth), rtol=1e-9, atol=1e-9)
+            smooth += (1 - np.exp(-1e-3 / 0.02)) * (action.T - smooth)
     assert np.abs(forces).max() <= 25
-    assert forces[-1].min() > 24.9
+    assert forces[-1, -1].min() > 24.9
 
 
-def test_an_ended_lane_starts_its_next_episode_with_no_believed_force(told):
+def test_oscillation_costs_authority_and_what_is_left_is_seen(told):
+    """Lane 0 is shaken at 7 Hz with all that an action may say; lane 1 is left alone."""
+    env, actions, shares = lanes(2, PROBE, authority=400.0, duration=4.0), np.zeros((2, 2), np.float32), []
+    env.reset(seed=0)
+    columns = [env.observation_names.index(f"share of the authority on cylinder {i}, 1") for i in (1, 2)]
+    for step in range(150):
+        actions[0] = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
+        shares.append(env.step(actions)[0][:, columns].T)
+    shares, smooth = np.array(shares), np.zeros(2)
+    np.testing.assert_array_equal(shares[:, :, 1], 1.0)
+    assert np.all(np.diff(shares[:, :, 0], axis=0) <= 0)
+    assert shares[-1, :, 0].min() < 0.5
+    for step in range(150):
+        action = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
+        for _ in range(10):
+            believed = smooth
+            smooth = smooth + (1 - np.exp(-1 / 28)) * (action - smooth)
+        # In the last period of a step the share was the one that the policy sees after it.
+        force, rate = (belief[:, 0] for belief in told[10 * step + 9])
+        np.testing.assert_allclose(force, 400 * shares[step, :, 0] * believed, rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(rate, 400 * shares[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
+
+
+def test_an_ended_lane_starts_its_next_episode_with_no_believed_force(told, unguarded):
     # Lane 1 hits the end stop; the others go on with what they had been told.
-    env = lanes(3, PROBE, authority=500.0, smoothing=0.5, duration=2.0)
+    env = lanes(3, PROBE, authority=500.0, time_constant=0.014, duration=2.0)
     env.reset(seed=0)
     actions, ended = np.full((3, 2), 0.1, np.float32), None
     actions[1] = [-1.0, -1.0]
@@ -164,9 +210,10 @@ def test_an_ended_lane_starts_its_next_episode_with_no_believed_force(told):
             assert infos["time"][1] == 0
             actions[1] = 0.0
     assert ended is not None
-    np.testing.assert_allclose(told[10 * ended], [[50, -500, 50]] * 2, rtol=0.02)
-    np.testing.assert_array_equal(told[-1][:, 1], 0.0)
-    np.testing.assert_allclose(told[-1][:, [0, 2]], 50, rtol=0.02)
+    np.testing.assert_allclose(told[10 * ended][0], [[50, -500, 50]] * 2, rtol=0.02)
+    for belief in told[-1]:
+        np.testing.assert_array_equal(belief[:, 1], 0.0)
+    np.testing.assert_allclose(told[-1][0][:, [0, 2]], 50, rtol=0.02)
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -199,17 +246,43 @@ def test_the_same_actions_twice_are_the_same_rollout_in_the_same_environment():
     np.testing.assert_array_equal(*rollouts)
 
 
-def test_observations_end_with_the_last_action_and_are_named_so():
-    env = lanes(2)
-    assert env.single_action_space == gymnasium.spaces.Box(-1, 1, (2,), np.float32)
-    assert env.single_observation_space.shape == (22,) == (len(env.observation_names),)
-    assert [name for name in env.observation_names if "believed force" in name] == list(env.observation_names[-2:])
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [({}, 2), ({"impedance": "variable_kp"}, 4), ({"impedance": "variable"}, 5), ({"law": "none"}, 4)],
+)
+def test_observations_end_with_the_last_action_and_what_the_law_remembers(arguments, size):
+    env = lanes(2, time_constant=0.02, **arguments)
+    assert env.single_action_space == gymnasium.spaces.Box(-1, 1, (size,), np.float32)
+    assert env.single_observation_space.shape == (SIZE + 2 * size + 8,) == (len(env.observation_names),)
+    names = list(env.observation_names)
+    assert names[:SIZE] == [str(entry) for entry in ENTRIES]
+    said = [name.removeprefix("last action: ") for name in names[SIZE : SIZE + size]]
+    assert names[SIZE + size : SIZE + 2 * size] == [f"smoothed action: {name}" for name in said]
+    word = "opening" if "law" in arguments else "believed force"
+    assert [word in name for name in said[:2]] == [True, True]
+    assert all("share" in name for name in names[-8:-6])
+    assert all(name.startswith("unexplained force on piston") for name in names[-6:])
+    assert len(set(names)) == len(names)
     observation, _ = env.reset(seed=0)
-    np.testing.assert_array_equal(observation[:, -2:], 0)
-    actions = random_actions(1, 2)[0]
+    np.testing.assert_array_equal(observation[:, SIZE:], [[0] * 2 * size + [1, 1] + [0] * 6] * 2)
+    actions = random_actions(1, 2, size)[0]
     observation, _, _, _, infos = env.step(actions)
-    np.testing.assert_array_equal(observation[:, -2:], actions)
+    np.testing.assert_array_equal(observation[:, SIZE : SIZE + size], actions)
+    np.testing.assert_allclose(observation[:, SIZE + size : SIZE + 2 * size], (1 - np.exp(-10 / 20)) * actions, rtol=1e-6)
     np.testing.assert_allclose(infos["reward_action_change"], -0.05 * np.abs(actions).sum(axis=1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(sensors):
+    env = lanes(3, PROBE, sensors=sensors, randomize=True, policy_period=1e-3)
+    observation, _ = env.reset(seed=5)
+    experience = Experience(RIG)
+    experience.reset(np.ones(3, dtype=np.bool_))
+    for _ in range(400):
+        experience.update(env.measurement)
+        observation = env.step(np.zeros((3, 2), np.float32))[0]
+        np.testing.assert_array_equal(observation[:, -6:], np.clip(experience.met.T / 100, -10, 10).astype(np.float32))
+    assert np.abs(observation[:, -6:]).max() > 0.05
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -240,8 +313,19 @@ def test_importing_twice_registers_once():
         ({"authority": 500.1}, r"authority = 500\.1; allowed: more than 0, at most 500"),
         ({"authority": float("nan")}, "authority = nan; allowed: more than 0"),
         ({"authority": "40"}, "authority = '40'; allowed: more than 0"),
-        ({"smoothing": 0.0}, r"smoothing = 0\.0; allowed: more than 0, at most 1"),
-        ({"smoothing": 1.5}, r"smoothing = 1\.5; allowed: more than 0, at most 1"),
+        ({"time_constant": 0.0}, r"time_constant = 0\.0; allowed: more than 0, at most 1"),
+        ({"time_constant": 1.5}, r"time_constant = 1\.5; allowed: more than 0, at most 1"),
+        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-backstepping', 'none'"),
+        ({"law": None}, "law = None; allowed: 'backstepping'"),
+        ({"impedance": "soft"}, "impedance = 'soft'; allowed: 'fixed', 'variable_kp', 'variable'"),
+        ({"impedance": "variable", "law": "none"}, "impedance = 'variable'; allowed: 'fixed', law = 'none' has no impedance"),
+        (
+            {"impedance": "variable_kp", "law": "admittance-backstepping"},
+            "impedance = 'variable_kp'; allowed: 'fixed', law = 'admittance-backstepping' has no impedance",
+        ),
+        ({"smoothing": 0.3}, "unknown argument 'smoothing'; allowed: "),
+        ({"weight_compensation": True}, "unknown argument 'weight_compensation'; allowed: "),
+        ({"actuation": None}, "actuation = None; allowed: not given"),
         ({"policy_period": 0.0105}, r"policy_period = 0\.0105; allowed: a multiple of the control period 0\.001 s"),
         ({"policy_period": -0.01}, r"policy_period = -0\.01; allowed: more than 0"),
         ({"policy_period": "fast"}, "policy_period = 'fast'; allowed: more than 0"),
@@ -254,12 +338,14 @@ def test_what_cannot_be_is_refused_by_name(make, arguments, message):
 
 
 def test_the_largest_settings_are_allowed():
-    env = lanes(2, authority=500, smoothing=1, policy_period=1)
+    env = lanes(2, authority=500, time_constant=1, policy_period=1)
     env.reset(seed=0)
     assert np.isfinite(env.step(np.zeros((2, 2), np.float32))[0]).all()
-    assert ResidualSettings(500, 1, 1).to_dict() == {
-        "authority": 500, "smoothing": 1, "policy_period": 1, "weight_compensation": False,
+    settings = ResidualSettings("backstepping-weight", "variable", 500, 1, 1)
+    assert settings.to_dict() == {
+        "law": "backstepping-weight", "impedance": "variable", "authority": 500, "time_constant": 1, "policy_period": 1,
     }  # fmt: skip
+    assert ResidualSettings(**settings.to_dict()) == settings
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def test_spaces_are_those_of_one_lane():
     assert env.observation_space == base.single_observation_space
     assert env.action_space == base.single_action_space
     observation = env.reset()
-    assert observation.shape == (5, 22)
+    assert observation.shape == (5, 32)
     assert observation.dtype == np.float32
     _, rewards, dones, infos = env.step(np.zeros((5, 2), np.float32))
     assert rewards.shape == dones.shape == (5,)
@@ -177,6 +177,7 @@ def test_normalization_and_ppo_run_on_it():
     before = model.policy.action_net.weight.detach().clone()
     model.learn(512)
     assert model.num_timesteps == 512
+    assert env.venv.seconds > 0
     assert not np.array_equal(before, model.policy.action_net.weight.detach())
     # 128 steps of 4 lanes with at most 60 in an episode: at least two ends in each.
     assert len(model.ep_info_buffer) >= 8

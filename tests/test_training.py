@@ -1,39 +1,36 @@
-"""Residual PPO: it starts as the law, repeats itself, gets better than the law, keeps the best, and runs from measurements."""
+"""Residual training: it starts as the law, repeats itself bit for bit, gets better than the law, and keeps what was best."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
 import pytest
 
-from agents import training
-from agents.policy_files import WEIGHTS, load_policy
-from agents.policy_network import PolicyNetwork
+from agents import monitor, training, validation
+from agents.configuration import TrainingSettings
+from agents.policy_files import CONFIGURATION, WEIGHTS, load_policy
 from agents.residual_controller import ResidualController
-from agents.residual_law import ResidualSettings
-from agents.training import TrainingSettings, train
+from agents.settings import ResidualSettings
+from agents.training import train
 from agents.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping import BacksteppingController
 from baselines.evaluation import evaluate
 from birthsim_env import Parameters
 
-PROBE, CIRCLE = "BirthSIM/ProbeResidual-v0", "BirthSIM/CircleResidual-v0"
+PROBE = "BirthSIM/ProbeResidual-v0"
 RESIDUAL = ResidualSettings()
-SMALL = TrainingSettings(PROBE, steps=40_000, lanes=16, rollout=64, batch=256, validation_lanes=8, validations=4)
-"""On the stiffness test, a few seconds are enough to halve the law's error."""
-BRIEF = replace(SMALL, steps=3072, validations=2)
-
-
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """Folder and figures of one small training."""
-    folder = tmp_path_factory.mktemp("trained")
-    return folder, train(SMALL, RESIDUAL, folder)
+SMALL = TrainingSettings(
+    PROBE, steps=30_000, lanes=32, rollout=32, batch=256, epochs=4, hidden=(32, 32), learning_rate=2e-3,
+    validation_lanes=8, validations=2,
+)  # fmt: skip
+"""On 2.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
+BRIEF = replace(SMALL, steps=2048, lanes=16, validation_lanes=4, validations=2)
+ROLLOUT = 16 * 32
 
 
 @pytest.fixture
@@ -43,12 +40,21 @@ def short_probe(monkeypatch):
     monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **kwargs: make_vec(*args, **{"duration": 1.0, **kwargs}))
 
 
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """Folder and figures of one small training."""
+    folder, make_vec = tmp_path_factory.mktemp("trained"), gymnasium.make_vec
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training.gymnasium, "make_vec", lambda *args, **kwargs: make_vec(*args, **{"duration": 2.5, **kwargs}))
+        return folder, train(SMALL, RESIDUAL, folder)
+
+
 def zero(observations):
     return np.zeros((len(observations), 2), np.float32)
 
 
 def rollout(env, act, seed):
-    """Rewards (T, N) and info of one episode of every lane."""
+    """Rewards (T, N) and positions (T, N, 2) of one episode of every lane."""
     observation, _ = env.reset(seed=seed)
     rewards, positions = [], []
     for _ in range(env.steps):
@@ -58,23 +64,20 @@ def rollout(env, act, seed):
     return np.array(rewards), np.array(positions)
 
 
-def weights_of(folder):
-    return hashlib.sha256((folder / WEIGHTS).read_bytes()).hexdigest()
-
-
 def steady(curve):
-    """A learning curve without its clock."""
-    return [{name: value for name, value in point.items() if name != "seconds"} for point in curve]
+    """A learning curve without its clock, in the words of JSON, which knows that NaN is NaN."""
+    clock = {"seconds", "environment_share"}
+    return json.dumps([{name: value for name, value in point.items() if name not in clock} for point in curve])
 
 
 def test_before_training_the_policy_is_the_law(tmp_path, monkeypatch, short_probe):
-    networks, take = [], training.network_of
+    networks, take = [], monitor.network_of
 
     def spied(*args):
         networks.append(take(*args))
         return networks[-1]
 
-    monkeypatch.setattr(training, "network_of", spied)
+    monkeypatch.setattr(monitor, "network_of", spied)
     reached = train(BRIEF, RESIDUAL, tmp_path)
     first, last = networks[0], networks[-1]
     env = gymnasium.make_vec(PROBE, num_envs=6, randomize=True, duration=1.0)
@@ -87,58 +90,97 @@ def test_before_training_the_policy_is_the_law(tmp_path, monkeypatch, short_prob
     assert not first.layers[-1][1].any()
     assert all(weight.any() for weight, _ in first.layers[:-1])
     assert reached["curve"][0]["steps"] == 0
-    assert {name: reached["curve"][0][name] for name in reached["law"]} == reached["law"]
+    assert steady([reached["law"]]) == steady([{name: reached["curve"][0][name] for name in reached["law"]}])
 
 
 def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     _, reached = trained
     law, policy, curve = reached["law"], reached["policy"], reached["curve"]
-    # Seeds 0 to 5 reached 0.42 to 0.58 of the law's error, and 0.37 to 0.49 of its tail.
-    assert policy["pooled_mm"] < 0.75 * law["pooled_mm"]
-    assert policy["tail_mm"] < 0.75 * law["tail_mm"]
+    # Seeds 0 to 2 reached 0.63 to 0.76 of the law's error, and 0.52 to 0.70 of its tail.
+    assert policy["pooled_mm"] < 0.85 * law["pooled_mm"]
+    assert policy["tail_mm"] < 0.85 * law["tail_mm"]
     assert policy["lost"] == law["lost"] == 0
     best = min(curve, key=lambda point: point["pooled_mm"] + point["tail_mm"])
-    assert {name: best[name] for name in policy} == policy
-    # Validations at the start, at four equal intervals (the nearest ends of rollouts), and at the end.
-    rollouts = 16 * 64
-    assert [point["steps"] for point in curve] == [
-        0,
-        *(rollouts * np.ceil(np.array([10e3, 20e3, 30e3, 40e3]) / rollouts)).astype(int),
-    ]
+    assert steady([{name: best[name] for name in policy}]) == steady([policy])
+    # Validations at the start, at equal intervals (the nearest ends of rollouts), and at the end.
+    rollouts = 32 * 32
+    assert [point["steps"] for point in curve] == [0, *(rollouts * np.ceil(np.array([15e3, 30e3]) / rollouts)).astype(int)]
     assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(curve))
+    assert all(0 < point["environment_share"] < 1 for point in curve[1:])
+    assert reached["settings"] == {**SMALL.to_dict(), **RESIDUAL.to_dict()}
+
+
+def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tmp_path, monkeypatch, short_probe):
+    """Four lanes: three at one error and the fourth, on which the tail depends, at another; the third validation is best."""
+    networks, take = [], monitor.network_of
+    monkeypatch.setattr(monitor, "network_of", lambda *args: (networks.append(take(*args)), networks[-1])[1])
+    errors, nothing = iter([(3.0, 3.0), (3.0, 3.0), (1.0, 9.0), (2.0, 2.5), (1.9, 4.0), (2.1, 2.5)]), np.full(4, np.nan)
+
+    def scored(env, act):
+        most, one = next(errors)
+        return Score(np.array([most, most, one, most]), nothing, nothing, nothing, np.zeros(4), 0)
+
+    monkeypatch.setattr(monitor, "validate", scored)
+    reached = train(replace(BRIEF, validations=4), RESIDUAL, tmp_path)
+    assert [point["max_mm"] for point in reached["curve"]] == [3.0, 9.0, 2.5, 4.0, 2.5]
+    assert reached["policy"]["max_mm"] == 2.5
+    kept = load_policy(tmp_path)
+    assert kept.training["reached"]["pooled_mm"] == reached["curve"][2]["pooled_mm"]
+    np.testing.assert_array_equal(kept.network.layers[-1][0], networks[2].layers[-1][0])
+    assert len(networks) == 5
 
 
 def test_the_folder_holds_the_policy_whose_figures_were_reported(trained):
     folder, reached = trained
     policy = load_policy(folder)
-    assert policy.environment == PROBE
-    assert policy.settings == RESIDUAL
-    assert policy.training["seed"] == 0
-    assert policy.training["steps"] == 40_000
-    assert policy.training["law_mm"] == reached["law"]["pooled_mm"]
-    assert steady(policy.training["curve"]) == steady(reached["curve"])[: len(policy.training["curve"])]
-    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True)
-    score = validate(env, policy.network.actions)
-    assert {"pooled_mm": score.pooled, "tail_mm": score.tail, "lost": score.lost} == reached["policy"]
+    assert (policy.environment, policy.settings, policy.network.squashed) == (PROBE, RESIDUAL, False)
+    assert {name: policy.training[name] for name in SMALL.to_dict()} == SMALL.to_dict()
+    assert steady([policy.training["law"], policy.training["reached"]]) == steady([reached["law"], reached["policy"]])
+    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True, duration=2.5)
+    assert steady([validate(env, policy.network.actions).to_dict()]) == steady([reached["policy"]])
     # On worlds that neither training nor validation has seen it is better as well.
-    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True)
-    assert validate(unseen, policy.network.actions, 50_000).pooled < 0.75 * validate(unseen, zero, 50_000).pooled
+    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True, duration=2.5)
+    assert validate(unseen, policy.network.actions, 50_000).pooled < 0.9 * validate(unseen, zero, 50_000).pooled
 
 
-def test_the_same_seed_twice_gives_the_same_weights_and_another_seed_others(tmp_path, short_probe):
+@pytest.fixture
+def events(trained):
+    """What TensorBoard shows of the small training: tag -> {step: value}."""
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    (run,) = (trained[0] / "tensorboard").iterdir()
+    accumulator = EventAccumulator(str(run))
+    accumulator.Reload()
+    return {tag: {event.step: event.value for event in accumulator.Scalars(tag)} for tag in accumulator.Tags()["scalars"]}
+
+
+def test_events_are_there_for_tensorboard(trained, events):
+    _, reached = trained
+    assert {"rollout/ep_rew_mean", "train/value_loss", "validation/pooled_mm", "validation/tail_mm_law"} <= set(events)
+    shown = list(events["validation/pooled_mm"].values())
+    np.testing.assert_allclose(shown[:2], [point["pooled_mm"] for point in reached["curve"][:2]], rtol=1e-5)
+    np.testing.assert_allclose(events["validation/pooled_mm_law"][min(events["validation/pooled_mm_law"])], shown[0], rtol=1e-5)
+
+
+def test_every_validation_is_in_the_events_at_its_own_step(trained, events):
+    _, reached = trained
+    assert set(events["validation/pooled_mm"]) == {point["steps"] for point in reached["curve"]}
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
+def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
+    settings = replace(BRIEF, algorithm=algorithm, gradient_steps=1, batch=64)
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
-        reached = train(replace(BRIEF, seed=seed), RESIDUAL, tmp_path / name)
-        results.append((steady(reached["curve"]), load_policy(tmp_path / name).network))
-    (one, network), (again, twin), (other, stranger) = results
-    assert one == again
-    assert one[0] == other[0]
-    assert one[-1] != other[-1]
-    for mine, its in zip(network.layers, twin.layers, strict=True):
-        np.testing.assert_array_equal(mine[0], its[0])
-        np.testing.assert_array_equal(mine[1], its[1])
-    assert weights_of(tmp_path / "one") == weights_of(tmp_path / "again") != weights_of(tmp_path / "other")
-    assert not np.array_equal(network.layers[0][0], stranger.layers[0][0])
+        reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
+        results.append((reached["curve"], *((tmp_path / name / file).read_bytes() for file in (WEIGHTS, CONFIGURATION))))
+    (one, *files), (again, *twins), (other, *strangers) = results
+    assert steady(one) == steady(again)
+    assert files == twins
+    # The untrained policies are the same, the law; the trained ones are not.
+    assert steady(one[:1]) == steady(other[:1])
+    assert steady(one[-1:]) != steady(other[-1:])
+    assert files[1] != strangers[1]
 
 
 def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
@@ -153,13 +195,20 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
 
     monkeypatch.setattr(training.gymnasium, "make_vec", spied)
     rig = Parameters().replace({"mechanics.mass": 4.0})
-    residual = ResidualSettings(authority=22.0, smoothing=0.5, policy_period=0.02, weight_compensation=True)
+    residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     settings = replace(
-        BRIEF, environment="BirthSIM/ForcepsResidual-v0", sensors="lab", randomize="plant", seed=30, lanes=4, steps=256
+        BRIEF,
+        environment="BirthSIM/ForcepsResidual-v0",
+        sensors="lab",
+        randomize="plant",
+        seed=30,
+        lanes=4,
+        steps=256,
+        batch=64,
     )
     train(settings, residual, tmp_path, rig)
     expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
-    for (name, arguments, _), lanes in zip(made, (4, 8), strict=True):
+    for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
         assert name == "BirthSIM/ForcepsResidual-v0"
         assert arguments == {**expected, "num_envs": lanes}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
@@ -170,34 +219,48 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     assert load_policy(tmp_path).settings == residual
 
 
-def test_an_interrupt_keeps_the_best_policy_so_far(tmp_path, monkeypatch, capsys, short_probe):
+def test_an_interrupt_is_passed_on_and_leaves_the_best_policy_so_far(tmp_path, monkeypatch, capsys, short_probe):
     def interrupt(self):
-        if self.num_timesteps >= 2048:
+        if self.num_timesteps >= 2 * ROLLOUT + 100:
             raise KeyboardInterrupt
         return True
 
-    monkeypatch.setattr(training._KeepBest, "_on_step", interrupt)
-    reached = train(replace(BRIEF, steps=10**6, validations=1000), RESIDUAL, tmp_path)
-    assert "interrupted after 2048 steps" in capsys.readouterr().out
-    assert [point["steps"] for point in reached["curve"]] == [0, 1024]
-    best = min(reached["curve"], key=lambda point: point["pooled_mm"] + point["tail_mm"])
-    assert reached["policy"]["pooled_mm"] == best["pooled_mm"]
+    monkeypatch.setattr(monitor.Monitor, "_on_step", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        train(replace(BRIEF, steps=10**6, validations=10**6 // ROLLOUT), RESIDUAL, tmp_path)
+    assert f"interrupted after {2 * ROLLOUT + 112} steps" in capsys.readouterr().out
     assert load_policy(tmp_path).training["steps"] == 10**6
-    json.dumps(reached)
+    assert (tmp_path / "checkpoint.pt").is_file()
 
 
 class Fake:
-    """A vector environment of three lanes that run for a second; its errors are known and do not heed the actions."""
+    """Three lanes that run for a second; their errors, pushes, openings and demands are known and do not heed the actions."""
 
     num_envs, steps = 3, 100
 
-    def __init__(self):
-        self.seed, self.actions = None, []
+    def __init__(self, demands):
+        self.seed, self.actions, self.demands = None, [], np.array(demands)
+        self.simulation = SimpleNamespace(period=1e-3, periods=10)
 
     def _info(self, k):
         # Settled are k >= 50. Lane 0: (3, 4) mm, lane 1: 1 mm after 9 mm, lane 2: lost at k = 80.
         error = 1e-3 * np.array([[3, 4], [9 if k < 50 else 1, 0], [2, 0]], float)
-        return {"tracking_error": error, "since_jump": np.full(3, 0.01 * k)}
+        # Lane 0 is pushed along y by 12 N at 2000 N/m: 6 mm are asked for, 4 mm more or less are two thirds. Lane 1 by 4 N.
+        force = np.array([[0, -12], [4, 0], [0, 0]], float)
+        self.simulation.openings = np.where(np.arange(4)[:, None] == 2, [1.0 if k % 4 == 0 else 0.5, -1.0, 0.3], 0.1)
+        return {
+            "tracking_error": error,
+            "position": np.zeros((3, 2)),
+            "velocity": np.zeros((3, 2)),
+            "target": np.zeros((3, 2)),
+            "compliant_target": force / 2000,
+            "user_force": force,
+            "stiffness_setpoint": np.full((3, 2), 2000.0),
+            "pneumatic_stiffness": np.ones((3, 2)),
+            "pneumatic_stiffness_setpoint": np.ones((3, 2)),
+            "supply_flow": np.zeros(3),
+            "since_jump": np.full(3, 0.01 * k),
+        }
 
     def reset(self, seed=None):
         self.seed, self._k = seed, 0
@@ -210,21 +273,63 @@ class Fake:
         return np.full((3, 3), self._k, np.float32), np.zeros(3), terminated, np.zeros(3, bool), self._info(self._k)
 
 
-def test_validation_scores_settled_errors_and_counts_a_lost_lane_as_a_hundred_millimetres():
-    env = Fake()
-    score = validate(env, lambda seen: seen[:, :2] * 0.01)
-    np.testing.assert_allclose(score.lanes, [5, 1, 100])
+@pytest.fixture
+def scored(monkeypatch):
+    """The score of ``Fake`` with the demands given."""
+    monkeypatch.setattr(validation, "demand", lambda env: env.demands)
+
+    def score(*demands):
+        env = Fake(demands)
+        return env, validate(env, lambda seen: seen[:, :2] * 0.01)
+
+    return score
+
+
+def test_validation_scores_settled_errors_and_counts_a_lost_lane_as_a_hundred_millimetres(scored):
+    env, score = scored(0.4, 0.9, 0.99)
+    np.testing.assert_allclose(score.error, [5, 1, 100])
     assert score.lost == 1
     assert score.pooled == pytest.approx(np.sqrt((25 + 1 + 10_000) / 3))
     assert score.tail == pytest.approx(np.quantile([5, 1, 100], 0.95))
     assert env.seed == VALIDATION_SEED
     # The policy was asked with the newest observation every time.
     np.testing.assert_allclose([actions[0, 0] for actions in env.actions], 0.01 * np.arange(100))
-    assert Score(np.array([3.0, 4.0]), 0).pooled == pytest.approx(np.sqrt(12.5))
+    # What the push of 12 N shows of the stiffness; 4 N are too weak to show anything.
+    np.testing.assert_allclose(score.stiffness, [100 * 4 / 6, np.nan, np.nan])
+    np.testing.assert_allclose(score.saturation[:2], [25, 100])
+    figures = score.to_dict()
+    assert figures["median_mm"] == pytest.approx(5)
+    assert figures["max_mm"] == 100
+    assert figures["stiffness_error_percent"] == pytest.approx(100 * 4 / 6)
+    assert (figures["infeasible"], figures["lost"]) == (0, 1)
+    assert (figures["pooled_mm"], figures["tail_mm"]) == (score.pooled, score.tail)
+
+
+def test_what_no_controller_can_do_does_not_count(scored):
+    _, score = scored(1.0, 0.9, np.inf)
+    np.testing.assert_array_equal(score.feasible, [False, True, False])
+    assert score.pooled == score.tail == pytest.approx(1)
+    figures = score.to_dict()
+    assert figures["infeasible"] == 2
+    assert figures["max_mm"] == pytest.approx(1)
+    assert np.isnan(figures["stiffness_error_percent"])
+    assert figures["saturation_percent"] == 100
+
+
+def test_a_validation_without_any_feasible_world_says_so(scored):
+    _, score = scored(1.5, 2.0, np.inf)
+    assert score.to_dict()["infeasible"] == 3
+
+
+def test_a_score_pools_lanes_by_their_mean_square():
+    nothing = np.full(2, np.nan)
+    score = Score(np.array([3.0, 4.0]), nothing, nothing, nothing, np.zeros(2), 0)
+    assert score.pooled == pytest.approx(np.sqrt(12.5))
+    assert np.isnan(score.to_dict()["hunting_mm"])
 
 
 def test_validation_does_not_let_a_lost_lane_back_in():
-    env = gymnasium.make_vec(PROBE, num_envs=3, authority=500.0, smoothing=1.0, duration=1.5)
+    env = gymnasium.make_vec(PROBE, num_envs=3, authority=500.0, time_constant=0.002, duration=1.5)
 
     def slam(observations):
         actions = np.zeros((3, 2), np.float32)
@@ -233,131 +338,27 @@ def test_validation_does_not_let_a_lost_lane_back_in():
 
     score, calm = validate(env, slam, 7), validate(env, zero, 7)
     assert (score.lost, calm.lost) == (1, 0)
-    assert score.lanes[1] == 100
-    np.testing.assert_array_equal(score.lanes[[0, 2]], calm.lanes[[0, 2]])
-
-
-@pytest.mark.parametrize(("sensors", "name"), [("ideal", CIRCLE), ("lab", CIRCLE), ("ideal", PROBE)])
-def test_the_controller_from_measurements_does_what_the_environment_does_inside(trained, sensors, name):
-    folder, _ = trained
-    policy, lanes, steps = load_policy(folder), 6, 150
-    arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
-    inside = gymnasium.make_vec(name, **arguments)
-    outside = gymnasium.make_vec(name.replace("Residual", ""), policy_period=1e-3, **arguments)
-    controller = ResidualController(policy=folder)
-    observation, _ = inside.reset(seed=11)
-    outside.reset(seed=11)
-    law, plain = BacksteppingController(), gymnasium.make_vec(name.replace("Residual", ""), policy_period=1e-3, **arguments)
-    plain.reset(seed=11)
-    for _ in range(steps):
-        actions = policy.network.actions(observation)
-        observation, _, _, _, info = inside.step(actions)
-        for _ in range(10):
-            _, _, _, _, its = outside.step(controller.command(outside.measurement, outside.reference).T)
-            plain.step(law.command(plain.measurement, plain.reference).T)
-        np.testing.assert_array_equal(outside.simulation.plant.state, inside.simulation.plant.state)
-        np.testing.assert_array_equal(its["tracking_error"], info["tracking_error"])
-    assert np.abs(actions).max() > 0.05
-    assert np.abs(plain.simulation.plant.state - inside.simulation.plant.state).max() > 1e-3
+    assert score.error[1] == 100
+    np.testing.assert_array_equal(score.error[[0, 2]], calm.error[[0, 2]])
 
 
 def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree(trained):
     folder, _ = trained
-    inside = gymnasium.make_vec(PROBE, num_envs=5, randomize=True)
+    arguments = {"randomize": True, "duration": 2.5}
+    inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
     score = validate(inside, load_policy(folder).network.actions, 40)
-    result = evaluate("BirthSIM/Probe-v0", ResidualController(policy=folder), "residual", 5, 40, progress=False, randomize=True)
-    law = evaluate("BirthSIM/Probe-v0", BacksteppingController(), "law", 5, 40, progress=False, randomize=True)
+    result = evaluate("BirthSIM/Probe-v0", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
+    law = evaluate("BirthSIM/Probe-v0", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
-    np.testing.assert_allclose(result.metrics["settled_rms"], score.lanes, rtol=0.02)
-    assert np.mean(result.metrics["settled_rms"]) < 0.8 * np.mean(law.metrics["settled_rms"])
-
-
-def network(bias) -> PolicyNetwork:
-    """A policy whose actions follow the tracking error, plus a constant."""
-    weight = np.zeros((2, 22), np.float32)
-    weight[0, 1], weight[1, 0] = 0.5, -0.5
-    return PolicyNetwork(np.zeros(22), np.ones(22), ((weight, np.array(bias, np.float32)),))
-
-
-@pytest.fixture
-def steering(tmp_path):
-    """Folder of a policy that follows the tracking error and leans on cylinder 2."""
-    from agents.policy_files import Policy, save_policy
-
-    save_policy(Policy(network((0.0, 0.4)), CIRCLE, ResidualSettings(policy_period=0.02), {}), tmp_path)
-    return tmp_path
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
-    env = gymnasium.make("BirthSIM/Circle-v0", policy_period=1e-3, sensors=sensors).unwrapped
-    lanes = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3, sensors=sensors)
-    one, several = ResidualController(policy=steering), ResidualController(policy=steering)
-    env.reset(seed=5)
-    lanes.reset(seed=5)
-    for _ in range(120):
-        alone, together = one.command(env.measurement, env.reference), several.command(lanes.measurement, lanes.reference)
-        assert alone.shape == (4,)
-        np.testing.assert_array_equal(alone, together[:, 0])
-        env.step(alone)
-        lanes.step(together.T)
-
-
-def test_a_reset_forgets_the_last_episode(steering):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3, sensors="lab")
-    controller, runs = ResidualController(policy=steering), []
-    for calls in (37, 50):
-        env.reset(seed=2)
-        controller.reset()
-        runs.append([])
-        for _ in range(calls):
-            runs[-1].append(controller.command(env.measurement, env.reference))
-            env.step(runs[-1][-1].T)
-    np.testing.assert_array_equal(runs[0], runs[1][:37])
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """Every observation (N, D) that a policy was asked with."""
-    seen, actions = [], PolicyNetwork.actions
-    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows: (seen.append(rows), actions(self, rows))[1])
-    return seen
-
-
-def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3)
-    controller = ResidualController(policy=steering)
-    env.reset(seed=2)
-    for _ in range(45):
-        env.step(controller.command(env.measurement, env.reference).T)
-    controller.reset(np.array([False, True, False]))
-    untold = BacksteppingController().command(env.measurement, env.reference)
-    openings = controller.command(env.measurement, env.reference)
-    np.testing.assert_array_equal(openings[:, 1], untold[:, 1])
-    assert (openings[:, [0, 2]] != untold[:, [0, 2]]).any(axis=0).all()
-    for _ in range(15):
-        env.step(controller.command(env.measurement, env.reference).T)
-    # The next question to the policy shows its last action: none in that lane.
-    assert len(asked) == 4
-    np.testing.assert_array_equal(asked[-1][1, -2:], 0)
-    assert (np.abs(asked[-1][[0, 2], -2:]).max(axis=1) > 0.1).all()
-
-
-def test_the_policy_is_asked_once_per_policy_period(steering, asked):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3)
-    controller = ResidualController(policy=steering)
-    env.reset(seed=0)
-    for _ in range(41):
-        env.step(controller.command(env.measurement, env.reference).T)
-    assert len(asked) == 3
-    np.testing.assert_array_equal(asked[0][:, -2:], 0)
-    np.testing.assert_array_equal(asked[1][:, -2:], load_policy(steering).network.actions(asked[0]))
+    np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
+    np.testing.assert_array_equal(result.demand, score.demand)
+    assert np.mean(result.metrics["settled_rms"]) < 0.9 * np.mean(law.metrics["settled_rms"])
 
 
 @pytest.mark.slow
 def test_the_default_training_improves_on_the_law_on_the_circle(tmp_path):
-    """A sixth of the default budget; five seeds reached 0.49 to 0.50 of the law's error and 0.22 to 0.30 of its tail."""
+    """A part of the default budget."""
     reached = train(TrainingSettings(steps=500_000, validations=4), ResidualSettings(), tmp_path)
     assert reached["policy"]["lost"] == 0
-    assert reached["policy"]["pooled_mm"] < 0.75 * reached["law"]["pooled_mm"]
-    assert reached["policy"]["tail_mm"] < 0.6 * reached["law"]["tail_mm"]
+    assert reached["policy"]["pooled_mm"] < 0.8 * reached["law"]["pooled_mm"]
+    assert reached["policy"]["tail_mm"] < 0.8 * reached["law"]["tail_mm"]

@@ -12,7 +12,7 @@ from birthsim_env.info import FIELDS
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v0", "BirthSIM/Probe-v0", "BirthSIM/Forceps-v0"
-TERMS = ("reward_tracking", "reward_action_change", "reward_failure")
+TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
 
 
 def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
@@ -123,7 +123,7 @@ def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
             assert_same(info, lane_of(infos["final_info"], lane))
             np.testing.assert_array_equal(observation[lane], after[0])
             assert_same(after[1], {name: infos[name][lane] for name in FIELDS})
-            assert (infos["time"][lane], infos[TERMS[2]][lane]) == (0.0, -250.0 if dead else 0.0)
+            assert (infos["time"][lane], infos[TERMS[-1]][lane]) == (0.0, -250.0 if dead else 0.0)
             instants[lane].append(step)
         if ended.any():
             np.testing.assert_array_equal(infos["_final_obs"], ended)

@@ -1,64 +1,142 @@
-"""birthsim-train: a residual policy on the paper's law, by PPO."""
+"""birthsim-train: residual policies by reinforcement learning, several seeds in one command."""
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import gymnasium
+from tqdm import tqdm
 
 import agents
+from agents.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
+from agents.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
-from birthsim_env.parameters import load_parameters
+from birthsim_env.parameters import Parameters, load_parameters
 
 
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim-train",
-        description="Train a residual policy on top of the paper's law with PPO of Stable-Baselines3.",
-        epilog="The best policy on validation worlds is kept in --out whenever it improves; Ctrl-C stops and keeps it.",
+        description="Train residual policies on top of a control law, by PPO, SAC or TQC.",
+        epilog="Options override what the configuration says. The best policy on validation worlds is kept whenever it "
+        "improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command with --resume goes on.",
     )
-    parser.add_argument("--env", default="BirthSIM/CircleResidual-v0", help="residual environment (default: %(default)s)")
-    parser.add_argument("--steps", type=whole, default=3_000_000, help="policy steps (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0)
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
-    parser.add_argument("--randomize", default="all", choices=tuple(RANDOMIZE), help="what training varies (default: all)")
-    parser.add_argument("--authority", type=float, help="bound of the residual force, N (default: 100)")
+    listed = ", ".join(configuration_names())
+    parser.add_argument("--config", default="circle", help=f"{listed}, or a TOML file (default: %(default)s)")
+    parser.add_argument("--env", help="residual environment")
+    parser.add_argument("--algorithm", choices=ALGORITHMS)
+    parser.add_argument("--law", choices=LAWS, help="law underneath; none: the policy drives the valves by itself")
+    parser.add_argument("--impedance", choices=tuple(IMPEDANCES), help="what an action sets beside forces")
+    parser.add_argument("--steps", type=whole, help="policy steps per seed")
+    parser.add_argument("--seed", type=seed_number, help="first seed (default: the configuration's, 0)")
+    parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
+    parser.add_argument("--jobs", type=whole, default=1, help="seeds trained side by side (default: 1)")
+    parser.add_argument("--sensors", choices=("ideal", "lab"))
+    parser.add_argument("--randomize", choices=tuple(RANDOMIZE), help="what training varies")
+    parser.add_argument("--authority", type=float, help="bound of the residual force, N")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for policy.safetensors, policy.json, training.json")
+    parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in --out")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="folder; each seed has one in it with its policy, checkpoint, curve and events"
+    )
     run(parser, _train)
 
 
 def _train(arguments: argparse.Namespace) -> None:
-    assert agents
+    training, residual = _settings(arguments)
     known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" in name)
-    if arguments.env not in known:
-        raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(known)}")
+    assert agents
+    if training.environment not in known:
+        raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
     rig = load_parameters(arguments.parameters)
+    first = training.seed if arguments.seed is None else arguments.seed
+    seeds = range(first, first + arguments.seeds)
+    folders = [arguments.out / f"seed_{seed}" for seed in seeds]
+    if not arguments.resume:
+        for folder in folders:
+            if (folder / "training.json").exists() or (folder / "checkpoint.pt").exists():
+                raise ValueError(f"{str(folder)!r} holds a training; allowed: --resume to go on, or another --out")
+    work = [
+        (replace(training, seed=seed), residual, make_folder(folder), rig, arguments.resume, k % arguments.jobs)
+        for k, (seed, folder) in enumerate(zip(seeds, folders, strict=True))
+    ]
+    results = _side_by_side(work, arguments.jobs) if arguments.jobs > 1 else [_one(*piece) for piece in work]
+    _report(training, residual, list(seeds), results)
+    print(f"written to {arguments.out}/")
+
+
+def _settings(arguments: argparse.Namespace) -> tuple[TrainingSettings, ResidualSettings]:
+    """The configuration, with what the options say instead."""
+    training, residual = load_configuration(arguments.config)
+    said = {
+        "environment": arguments.env, "algorithm": arguments.algorithm, "steps": arguments.steps, "sensors": arguments.sensors,
+        "randomize": None if arguments.randomize is None else RANDOMIZE[arguments.randomize],
+    }  # fmt: skip
+    allowed = {"law": arguments.law, "impedance": arguments.impedance, "authority": arguments.authority}
+    return (
+        override(training, **{name: value for name, value in said.items() if value is not None}),
+        override(residual, **{name: value for name, value in allowed.items() if value is not None}),
+    )
+
+
+def _one(
+    settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, resume: bool, position: int
+) -> dict[str, Any]:  # fmt: skip
     try:
         # Stable-Baselines3 and torch take three seconds to load and come with the extra "agents" only.
-        from agents.residual_law import ResidualSettings
-        from agents.training import TrainingSettings, train
+        from agents.training import train
     except ImportError as error:
         raise ValueError(f"{error}; training needs the extra: pip install 'birthsim[agents]'") from error
-    settings = TrainingSettings(
-        environment=arguments.env,
-        steps=arguments.steps,
-        seed=arguments.seed,
-        sensors=arguments.sensors,
-        randomize=RANDOMIZE[arguments.randomize],
-    )
-    residual = ResidualSettings() if arguments.authority is None else ResidualSettings(authority=arguments.authority)
-    folder = make_folder(arguments.out)
-    reached = train(settings, residual, folder, rig)
+    reached = train(settings, residual, folder, rig, resume, position)
     write_json(folder / "training.json", reached)
-    law, policy = reached["law"], reached["policy"]
-    print(f"\n{settings.environment}, {settings.validation_lanes} validation episodes, settled RMS error:")
+    return reached
+
+
+def _side_by_side(work: list[tuple[Any, ...]], jobs: int) -> list[dict[str, Any]]:
+    with ProcessPoolExecutor(min(jobs, len(work)), multiprocessing.get_context("spawn"), _begin_worker) as executor:
+        futures = [executor.submit(_one, *piece) for piece in work]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:
+            for process in multiprocessing.active_children():
+                process.terminate()
+            executor.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _begin_worker() -> None:
+    """Ctrl-C reaches the whole process group: the parent ends its workers, whose checkpoints stay."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's
+
+
+def _report(
+    training: TrainingSettings, residual: ResidualSettings, seeds: list[int], results: list[dict[str, Any]]
+) -> None:  # fmt: skip
+    law = results[0]["law"]
+    print(
+        f"\n{training.environment}, {training.validation_lanes} validation episodes, of which {law['infeasible']} ask for more"
+    )
+    print("than the rig's strength and are left out; settled RMS error:")
     print(f"{'':12}{'pooled':>10}{'95 %':>10}{'lost':>8}")
-    for name, figures in (("law", law), ("residual", policy)):
-        print(f"{name:12}{figures['pooled_mm']:7.2f} mm{figures['tail_mm']:7.2f} mm{figures['lost']:8d}")
-    print(f"{100 * (1 - policy['pooled_mm'] / law['pooled_mm']):.0f} % below the law; written to {folder}/")
+    for name, figures in (
+        (residual.law, law),
+        *((f"seed {seed}", result["policy"]) for seed, result in zip(seeds, results, strict=True)),
+    ):
+        better = "" if figures is law else f"  {100 * (1 - figures['pooled_mm'] / law['pooled_mm']):3.0f} % below"
+        print(f"{name:12}{figures['pooled_mm']:7.2f} mm{figures['tail_mm']:7.2f} mm{figures['lost']:8d}{better}")
+    last = [result["curve"][-1] for result in results]
+    seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
+    shares = ", ".join(f"{100 * point['environment_share']:.0f}" for point in last)
+    print(f"{seconds} s per seed with validation; {shares} % of the rest in the environment")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import gymnasium
 
@@ -36,7 +35,11 @@ def main() -> None:
         help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping, with --all "
         "every one of the registry that is not slow)",
     )
-    parser.add_argument("--policy", type=Path, help="folder of a trained policy, for the controller 'residual'; not with --all")
+    parser.add_argument(
+        "--policy",
+        help="for the controller 'residual': a folder that birthsim-train wrote, of one training seed or of several, or the "
+        "name of what comes with the package, such as circle; not with --all",
+    )
     parser.add_argument("--episodes", type=whole, default=32, help="per controller, with --all per cell (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
     parser.add_argument("--sensors", choices=("ideal", "lab"), help="default: ideal, with --all both")
@@ -77,17 +80,18 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         raise ValueError(f"--env {arguments.env!r}; allowed: {known}")
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
-        raise ValueError("--controller residual needs --policy DIR, the folder that birthsim-train wrote")
+        raise ValueError("--controller residual needs --policy, a folder that birthsim-train wrote")
     if arguments.policy is not None:
         names = ["backstepping", "residual"] if names == ["residual"] else list(dict.fromkeys([*names, "residual"]))
-    controllers = {}
-    for name in names:
-        options: dict[str, Any] = {"policy": arguments.policy} if name == "residual" else {}
-        controllers[name] = make_controller(name, rig, **options)
+    policies = _policies(arguments.policy)
+    controllers = [(name, make_controller(name, rig)) for name in names if name != "residual"]
+    for place in policies:
+        name = "residual" if len(policies) == 1 else f"residual {place.name}"
+        controllers.append((name, make_controller("residual", rig, policy=place)))
     folder = make_folder(arguments.out)
     setting = {"parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize]}
     evaluations: list[Evaluation] = []
-    for name, controller in controllers.items():
+    for name, controller in controllers:
         try:
             evaluations.append(evaluate(arguments.env, controller, name, arguments.episodes, arguments.seed, **setting))
         except KeyboardInterrupt:
@@ -101,13 +105,35 @@ def _evaluate(arguments: argparse.Namespace) -> None:
 
     caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
     caption += f"randomised: {arguments.randomize}"
-    text = table(evaluations)
+    classical = [one for one in evaluations if not one.controller.startswith("residual")]
+    learned = evaluations[len(classical) :]
+    text, pictures = table(evaluations), "error_over_time"
+    if len(learned) > 1:
+        from agents.learning_curves import draw_learning_curves
+        from agents.seeds import learning_curves, merged, seed_table
+
+        together = merged(learned, f"residual, {len(learned)} seeds")
+        evaluations = [*classical, together]
+        text = "\n\n".join([table(evaluations), *(seed_table(one, learned) for one in classical)])
+        pictures += ", learning_curves"
+        draw_learning_curves(learning_curves(policies), folder)
     (folder / "evaluation.md").write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
     shown = {key: str(value) for key, value in vars(arguments).items()}
-    results = [evaluation.to_dict() for evaluation in evaluations]
+    results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
     write_json(folder / "evaluation.json", {"arguments": shown, "rig": rig.to_dict(), "results": results})
     error_over_time(evaluations, caption, folder)
-    print(f"{caption}\n\n{text}\n\nwritten to {folder}/: evaluation.json, evaluation.md, error_over_time.png and .svg")
+    print(f"{caption}\n\n{text}\n\nwritten to {folder}/: evaluation.json, evaluation.md, {pictures} (.png, .svg)")
+
+
+def _policies(path: str | None) -> list[Path]:
+    """The policy folders at ``path``."""
+    if path is None:
+        return []
+    try:
+        from agents.seeds import policy_folders
+    except ImportError as error:
+        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+    return policy_folders(path)
 
 
 if __name__ == "__main__":

@@ -50,13 +50,14 @@ def make_folder(path: Path) -> Path:
 def write_json(path: Path, content: Any) -> None:
     """Write JSON as a whole or not at all; a number that is not finite becomes null, for which JSON has no other word."""
     partial = path.with_suffix(path.suffix + ".partial")
-    partial.write_text(json.dumps(_finite(content), indent=1, allow_nan=False), encoding="utf-8")
+    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
     partial.replace(path)
 
 
-def _finite(content: Any) -> Any:
+def finite(content: Any) -> Any:
+    """``content`` with None for every number that is not finite, at any depth."""
     if isinstance(content, dict):
-        return {name: _finite(value) for name, value in content.items()}
+        return {name: finite(value) for name, value in content.items()}
     if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
+        return [finite(value) for value in content]
     return None if isinstance(content, float) and not math.isfinite(content) else content

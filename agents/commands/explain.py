@@ -1,0 +1,84 @@
+"""birthsim-explain: what a trained residual has learned, and what a hand feels of it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baselines.commands.shared import make_folder, run, write_json
+from baselines.statistics import number
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-explain",
+        description="Look into a trained residual: its correction against the weight that the law leaves out and against "
+        "friction, the frictionless circle, and the stiffness test per setpoint on rigs drawn at random.",
+    )
+    parser.add_argument("--policy", default="circle", help="a folder of birthsim-train, or a name that comes with the package")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="folder for correction.png and .svg, residual.md, residual.json"
+    )
+    run(parser, _explain)
+
+
+def _explain(arguments: argparse.Namespace) -> None:
+    try:
+        from agents import inspection
+        from agents.correction_figure import draw_corrections
+        from agents.policy_files import load_policy
+        from agents.residual_controller import ResidualController
+        from agents.seeds import policy_folders
+    except ImportError as error:
+        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+    from baselines.registry import make_controller
+    from birthsim_env.parameters import Parameters
+
+    places = policy_folders(arguments.policy)
+    policies = [load_policy(place) for place in places]
+    names = [place.name for place in places]
+    weights = [inspection.weight_over_workspace(policy) for policy in policies]
+    correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]
+    slopes = [float(np.polyfit(weight[1], weight[0], 1)[0]) for weight in weights]
+    circles = [inspection.frictionless_circle(policy) for policy in policies]
+    folder = make_folder(arguments.out)
+    draw_corrections(weights[0], correlations[0], inspection.friction_along_circle(policies[0]), folder)
+    law = policies[0].settings.law
+    controllers: list[tuple[str, Any]] = [(law, make_controller(law, Parameters()))]
+    controllers += [(name, ResidualController(policy=place)) for name, place in zip(names, places, strict=True)]
+    rows = inspection.rendered(controllers)
+    lines = [
+        "Without friction, held still at 128 places with masses of 2 to 5 kg: correction on cylinder 2 over m g cos(theta1).",
+        "Circle of 100 mm without friction: settled RMS error on x.",
+        "",
+        f"| policy | correlation | slope | circle: {law} (mm) | with the policy (mm) |",
+        "|---|---|---|---|---|",
+    ]
+    for name, correlation, slope, (alone, helped) in zip(names, correlations, slopes, circles, strict=True):
+        lines.append(f"| {name} | {correlation:.3f} | {slope:.2f} | {alone:.2f} | {helped:.3f} |")
+    lines += [
+        "",
+        f"Stiffness test on rigs drawn at random, {rows[0]['cases']} pushes per setpoint: median (95 %).",
+        "",
+        "| setpoint (N/m) | controller | error of the stiffness (%) | hunting x (mm) | hunting y (mm) | lost |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        figures = " | ".join(
+            f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})"
+            for label in ("error_percent", "hunting_x_mm", "hunting_y_mm")
+        )
+        lines.append(f"| {row['setpoint']:g} | {row['controller']} | {figures} | {row['lost']} |")
+    text = "\n".join(lines)
+    (folder / "residual.md").write_text(text + "\n", encoding="utf-8")
+    content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
+    write_json(folder / "residual.json", content)
+    print(f"{text}\n\nwritten to {folder}/: correction.png and .svg, residual.md, residual.json")
+
+
+if __name__ == "__main__":
+    main()

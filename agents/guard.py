@@ -1,0 +1,69 @@
+"""The authority of a residual yields where the pistons oscillate.
+
+A policy has learned from many rigs; on one that is lighter, or has slower valves, than it takes it for, its correction may
+excite what it should calm. As in ``admittance-backstepping``, sustained half waves of the speed error lower the share of the
+authority that is left, for the rest of the episode.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.admittance_law import watch
+from baselines.cartesian_law import across, along
+from birthsim_env import geometry
+from birthsim_env import lanes as at
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import Array
+from birthsim_env.signals import Mask, Reference
+
+LEVEL = 0.1
+"""m/s of the speed error; smaller half waves do not count. As in ``admittance-backstepping``."""
+
+YIELDING = 0.9
+"""What each sustained half wave leaves of the authority; assumed."""
+
+LEAST = 0.2
+"""Share of the authority that is always left; assumed: the law alone oscillates less."""
+
+_ROWS = 4
+"""Rows of ``watch`` per cylinder."""
+
+
+@kernel
+def _update(joints: Array, target: Array, p: Array, period: float, memory: Array) -> None:
+    for i in range(joints.shape[1]):
+        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
+            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        error1 = -kappa * joints[2, i] - across(target[2, i], target[3, i], sine, cosine)
+        error2 = joints[3, i] - along(target[2, i], target[3, i], sine, cosine)
+        watch(memory, 0, i, error1, period, LEVEL, YIELDING, LEAST)
+        watch(memory, _ROWS, i, error2, period, LEVEL, YIELDING, LEAST)
+
+
+class Guard:
+    """``share`` (2, N) of the authority that is left along cylinders 1 and 2.
+
+    Arguments: control period, s; the rig as believed (PARAMETERS,).
+    """
+
+    def __init__(self, period: float, lane_parameters: Array) -> None:
+        self._period, self._p = period, lane_parameters
+        self._memory: Array = np.zeros((2 * _ROWS, 0))
+
+    @property
+    def share(self) -> Array:
+        """1 where nothing has oscillated, down to ``LEAST``; (2, N)."""
+        return self._memory[::_ROWS]
+
+    def reset(self, lanes: Mask) -> None:
+        """Forget the past of the lanes where ``lanes`` (N,) is True."""
+        if self._memory.shape[1] != len(lanes):
+            self._memory = np.zeros((2 * _ROWS, len(lanes)))
+        self._memory[:, lanes] = 0.0
+        self._memory[::_ROWS, lanes] = 1.0
+
+    def update(self, joints: Array, reference: Reference) -> None:
+        """Take y1, y2, v1, v2 (4, N) of one control period."""
+        _update(joints, reference.rows, self._p, self._period, self._memory)

@@ -1,0 +1,69 @@
+"""Learning curves of several training seeds: interquartile mean and 95 % bootstrap interval over the seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from baselines.figures import ACCENT, DARK, MIDDLE, STYLE, save
+from baselines.statistics import crossed_interval, interquartile_mean
+from birthsim_env.lanes import Array
+
+SHOWN = (
+    ("pooled_mm", "pooled settled error (mm)"),
+    ("tail_mm", "95 % of the episodes (mm)"),
+    ("stiffness_error_percent", "error along the push (%)"),
+    ("hunting_mm", "hunting (mm)"),
+    ("saturation_percent", "time at a valve's limit (%)"),
+)
+"""Figures of a validation, where they say something."""
+
+
+def over_seeds(trainings: Sequence[dict[str, Any]], figure: str) -> tuple[Array, Array]:
+    """Steps (T,), and interquartile mean and both ends of its 95 % interval (3, T) of ``figure`` over the trainings.
+
+    Up to where the shortest of them ends. NaN where an interval's figure says nothing.
+    """
+    length = min(len(training["curve"]) for training in trainings)
+    steps = np.array([point["steps"] for point in trainings[0]["curve"][:length]], dtype=np.float64)
+    values = np.array(
+        [[_number(point[figure]) for point in training["curve"][:length]] for training in trainings], dtype=np.float64
+    )
+    rows = [
+        (interquartile_mean(column), *crossed_interval(interquartile_mean, column[:, None])) if np.isfinite(column).all()
+        else (np.nan,) * 3
+        for column in values.T
+    ]  # fmt: skip
+    return steps, np.array(rows).T
+
+
+def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
+    """Draw ``learning_curves`` (PNG and SVG) with the law as a line; nothing without trainings."""
+    if not trainings:
+        return []
+    said = [(key, label) for key, label in SHOWN if np.isfinite(over_seeds(trainings, key)[1]).any()]
+    with plt.rc_context(STYLE):
+        figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 2.8), layout="constrained", squeeze=False)
+        for axes, (key, label) in zip(panels[0], said, strict=True):
+            steps, (middle, low, high) = over_seeds(trainings, key)
+            axes.fill_between(1e-6 * steps, low, high, color=MIDDLE, alpha=0.25, lw=0)
+            for training in trainings:
+                own = [_number(point[key]) for point in training["curve"]]
+                axes.plot([1e-6 * point["steps"] for point in training["curve"]], own, color=ACCENT, lw=0.5, alpha=0.7)
+            axes.plot(1e-6 * steps, middle, color=MIDDLE, lw=1.4, label="residual (IQM, 95 %)")
+            law = [_number(training["law"][key]) for training in trainings]
+            axes.axhline(interquartile_mean(law), color=DARK, ls="--", lw=1.0, label="law")
+            axes.set(xlabel="policy steps (million)", ylabel=label)
+            axes.set_ylim(bottom=0)
+        panels[0][0].legend(loc="center right")
+        panels[0][0].set_title(f"{trainings[0]['settings']['environment']}, {len(trainings)} seeds", loc="left", fontsize=8)
+        return save(figure, folder, "learning_curves")
+
+
+def _number(value: float | None) -> float:
+    """JSON has null for what is not finite."""
+    return float("nan") if value is None else float(value)

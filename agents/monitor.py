@@ -1,0 +1,123 @@
+"""Watches a training: validation on held-out worlds against the law, the best policy, checkpoints, TensorBoard, progress."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+from tqdm import tqdm
+
+from agents.algorithms import network_of
+from agents.checkpoint import save_checkpoint
+from agents.configuration import TrainingSettings
+from agents.policy_files import Policy, save_policy
+from agents.sb3_adapter import SB3VecEnv
+from agents.settings import ResidualSettings
+from agents.validation import Score, validate
+from birthsim_env.parameters import Parameters
+
+LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
+"""Figures of a validation that TensorBoard shows."""
+
+
+class Monitor(BaseCallback):
+    """Validates at equal intervals; after each validation the best policy and a checkpoint are on disk.
+
+    ``env`` has the validation worlds, ``stepped`` is what the training steps; ``past`` is what an earlier monitor of the same
+    training had written to its checkpoint. A curve's ``environment_share`` is that of the training's time, without validation.
+    """
+
+    def __init__(
+        self, settings: TrainingSettings, residual: ResidualSettings, env: Any, folder: Path, past: dict[str, Any] | None,
+        stepped: SB3VecEnv, position: int = 0,
+    ) -> None:  # fmt: skip
+        super().__init__()
+        self._settings, self._residual, self._env, self._folder = settings, residual, env, folder
+        self._every = settings.steps / settings.validations
+        self._stepped, self._validating = stepped, 0.0
+        self._started = time.perf_counter()
+        if past is None:
+            zero = np.zeros((env.num_envs, residual.size), dtype=np.float32)
+            law: dict[str, float] = validate(env, lambda _: zero).to_dict()
+            past = {"law": law, "policy": None, "curve": []}
+            self._validating = time.perf_counter() - self._started
+        self._past = past
+        curve = past["curve"]
+        self._before = curve[-1]["seconds"] if curve else 0.0
+        # A checkpoint is written right after a validation, which need not be repeated.
+        self._due = curve[-1]["steps"] + self._every if curve else 0.0
+        self._bar = tqdm(
+            total=settings.steps, initial=curve[-1]["steps"] if curve else 0, desc=f"seed {settings.seed}", unit=" steps",
+            unit_scale=True, position=position,
+        )  # fmt: skip
+
+    def _on_rollout_start(self) -> None:
+        # After an update and not inside a rollout: every validated policy is one that the algorithm has finished with.
+        if self.num_timesteps >= self._due:
+            self._due = min(max(self._due, 0.0) + self._every, float(self._settings.steps))
+            self._check()
+
+    def _on_rollout_end(self) -> None:
+        self._bar.update(min(self.num_timesteps, self._settings.steps) - self._bar.n)
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_training_end(self) -> None:
+        self._check()
+
+    def _check(self) -> None:
+        began = time.perf_counter()
+        network = network_of(self.model, self.training_env)  # type: ignore[arg-type]
+        score = validate(self._env, network.actions)
+        figures, law = score.to_dict(), self._past["law"]
+        self._validating += time.perf_counter() - began
+        seconds = self._before + time.perf_counter() - self._started
+        share = self._stepped.seconds / max(time.perf_counter() - self._started - self._validating, 1e-9)
+        self._past["curve"].append(
+            {"steps": self.num_timesteps, "seconds": seconds, "environment_share": share, **figures}
+        )  # fmt: skip
+        for name in LOGGED:
+            if np.isfinite(figures[name]):
+                self.logger.record(f"validation/{name}", figures[name])
+                self.logger.record(f"validation/{name}_law", law[name])
+        better = 100 * (1 - figures["pooled_mm"] / law["pooled_mm"])
+        self.logger.record("validation/better_than_law_percent", better)
+        self.logger.dump(self.num_timesteps)
+        self._bar.set_postfix_str(f"error {score.pooled:.2f} mm, law {law['pooled_mm']:.2f} mm, {better:+.0f} % better")
+        best = self._past["policy"]
+        if best is None or _merit(figures) < _merit(best):
+            self._past["policy"] = figures
+            self._keep(network, score)
+        save_checkpoint(
+            self._folder, self.model, self.training_env, self.describe(), self._past  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    def _keep(self, network: Any, score: Score) -> None:
+        training = {**self._settings.to_dict(), "law": self._past["law"], "reached": score.to_dict()}
+        save_policy(Policy(network, self._settings.environment, self._residual, training), self._folder)
+
+    def describe(self) -> dict[str, Any]:
+        """The settings that a checkpoint must share."""
+        return described(self._settings, self._residual, self._env.simulation.parameters)
+
+    def close(self) -> None:
+        """Finish the progress bar."""
+        self._bar.close()
+
+    def reached(self) -> dict[str, Any]:
+        """Validation figures of the law and of the kept policy, and the learning curve."""
+        return {"settings": self.describe(), **self._past}
+
+
+def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:
+    """All settings of a training, as JSON takes them."""
+    return {**settings.to_dict(), **residual.to_dict(), "rig": rig.to_dict()}
+
+
+def _merit(figures: dict[str, float]) -> float:
+    """What is to be small: pooled error and its tail together, since the tail is what a mean hides."""
+    return figures["pooled_mm"] + figures["tail_mm"]

@@ -1,0 +1,56 @@
+"""What a residual may do, and on which law."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+NO_LAW = "none"
+
+LAWS = ("backstepping", "backstepping-weight", "backstepping-frozen", "admittance-backstepping", NO_LAW)
+"""Laws that can be told of a force, the paper's first; and none, where a policy drives the valves by itself."""
+
+VALVES = 4
+"""Length of an action without a law: the openings of all spools."""
+
+IMPEDANCES = {"fixed": 2, "variable_kp": 4, "variable": 5}
+"""Impedance mode (the vocabulary of robosuite) -> length of an action: forces; and stiffness; and damping."""
+
+
+@dataclass(frozen=True)
+class ResidualSettings:
+    """What a residual may do.
+
+    ``law`` underneath, one of ``LAWS``. ``impedance``: ``"fixed"``, an action is a force along each cylinder; with
+    ``"variable_kp"`` also the stiffness Kclx, Kcly that the law works with, with ``"variable"`` its damping besides (neither
+    of them without a law or on one that is stiff by itself). ``authority`` (N) bounds the force: 100 N, since the weight of
+    2 kg more than believed is 40 to 57 N along cylinder 1 and friction comes on top. ``time_constant`` (s) of the low-pass
+    between an action and the law: without it single lanes oscillate. ``policy_period`` (s). Raises ``ValueError`` for values
+    outside these limits.
+    """
+
+    law: str = "backstepping"
+    impedance: str = "fixed"
+    authority: float = 100.0
+    time_constant: float = 0.028
+    policy_period: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("authority", 0.0, 500.0), ("time_constant", 0.0, 1.0), ("policy_period", 0.0, 1.0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not (isinstance(value, (int, float)) and low < value <= high):
+                raise ValueError(f"{name} = {value!r}; allowed: more than {low:g}, at most {high:g}")
+        for name, allowed in (("law", LAWS), ("impedance", tuple(IMPEDANCES))):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} = {getattr(self, name)!r}; allowed: {', '.join(map(repr, allowed))}")
+        if self.impedance != "fixed" and self.law in ("admittance-backstepping", NO_LAW):
+            raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
+
+    @property
+    def size(self) -> int:
+        """Length of an action."""
+        return VALVES if self.law == NO_LAW else IMPEDANCES[self.impedance]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON takes it."""
+        return asdict(self)

@@ -1,0 +1,95 @@
+"""PPO, SAC and TQC: each begins as the law, learns, and its NumPy network does what its own ``predict`` does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import VecNormalize
+
+from agents.algorithms import make_model, network_of
+from agents.configuration import ALGORITHMS, TrainingSettings
+from agents.policy_files import Policy, load_policy, save_policy
+from agents.residual_controller import ResidualController
+from agents.sb3_adapter import SB3VecEnv
+from agents.settings import ResidualSettings
+
+CIRCLE = "BirthSIM/CircleResidual-v0"
+TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))
+VARIABLE = ResidualSettings(impedance="variable")
+
+
+def made(settings, residual=VARIABLE, **arguments):
+    """A new model, its normalised environment and the native one below it."""
+    torch.set_num_threads(1)
+    native = gymnasium.make_vec(CIRCLE, num_envs=settings.lanes, **residual.to_dict(), **arguments)
+    env = VecNormalize(SB3VecEnv(native), gamma=settings.discount)
+    return make_model(settings, env), env, native
+
+
+def observations(native, size, steps=40, seed=77):
+    """What policies see, (N, D), on the way under random actions; and things that they never see."""
+    rng = np.random.default_rng(0)
+    seen = [native.reset(seed=seed)[0]]
+    seen += [native.step(rng.uniform(-1, 1, (native.num_envs, size)).astype(np.float32))[0] for _ in range(steps)]
+    rows = np.concatenate(seen)
+    return rows, rng.normal(size=rows.shape, scale=5).astype(np.float32)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(algorithm):
+    model, env, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
+    rows, far = observations(native, 5)
+    for inputs in (rows, far):
+        np.testing.assert_array_equal(network_of(model, env).actions(inputs), 0)
+        np.testing.assert_array_equal(model.predict(env.normalize_obs(inputs), deterministic=True)[0], 0)
+    tried = model.predict(env.normalize_obs(rows), deterministic=False)[0]
+    expected = np.tanh(np.exp(-1) * np.random.default_rng(0).normal(size=100_000)).std() if algorithm != "ppo" else np.exp(-1)
+    assert tried.std() == pytest.approx(expected, rel=0.1)
+    assert abs(tried.mean()) < 0.05
+    # The layers below the last one are random: there is something to learn with.
+    assert all(weight.any() for weight, _ in network_of(model, env).layers[:-1])
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("hidden", [(16, 16), (8,), (5, 6, 7)])
+def test_the_network_taken_from_a_model_does_what_the_model_predicts(tmp_path, algorithm, hidden):
+    # Without randomisation some inputs never change: their variance is almost nothing, and rounding weighs most.
+    model, env, native = made(replace(TINY, algorithm=algorithm, hidden=hidden), randomize=hidden != (8,))
+    model.learn(600)
+    last = model.policy.action_net if algorithm == "ppo" else model.policy.actor.mu
+    with torch.no_grad():
+        # As a trained network: actions over most of [-1, 1].
+        last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
+    save_policy(Policy(network_of(model, env), CIRCLE, VARIABLE, {}), tmp_path)
+    taken = load_policy(tmp_path).network
+    assert taken.squashed == (algorithm != "ppo")
+    assert len(taken.layers) == len(hidden) + 1
+    rows, far = observations(native, 5)
+    for inputs in (rows, far):
+        expected, _ = model.predict(env.normalize_obs(inputs), deterministic=True)
+        actions = taken.actions(inputs)
+        np.testing.assert_allclose(actions, expected, rtol=0, atol=2e-6)
+        assert len(np.unique(actions.round(3), axis=0)) > 20
+    assert (np.abs(taken.actions(rows)) < 1).mean() > 0.5
+    controller = ResidualController(policy=tmp_path)
+    plain = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2)
+    plain.reset(seed=0)
+    assert controller.command(plain.measurement, plain.reference).shape == (4, 2)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_settings_reach_the_algorithm(algorithm):
+    settings = replace(TINY, algorithm=algorithm, discount=0.9, learning_rate=2e-3, seed=5)
+    model, _, _ = made(settings)
+    assert (model.gamma, model.batch_size, model.seed, str(model.device)) == (0.9, 64, 5, "cpu")
+    np.testing.assert_allclose([model.lr_schedule(left) for left in (1.0, 0.5, 0.0)], [2e-3, 1.1e-3, 2e-4])
+    if algorithm == "ppo":
+        assert (model.n_steps, model.n_epochs, model.gae_lambda) == (32, 2, 0.95)
+    else:
+        assert (model.gradient_steps, model.train_freq.frequency) == (2, 1)
+        # Random actions fill the memory for twenty steps of all lanes.
+        assert model.learning_starts == 160

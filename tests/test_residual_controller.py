@@ -1,0 +1,187 @@
+"""The residual from measurements: bit for bit what the environments do inside, in one lane and many, and what it forgets."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents
+from agents.policy_files import Policy, load_policy, save_policy
+from agents.policy_network import PolicyNetwork
+from agents.residual_controller import ResidualController, observation_size
+from agents.settings import ResidualSettings
+from baselines.backstepping import BacksteppingController
+from baselines.registry import make_controller
+from birthsim_env import Parameters
+from birthsim_env.observation import SIZE
+
+assert agents  # importing it registers the ids
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v0", "BirthSIM/ProbeResidual-v0"
+
+
+def random_network(inputs, outputs, reach=0.5, squashed=False, seed=0) -> PolicyNetwork:
+    """Two layers of random weights whose actions are about ``reach`` in size."""
+    rng = np.random.default_rng(seed)
+    layers = [
+        (rng.normal(size=(n, m), scale=1 / np.sqrt(m)).astype(np.float32), np.zeros(n, np.float32))
+        for m, n in pairwise((inputs, 12, outputs))
+    ]
+    layers[-1] = (layers[-1][0] * np.float32(reach), layers[-1][1])
+    return PolicyNetwork(rng.normal(size=inputs, scale=0.1), rng.uniform(0.5, 2, inputs), tuple(layers), squashed)
+
+
+SETTINGS = {
+    "fixed": ResidualSettings(),
+    "on an admittance": ResidualSettings("admittance-backstepping", authority=20.0),
+    "variable_kp": ResidualSettings("backstepping-frozen", "variable_kp", policy_period=0.02),
+    "variable": ResidualSettings("backstepping-weight", "variable", time_constant=0.01),
+    "no law": ResidualSettings("none"),
+}
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
+def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_path, settings, sensors):
+    # Valves that a policy drives at random soon slam the pistons into their stops: gently, then.
+    reach = 0.05 if settings.law == "none" else 0.5
+    network = random_network(observation_size(settings), settings.size, reach, squashed=settings.impedance == "variable")
+    save_policy(Policy(network, CIRCLE, settings, {}), tmp_path)
+    controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5
+    arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
+    inside = gymnasium.make_vec(CIRCLE, **arguments, **settings.to_dict())
+    outside = gymnasium.make_vec("BirthSIM/Circle-v0", policy_period=1e-3, **arguments)
+    observation, _ = inside.reset(seed=11)
+    outside.reset(seed=11)
+    for _ in range(steps):
+        actions = network.actions(observation)
+        observation, _, terminated, _, info = inside.step(actions)
+        for _ in range(round(1000 * settings.policy_period)):
+            _, _, _, _, its = outside.step(controller.command(outside.measurement, outside.reference).T)
+        np.testing.assert_array_equal(outside.simulation.plant.state, inside.simulation.plant.state)
+        np.testing.assert_array_equal(its["tracking_error"], info["tracking_error"])
+        assert not terminated.any()
+    assert np.ptp(actions, axis=0).max() > 0.1 * reach, "it says different things in different worlds"
+    # It is not the law alone that went there.
+    if settings.law != "none":
+        plain = gymnasium.make_vec("BirthSIM/Circle-v0", policy_period=1e-3, **arguments)
+        law = make_controller(settings.law, Parameters())
+        plain.reset(seed=11)
+        for _ in range(10 * steps):
+            plain.step(law.command(plain.measurement, plain.reference).T)
+        assert np.abs(plain.simulation.plant.state - inside.simulation.plant.state)[:2].max() > 1e-6
+
+
+def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
+    rig = Parameters().replace({"mechanics.mass": 4.0, "geometry.d3": 0.36})
+    settings = ResidualSettings()
+    network = random_network(observation_size(settings), 2)
+    save_policy(Policy(network, PROBE, settings, {}), tmp_path)
+    inside = gymnasium.make_vec(PROBE, num_envs=2, parameters=rig)
+    observation, _ = inside.reset(seed=1)
+    states = []
+    for believed in (rig, None):
+        outside = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=2, policy_period=1e-3, parameters=rig)
+        controller = ResidualController(believed, tmp_path)
+        outside.reset(seed=1)
+        for _ in range(200):
+            outside.step(controller.command(outside.measurement, outside.reference).T)
+        states.append(outside.simulation.plant.state)
+    for _ in range(20):
+        observation, *_ = inside.step(network.actions(observation))
+    np.testing.assert_array_equal(states[0], inside.simulation.plant.state)
+    assert not np.array_equal(*states)
+
+
+def network(bias) -> PolicyNetwork:
+    """A policy whose actions follow the tracking error, plus a constant."""
+    inputs = observation_size(ResidualSettings())
+    weight = np.zeros((2, inputs), np.float32)
+    weight[0, 1], weight[1, 0] = 0.5, -0.5
+    return PolicyNetwork(np.zeros(inputs), np.ones(inputs), ((weight, np.array(bias, np.float32)),))
+
+
+@pytest.fixture
+def steering(tmp_path):
+    """Folder of a policy that follows the tracking error and leans on cylinder 2."""
+    save_policy(Policy(network((0.0, 0.4)), CIRCLE, ResidualSettings(policy_period=0.02), {}), tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
+    env = gymnasium.make("BirthSIM/Circle-v0", policy_period=1e-3, sensors=sensors).unwrapped
+    lanes = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3, sensors=sensors)
+    one, several = ResidualController(policy=steering), ResidualController(policy=steering)
+    env.reset(seed=5)
+    lanes.reset(seed=5)
+    for _ in range(120):
+        alone, together = one.command(env.measurement, env.reference), several.command(lanes.measurement, lanes.reference)
+        assert alone.shape == (4,)
+        np.testing.assert_array_equal(alone, together[:, 0])
+        env.step(alone)
+        lanes.step(together.T)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_a_reset_forgets_the_last_episode(steering, sensors):
+    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3, sensors=sensors)
+    controller, runs = ResidualController(policy=steering), []
+    for calls in (137, 150):
+        env.reset(seed=2)
+        controller.reset()
+        runs.append([])
+        for _ in range(calls):
+            runs[-1].append(controller.command(env.measurement, env.reference))
+            env.step(runs[-1][-1].T)
+    np.testing.assert_array_equal(runs[0], runs[1][:137])
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Every observation (N, D) that a policy was asked with."""
+    seen, actions = [], PolicyNetwork.actions
+    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows: (seen.append(rows), actions(self, rows))[1])
+    return seen
+
+
+LAST = slice(SIZE, SIZE + 2)
+SMOOTH, SHARE, MET = slice(SIZE + 2, SIZE + 4), slice(SIZE + 4, SIZE + 6), slice(SIZE + 6, SIZE + 12)
+
+
+def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
+    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3)
+    controller = ResidualController(policy=steering)
+    env.reset(seed=2)
+    for _ in range(45):
+        env.step(controller.command(env.measurement, env.reference).T)
+    controller.reset(np.array([False, True, False]))
+    untold = BacksteppingController().command(env.measurement, env.reference)
+    openings = controller.command(env.measurement, env.reference)
+    np.testing.assert_array_equal(openings[:, 1], untold[:, 1])
+    assert (openings[:, [0, 2]] != untold[:, [0, 2]]).any(axis=0).all()
+    for _ in range(15):
+        env.step(controller.command(env.measurement, env.reference).T)
+    # The next question to the policy shows its last action, smoothed too: none in that lane.
+    assert len(asked) == 4
+    for part in (LAST, SMOOTH):
+        np.testing.assert_array_equal(asked[-1][1, part], 0)
+        assert (np.abs(asked[-1][[0, 2], part]).max(axis=1) > 0.05).all()
+    # What the pistons met since, it shows.
+    assert np.abs(asked[-1][1, MET]).max() > 0
+
+
+def test_the_policy_is_asked_once_per_policy_period(steering, asked):
+    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3)
+    controller = ResidualController(policy=steering)
+    env.reset(seed=0)
+    for _ in range(41):
+        env.step(controller.command(env.measurement, env.reference).T)
+    assert len(asked) == 3
+    np.testing.assert_array_equal(asked[0][:, LAST], 0)
+    np.testing.assert_array_equal(asked[0][:, SHARE], 1)
+    first = load_policy(steering).network.actions(asked[0])
+    np.testing.assert_array_equal(asked[1][:, LAST], first)
+    np.testing.assert_allclose(asked[1][:, SMOOTH], (1 - np.exp(-20 / 28)) * first, rtol=1e-6)

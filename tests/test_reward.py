@@ -1,0 +1,177 @@
+"""What a policy is paid: every term is its documented formula, worked out anew from ``info``; caps, grace, and what ends it."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_env import StiffnessSchedule, reward
+from birthsim_env.info import FIELDS
+from birthsim_env.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
+from birthsim_env.signals import REFERENCES
+
+CIRCLE, PROBE, FORCEPS, DESCENT = (f"BirthSIM/{name}-v0" for name in ("Circle", "Probe", "Forceps", "Descent"))
+TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
+COUPLED = StiffnessSchedule((0.0, 1.2), (2000.0, 3000.0), (4600.0, 4000.0), (2300.0, 2000.0), closed_loop_xy=(900.0, -1200.0))
+
+
+def springs(env, time):
+    """The stiffness matrix asked for in the only lane at ``time``, N/m."""
+    setpoints = env.simulation.stiffness.sample(np.array([time]))[:, 0]
+    return np.array([[setpoints[0], setpoints[6]], [setpoints[6], setpoints[1]]])
+
+
+@pytest.mark.parametrize(
+    ("name", "period", "arguments"),
+    [
+        (CIRCLE, 0.01, {}),
+        (CIRCLE, 0.001, {}),
+        (CIRCLE, 0.02, {"sensors": "lab", "randomize": True}),
+        (FORCEPS, 0.01, {"randomize": True}),
+        (DESCENT, 0.01, {}),
+        (PROBE, 0.01, {"stiffness": COUPLED}),
+    ],
+)
+def test_every_term_is_its_formula_of_info(name, period, arguments):
+    env = gymnasium.make(name, policy_period=period, **arguments).unwrapped
+    steps, share = round(2.5 / period), period / 0.01
+    _, before = env.reset(seed=1)
+    assert set(before) == set(FIELDS), "nothing has been earned yet"
+    last, paid, ramped = np.zeros(4), 0, 0.0
+    for action in np.random.default_rng(0).uniform(-0.2, 0.2, (steps, 4)).astype(np.float32):
+        _, earned, _, _, info = env.step(action)
+        action, time = action.astype(float), info["time"]
+        compliance = np.linalg.inv(springs(env, time))
+        target = env.simulation.trajectory.sample(np.array([time]))[:, 0]
+        error = info["position"] - target[:2] - compliance @ info["user_force"]
+        # The compliant target moves with the target, and by what the hand has changed during the step.
+        yielding = compliance @ (info["user_force"] - before["user_force"]) / period
+        relative = info["velocity"] - target[2:4] - yielding
+        settled = share if info["since_jump"] >= 0.3 else 0.0
+        expected = {
+            "reward_tracking": -settled * min(np.abs(error).sum() / 2e-3, 5.0),
+            "reward_hunting": -settled * 0.1 * min(np.abs(relative).sum() / 0.02, 5.0),
+            "reward_effort": -share * 0.01 * (action @ action),
+            "reward_action_change": -0.05 * np.abs(action - last).sum(),
+            "reward_failure": 0.0,
+        }
+        for term, value in expected.items():
+            assert info[term] == pytest.approx(value, rel=1e-7, abs=1e-9), term
+        assert earned == pytest.approx(sum(expected.values()), rel=1e-7)
+        last, before, paid = action, info, paid + (settled > 0)
+        ramped = max(ramped, np.abs(yielding).max() if settled else 0.0)
+    assert paid > 0.3 * steps
+    # Ramps of pulls and contractions are no jumps: what they move the compliant target by is felt where it counts.
+    if name in (FORCEPS, DESCENT):
+        assert ramped > 2e-3
+
+
+def test_a_push_is_free_while_it_jumps_and_for_the_grace_after_it():
+    env = gymnasium.make(CIRCLE).unwrapped
+    env.reset(seed=1)
+    infos = [env.step(np.zeros(4))[4] for _ in range(200)]
+    free = [info["time"] for info in infos if info["reward_tracking"] == info["reward_hunting"] == 0]
+    # A push of 300 N/s runs from 1.0 to 1.1 s: free until 1.4 s, and for the first 0.3 s of the episode.
+    assert len(free) == pytest.approx(30 + 40, abs=3)
+    assert all(time < 0.301 or 0.999 < time < 1.401 for time in free)
+
+
+def assess(lanes=1, policy_period=0.01, **changes):
+    """Terms by name, (N,), and failures of healthy lanes at rest on their target, apart from ``changes``."""
+    state = np.zeros((STATES, lanes))
+    state[list(PRESSURES)], state[list(TEMPERATURES)] = 3e5, 293.0
+    rows = np.zeros((REFERENCES, lanes))
+    rows[0], rows[8:10] = 0.5, 2000.0
+    given = {
+        "state": state,
+        "motion": rows[:4].copy(),
+        "reference": rows,
+        "force": np.zeros((2, lanes)),
+        "last_force": np.zeros((2, lanes)),
+        "since_jump": np.ones(lanes),
+        "action": np.zeros((2, lanes)),
+        "last_action": np.zeros((2, lanes)),
+        "impacts": np.zeros((2, lanes)),
+        "impact_speed": 0.1,
+        "policy_period": policy_period,
+    }
+    for name, change in changes.items():
+        given[name] = change(given[name]) if callable(change) else np.asarray(change, dtype=float)
+    terms, failed = reward.assess(**given)
+    return dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
+
+
+def test_the_terms_are_named_in_order():
+    assert reward.REWARD_TERMS == TERMS
+    terms, failed = assess(lanes=3)
+    assert not any(term.any() for term in terms.values())
+    assert not failed.any()
+
+
+@pytest.mark.parametrize("period", [0.001, 0.01, 0.05])
+def test_giving_way_with_a_growing_push_is_calm_and_standing_still_is_not(period):
+    """At 2000 N/m a push that grows by 100 N/s moves the compliant target at 50 mm/s."""
+    now = np.array([[20.0, 20.0], [0.0, 0.0]])
+    before = now - np.array([[100.0], [0.0]]) * period
+    motion = np.array([[0.51, 0.51], [0.0, 0.0], [0.05, 0.0], [0.0, 0.0]])
+    terms, _ = assess(2, period, force=now, last_force=before, motion=motion)
+    np.testing.assert_allclose(terms["reward_tracking"], 0, atol=1e-12)
+    np.testing.assert_allclose(terms["reward_hunting"], [0, -0.1 * 0.05 / 0.02 * period / 0.01], rtol=1e-9, atol=1e-12)
+
+
+def test_costs_are_capped_and_scale_with_the_time_that_a_step_takes():
+    motion = np.array([[0.5 + 9e-3, 0.5 + 11e-3], [0.0, 0.5], [0.09, 0.09], [0.0, 0.09]])
+    for period in (0.01, 0.02):
+        terms, _ = assess(2, period, motion=motion, action=[[0.5, 1], [0, -1]], last_action=[[0, 1], [0, 1]])
+        np.testing.assert_allclose(terms["reward_tracking"], np.array([-4.5, -5]) * period / 0.01)
+        np.testing.assert_allclose(terms["reward_hunting"], np.array([-0.45, -0.5]) * period / 0.01)
+        np.testing.assert_allclose(terms["reward_effort"], np.array([-0.0025, -0.02]) * period / 0.01)
+        # A change is an event: it costs the same however long the step is.
+        np.testing.assert_allclose(terms["reward_action_change"], [-0.025, -0.1])
+
+
+def test_after_a_jump_only_tracking_and_hunting_are_free():
+    motion = np.repeat([[0.52], [0.0], [0.1], [0.0]], 3, axis=1)
+    terms, _ = assess(3, motion=motion, since_jump=[0.0, 0.299, 0.3], action=np.ones((2, 3)))
+    np.testing.assert_allclose(terms["reward_tracking"], [0, 0, -5])
+    np.testing.assert_allclose(terms["reward_hunting"], [0, 0, -0.5])
+    np.testing.assert_allclose(terms["reward_effort"], -0.02)
+    np.testing.assert_allclose(terms["reward_action_change"], -0.1)
+
+
+def changed(row, value):
+    """A change of one number of the state in the middle one of three lanes."""
+
+    def change(state):
+        state[row, 1] = value
+        return state
+
+    return change
+
+
+@pytest.mark.parametrize("row", PRESSURES)
+@pytest.mark.parametrize(("value", "fails"), [(0.19e5, True), (0.21e5, False), (19.9e5, False), (20.1e5, True), (np.nan, True)])
+def test_a_chamber_out_of_its_range_of_pressures_costs_250(row, value, fails):
+    terms, failed = assess(3, state=changed(row, value))
+    np.testing.assert_array_equal(failed, [False, fails, False])
+    np.testing.assert_array_equal(terms["reward_failure"], np.where(failed, -250.0, 0.0))
+
+
+@pytest.mark.parametrize("row", TEMPERATURES)
+@pytest.mark.parametrize(("value", "fails"), [(99.0, True), (101.0, False), (999.0, False), (1001.0, True), (np.nan, True)])
+def test_a_chamber_out_of_its_range_of_temperatures_fails(row, value, fails):
+    np.testing.assert_array_equal(assess(3, state=changed(row, value))[1], [False, fails, False])
+
+
+@pytest.mark.parametrize("row", [Y1, Y2])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_piston_that_is_nowhere_fails(row, value):
+    np.testing.assert_array_equal(assess(3, state=changed(row, value))[1], [False, True, False])
+
+
+def test_a_fast_collision_of_either_piston_fails():
+    impacts = np.array([[0.0, 0.101, 0.0, 0.1], [0.0, 0.0, 0.2, 0.1]])
+    terms, failed = assess(4, impacts=impacts)
+    np.testing.assert_array_equal(failed, [False, True, True, False])
+    np.testing.assert_array_equal(terms["reward_failure"], [0, -250, -250, 0])
