@@ -66,12 +66,13 @@ policies: $(READY)
 
 learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
-	for name in $(filter-out circle,$(SCENARIOS)); do scenario=$$(echo $$name | sed 's/./\u&/'); \
-	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v0 --controller residual --policy $$name --episodes 128 --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
-	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 128 --seed 20000 --out $(OUT)/learned/circle_pure
-	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 128 --seed 20000 --out $(OUT)/learned/circle_lab
+	for name in probe forceps dystocia descent; do scenario=$$(echo $$name | sed 's/./\u&/'); \
+	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v0 --controller residual --policy $$name \
+	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
+	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
+	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
-	$(BIN)/birthsim-explain --policy circle --out $(OUT)/learned/explain
+	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done >docs/learned.md
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
