@@ -107,7 +107,7 @@ def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     assert [point["steps"] for point in curve] == [0, *(rollouts * np.ceil(np.array([15e3, 30e3]) / rollouts)).astype(int)]
     assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(curve))
     assert all(0 < point["environment_share"] < 1 for point in curve[1:])
-    assert reached["settings"] == {**SMALL.to_dict(), **RESIDUAL.to_dict()}
+    assert reached["settings"] == {**SMALL.to_dict(), **RESIDUAL.to_dict(), "rig": Parameters().to_dict()}
 
 
 def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tmp_path, monkeypatch, short_probe):
