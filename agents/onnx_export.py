@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from agents.policy_files import Policy
 from agents.policy_network import CLIP, EPSILON, PolicyNetwork
-from agents.residual_law import action_names, memory_names
-from agents.settings import ResidualSettings
-from birthsim_env.observation import ENTRIES, LIMIT
+from agents.residual_law import action_names, observation_names
+from birthsim_env.observation import LIMIT
 
 FORMAT = "birthsim-residual-onnx-1"
 
@@ -112,12 +111,6 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     partial.write_bytes(content)
     partial.replace(path)
     return exported
-
-
-def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
-    """What each entry of an observation says, as in the environments' ``observation_names``."""
-    last = (f"last action: {name}" for name in action_names(settings))
-    return (*map(str, ENTRIES), *last, *memory_names(settings))
 
 
 def _traced(module: PolicyModule, inputs: int) -> Any:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.policy_files import load_policy
-from agents.residual_law import ResidualLaw, memory_names
+from agents.residual_law import ResidualLaw, observation_names
 from agents.seeds import best_policy
 from agents.settings import ResidualSettings
 from birthsim_env import observation
@@ -19,7 +19,7 @@ from birthsim_env.signals import Mask, Measurement, Reference, one_lane
 
 def observation_size(settings: ResidualSettings) -> int:
     """Length of what a policy with these settings sees."""
-    return observation.SIZE + settings.size + len(memory_names(settings))
+    return len(observation_names(settings))
 
 
 class ResidualController:

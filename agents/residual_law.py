@@ -18,7 +18,7 @@ from agents.guard import Guard
 from agents.settings import NO_LAW, ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.observation import LIMIT
+from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.signals import Mask, Measurement, Reference
@@ -63,8 +63,17 @@ def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
     return (*smooth, *(f"share of the authority on cylinder {i}, 1" for i in (1, 2)), *MET)
 
 
+def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
+    """What each entry of an observation says, as in the environments' ``observation_names``."""
+    last = (f"last action: {name}" for name in action_names(settings))
+    return (*map(str, ENTRIES), *last, *memory_names(settings))
+
+
 def stiffened(reference: Reference, force: Array, powers: Array) -> Reference:
-    """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'."""
+    """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
+
+    ``force`` (2, N), N, is the hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
+    """
     rows = reference.rows.copy()
     asked = reference.stiffness
     rows[8:10] = np.where(powers == 0, asked, np.minimum(asked * STIFFENING**powers, np.maximum(asked, STIFFEST)))

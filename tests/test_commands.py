@@ -429,11 +429,6 @@ BAD = [
         "controller file 'nowhere.py' does not exist; allowed: path/to/file.py:Class",
     ),
     ("evaluate", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a class with command() and reset()"),
-    (
-        "evaluate",
-        ("--controller", "residual"),
-        "--controller residual needs --policy, a folder that birthsim-train wrote",
-    ),
     ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that"),
     ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim-train wrote"),
     ("evaluate", ("--controller", "residual", "--policy", "{damaged}"), "policy.safetensors is not the file that policy.json"),

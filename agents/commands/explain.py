@@ -34,6 +34,7 @@ def _explain(arguments: argparse.Namespace) -> None:
         from agents.policy_files import load_policy
         from agents.residual_controller import ResidualController
         from agents.seeds import policy_folders
+        from agents.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     from baselines.registry import make_controller
@@ -41,6 +42,8 @@ def _explain(arguments: argparse.Namespace) -> None:
 
     places = policy_folders(arguments.policy)
     policies = [load_policy(place) for place in places]
+    if any(policy.settings.law == NO_LAW for policy in policies):
+        raise ValueError(f"--policy {arguments.policy!r} drives the valves by itself; allowed: one that corrects a law")
     names = [place.name for place in places]
     weights = [inspection.weight_over_workspace(policy) for policy in policies]
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]

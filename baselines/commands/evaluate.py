@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument(
         "--policy",
         help="for the controller 'residual': a folder that birthsim-train wrote, of one training seed or of several, or the "
-        "name of what comes with the package, such as circle; not with --all",
+        "name of what comes with the package, such as circle (default: that of the scenario); not with --all",
     )
     parser.add_argument("--episodes", type=whole, default=32, help="per controller, with --all per cell (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
@@ -74,17 +74,18 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
-        known = ", ".join(
+        allowed = ", ".join(
             sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
         )
-        raise ValueError(f"--env {arguments.env!r}; allowed: {known}")
+        raise ValueError(f"--env {arguments.env!r}; allowed: {allowed}")
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
-        raise ValueError("--controller residual needs --policy, a folder that birthsim-train wrote")
+        arguments.policy = arguments.env.removeprefix("BirthSIM/").removesuffix("-v0").lower()
     if arguments.policy is not None:
         names = ["backstepping", "residual"] if names == ["residual"] else list(dict.fromkeys([*names, "residual"]))
     policies = _policies(arguments.policy)
     controllers = [(name, make_controller(name, rig)) for name in names if name != "residual"]
+    known = len(controllers)
     for place in policies:
         name = "residual" if len(policies) == 1 else f"residual {place.name}"
         controllers.append((name, make_controller("residual", rig, policy=place)))
@@ -105,16 +106,17 @@ def _evaluate(arguments: argparse.Namespace) -> None:
 
     caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
     caption += f"randomised: {arguments.randomize}"
-    classical = [one for one in evaluations if not one.controller.startswith("residual")]
-    learned = evaluations[len(classical) :]
+    classical, learned = evaluations[:known], evaluations[known:]
+    # A seed that was interrupted is kept, but the table over seeds compares the same episodes.
+    complete = [one for one in learned if len(one.seeds) == arguments.episodes]
     text, pictures = table(evaluations), "error_over_time"
-    if len(learned) > 1:
+    if len(complete) > 1:
         from agents.learning_curves import draw_learning_curves
         from agents.seeds import learning_curves, merged, seed_table
 
-        together = merged(learned, f"residual, {len(learned)} seeds")
+        together = merged(complete, f"residual, {len(complete)} seeds")
         evaluations = [*classical, together]
-        text = "\n\n".join([table(evaluations), *(seed_table(one, learned) for one in classical)])
+        text = "\n\n".join([table(evaluations), *(seed_table(one, complete) for one in classical)])
         pictures += ", learning_curves"
         draw_learning_curves(learning_curves(policies), folder)
     (folder / "evaluation.md").write_text(f"{caption}\n\n{text}\n", encoding="utf-8")

@@ -1,0 +1,118 @@
+"""Several training seeds: interquartile means, intervals, the table, the shipped policies, the evaluation of all of them."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from agents.inspection import friction_along_circle, weight_over_workspace
+from agents.learning_curves import over_seeds
+from agents.policy_files import load_policy
+from agents.residual_controller import observation_size
+from agents.seeds import best_policy, merged, policy_folders, pooled, seed_table, shipped_names
+from baselines.commands import evaluate as command
+from baselines.evaluation import Evaluation
+from baselines.metrics import UNITS
+from baselines.statistics import crossed_interval, interquartile_mean
+
+
+def evaluation(name, error, lost=(), demand=()):
+    one = Evaluation(name, seeds=list(range(len(error))), cost=1.0)
+    one.lost = [k in lost for k in range(len(error))]
+    one.demand = [1.2 if k in demand else 0.5 for k in range(len(error))]
+    for metric in UNITS:
+        one.metrics[metric] = [float(value) for value in error]
+    return one
+
+
+@pytest.mark.parametrize("size", [4, 20, 256])
+def test_the_interquartile_mean_is_scipys_trimmed_mean(size):
+    values = np.random.default_rng(size).gamma(2, size=size)
+    assert interquartile_mean(values) == pytest.approx(stats.trim_mean(values, 0.25), rel=1e-12)
+
+
+def test_values_at_the_edge_of_the_middle_half_count_by_their_share():
+    # Of five the middle half is 2.5 wide: three quarters of the second, the third, three quarters of the fourth.
+    assert interquartile_mean([1.0, 2.0, 4.0, 5.0, 100.0]) == pytest.approx((0.75 * 2 + 4 + 0.75 * 5) / 2.5)
+    assert interquartile_mean([1.0, 2.0, 3.0, np.inf]) == 2.5
+    assert interquartile_mean([1.0, np.inf, np.inf, np.inf]) == np.inf
+    assert np.isnan(interquartile_mean([np.nan]))
+
+
+def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
+    rng = np.random.default_rng(0)
+    level = np.repeat([[1.0], [2.0], [3.0], [4.0]], 100, axis=1) + 0.01 * rng.normal(size=(4, 100))
+    low, high = crossed_interval(lambda values: float(values.mean()), level)
+    assert 1.0 < low < 1.7
+    assert 3.3 < high < 4.0
+    # One seed: what is left is the episodes, as the normal theory has it.
+    one = rng.normal(size=(1, 400))
+    low, high = crossed_interval(lambda values: float(values.mean()), one)
+    np.testing.assert_allclose([low, high], one.mean() + np.array([-1, 1]) * 1.96 * one.std() / 20, atol=0.02)
+
+
+def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
+    law = evaluation("law", [2.0, 2.0, 2.0, 50.0], demand=(3,))
+    residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], demand=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
+    text = seed_table(law, residuals)
+    assert "3 of 4 episodes are within the rig's strength; 2 training seeds" in text
+    assert f"Pooled error of each seed: 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} mm. Lost: 0 by law, 0, 1 by the seeds" in text
+    assert "| settled_rms | mm | median | 2 | 1 |" in text
+    assert "| settled_rms | mm | max | 2 | lost |" in text
+    assert pooled(np.array([3.0, 4.0])) == pytest.approx(np.sqrt(12.5))
+    assert merged(residuals, "both").lost == [False] * 6 + [True, False]
+
+
+def test_a_learning_curve_over_seeds_ends_with_the_shortest():
+    trainings = [{"curve": [{"steps": 10 * t, "x": level - t} for t in range(4 - k)]} for k, level in enumerate((8.0, 9.0))]
+    steps, (middle, low, high) = over_seeds(trainings, "x")
+    np.testing.assert_array_equal(steps, [0, 10, 20])
+    np.testing.assert_allclose(middle, [8.5, 7.5, 6.5])
+    np.testing.assert_allclose([low, high], [[8, 7, 6], [9, 8, 7]])
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_shipped_policies_load_fit_and_are_small(name):
+    places = policy_folders(name)
+    assert [place.name for place in places] == [f"seed_{k}" for k in range(len(places))]
+    for place in places:
+        policy = load_policy(place)
+        assert policy.network.inputs == observation_size(policy.settings)
+        assert sum(path.stat().st_size for path in place.iterdir()) < 60_000
+        training = json.loads((place / "training.json").read_text(encoding="utf-8"))
+        assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]
+    reached = [load_policy(place).training["reached"]["pooled_mm"] for place in places]
+    assert best_policy(name) == places[int(np.argmin(reached))]
+
+
+def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction():
+    policy = load_policy(best_policy("circle"))
+    assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
+    unknown, *halves = friction_along_circle(policy)
+    for half in halves:
+        # Newton for newton: the slope, whatever else the correction holds.
+        assert 0.7 < np.polyfit(unknown, half, 1)[0] < 1.3
+
+
+def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed_is_kept(tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def stopped(env, controller, name, episodes, seed, **setting):
+        asked.append(name)
+        made = evaluation(name, np.ones(episodes if name != "residual seed_3" else 1))
+        made.traces = [np.ones((3, len(made.seeds), 2))]
+        return made
+
+    monkeypatch.setattr(command, "evaluate", stopped)
+    arguments = ("--env", "BirthSIM/Probe-v0", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
+    command.main()
+    assert asked == ["backstepping", *(f"residual seed_{k}" for k in range(4))]
+    assert "; 3 training seeds" in capsys.readouterr().out
+    content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
+    assert content["arguments"]["policy"] == "probe"
+    assert [len(result["seeds"]) for result in content["results"]] == [4, 4, 4, 4, 1]
