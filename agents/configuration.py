@@ -33,12 +33,12 @@ class TrainingSettings:
     sensors: str = "ideal"
     randomize: bool | str = True
     lanes: int = 128
-    rollout: int = 64
-    batch: int = 2048
+    rollout: int = 16
+    batch: int = 1024
     epochs: int = 2
     gradient_steps: int = 4
     learning_rate: float = 1e-3
-    discount: float = 0.98
+    discount: float = 0.96
     gae_lambda: float = 0.95
     log_std: float = -1.5
     hidden: tuple[int, ...] = (64, 64)

@@ -2,7 +2,7 @@
 
 A policy has learned from many rigs; on one that is lighter, or has slower valves, than it takes it for, its correction may
 excite what it should calm. As in ``admittance-backstepping``, sustained half waves of the speed error lower the share of the
-authority that is left, for the rest of the episode.
+authority that is left, for the rest of the episode. One that follows a jump of the hand is large after none, and costs nothing.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def _update(joints: Array, target: Array, p: Array, period: float, memory: Array
         )
         error1 = -kappa * joints[2, i] - across(target[2, i], target[3, i], sine, cosine)
         error2 = joints[3, i] - along(target[2, i], target[3, i], sine, cosine)
-        watch(memory, 0, i, error1, period, LEVEL, YIELDING, LEAST)
-        watch(memory, _ROWS, i, error2, period, LEVEL, YIELDING, LEAST)
+        watch(memory, 0, i, error1, period, LEVEL, LEVEL, YIELDING, LEAST)
+        watch(memory, _ROWS, i, error2, period, LEVEL, LEVEL, YIELDING, LEAST)
 
 
 class Guard:

@@ -70,8 +70,10 @@ def test_what_decays_is_slow_small_or_goes_one_way_costs_nothing(cylinder: int) 
         wave(0.95 * LEVEL),
         wave(2 * LEVEL) + 2.5 * LEVEL,
         np.where(TIMES < 0.7, 5 * LEVEL, -5 * LEVEL),
+        # A jump of the hand or of a setpoint amid ripple: one large half wave between small ones.
+        np.where(abs(TIMES - 0.725) < 0.025, 20.0, 1.0) * wave(0.5 * LEVEL),
     ]
-    np.testing.assert_array_equal(watched(new(5), shaken(harmless, cylinder)), 1.0)
+    np.testing.assert_array_equal(watched(new(6), shaken(harmless, cylinder)), 1.0)
 
 
 def test_an_oscillation_that_the_target_asks_for_costs_nothing() -> None:
