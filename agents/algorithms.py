@@ -10,7 +10,9 @@ import torch
 from numpy.typing import NDArray
 from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from agents.configuration import TrainingSettings
 from agents.policy_network import PolicyNetwork
@@ -19,8 +21,26 @@ BUFFER = 300_000
 """Steps that SAC and TQC remember."""
 
 
+AVERAGED = 0.05
+"""Share of a training over which its policies are averaged."""
+
+
 def make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str | None = None) -> Any:
-    """A model of ``settings.algorithm`` whose mean action is zero everywhere."""
+    """A model of ``settings.algorithm`` whose mean action is zero everywhere.
+
+    Its ``average`` is the exponential average of its policies over the last ``AVERAGED`` of the steps, as far as
+    ``average.update_parameters(policy)`` is called after every update: late in a training an update moves a policy by more than
+    is left to be learned, and what they have in common is better than each.
+    """
+    model = _make_model(settings, env, tensorboard)
+    between = settings.lanes * (settings.rollout if settings.algorithm == "ppo" else 1)
+    decay = max(0.0, 1.0 - between / (AVERAGED * settings.steps))
+    averaging: Any = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
+    model.average = AveragedModel(model.policy, multi_avg_fn=averaging)
+    return model
+
+
+def _make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str | None) -> Any:
     hidden = list(settings.hidden)
     shared: dict[str, Any] = {
         "seed": settings.seed,
@@ -49,18 +69,17 @@ def make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str |
     return model
 
 
-def network_of(model: Any, env: VecNormalize) -> PolicyNetwork:
-    """The deterministic part of a policy with its normalisation, as plain arrays."""
+def network_of(policy: Any, env: VecNormalize) -> PolicyNetwork:
+    """The deterministic part of a model's policy, of whichever algorithm, with its normalisation, as plain arrays."""
 
     def array(tensor: Any) -> NDArray[np.float32]:
-        # A copy: the model goes on training in its own memory.
+        # A copy: the policy goes on training in its own memory.
         return np.array(tensor.detach().cpu().numpy(), dtype=np.float32, order="C")
 
-    if isinstance(model, PPO):
-        hidden: Any = model.policy.mlp_extractor
-        inner, last, squashed = hidden.policy_net, model.policy.action_net, False
+    if isinstance(policy, ActorCriticPolicy):
+        inner, last, squashed = policy.mlp_extractor.policy_net, policy.action_net, False
     else:
-        inner, last, squashed = model.policy.actor.latent_pi, model.policy.actor.mu, True
+        inner, last, squashed = policy.actor.latent_pi, policy.actor.mu, True
     linear = [layer for layer in inner if isinstance(layer, torch.nn.Linear)]
     layers = tuple((array(layer.weight), array(layer.bias)) for layer in [*linear, last])
     statistics: Any = env.obs_rms

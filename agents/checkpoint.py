@@ -17,9 +17,11 @@ NAME = "checkpoint.pt"
 
 
 def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any], past: dict[str, Any]) -> None:
-    """Write the model, its normalisation, PyTorch's random state, the training's settings and its ``past``, which is JSON."""
+    """Write the model, the average of its policies, its normalisation, PyTorch's random state, the training's settings and its
+    ``past``, which is JSON."""
     content = {
         "parameters": model.get_parameters(),
+        "average": model.average.state_dict(),
         "entropy": _entropy(model),
         "steps": int(model.num_timesteps),
         "updates": int(model._n_updates),
@@ -56,6 +58,7 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
     try:
         past: dict[str, Any] = json.loads(content["past"])
         model.set_parameters(content["parameters"], exact_match=True, device="cpu")
+        model.average.load_state_dict(content["average"])
         if content["entropy"] is not None:
             with torch.no_grad():
                 model.log_ent_coef.copy_(content["entropy"])

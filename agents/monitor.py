@@ -24,7 +24,7 @@ LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "satu
 
 
 class Monitor(BaseCallback):
-    """Validates at equal intervals; after each validation the best policy and a checkpoint are on disk.
+    """Averages the policies and validates the average at equal intervals; then the best one and a checkpoint are on disk.
 
     ``env`` has the validation worlds, ``stepped`` is what the training steps; ``past`` is what an earlier monitor of the same
     training had written to its checkpoint. A curve's ``environment_share`` is that of the training's time, without validation.
@@ -56,6 +56,7 @@ class Monitor(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         # After an update and not inside a rollout: every validated policy is one that the algorithm has finished with.
+        self.model.average.update_parameters(self.model.policy)  # type: ignore[attr-defined]
         if self.num_timesteps >= self._due:
             self._due = min(max(self._due, 0.0) + self._every, float(self._settings.steps))
             self._check()
@@ -67,11 +68,13 @@ class Monitor(BaseCallback):
         return True
 
     def _on_training_end(self) -> None:
+        self.model.average.update_parameters(self.model.policy)  # type: ignore[attr-defined]
         self._check()
 
     def _check(self) -> None:
         began = time.perf_counter()
-        network = network_of(self.model, self.training_env)  # type: ignore[arg-type]
+        average: Any = self.model.average  # type: ignore[attr-defined]
+        network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
         score = validate(self._env, network.actions)
         figures, law = score.to_dict(), self._past["law"]
         self._validating += time.perf_counter() - began

@@ -18,15 +18,17 @@ class SB3VecEnv(VecEnv):
 
     Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
     ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in steps of
-    the environment.
+    the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset`` says: what an on-policy
+    algorithm with rollouts shorter than an episode needs.
     """
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Any, staggered: bool = False) -> None:
         if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
             raise ValueError(f"env = {env!r}; allowed: a vector environment that resets within the same step")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.seconds = 0.0
+        self._staggered = staggered
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
         self._actions: NDArray[Any] = np.zeros((env.num_envs, *env.single_action_space.shape))
@@ -34,7 +36,7 @@ class SB3VecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Start all lanes; seeds given by ``seed`` count once."""
         seeds = list(self._seeds) if any(seed is not None for seed in self._seeds) else None
-        observation, _ = self.env.reset(seed=seeds)
+        observation, _ = self.env.reset(seed=seeds, options={"staggered": True} if self._staggered else None)
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0

@@ -41,7 +41,7 @@ def train(
     arguments = {
         "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
     }  # fmt: skip
-    env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments))
+    env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments), staggered=True)
     checks = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
     normalized = VecNormalize(env, gamma=settings.discount)
     model = make_model(settings, normalized, str(folder / "tensorboard"))

@@ -126,7 +126,10 @@ class Episodes:
 def _start(options: dict[str, Any] | None) -> Array | None:
     unknown = set(options or {}) - {"position"}
     if unknown:
-        raise ValueError(f"options has {', '.join(map(repr, sorted(unknown)))}; allowed: 'position', (x, y) in m")
+        raise ValueError(
+            f"options has {', '.join(map(repr, sorted(unknown)))}; allowed: 'position', (x, y) in m, and in vector "
+            "environments 'staggered'"
+        )
     if not options:
         return None
     try:

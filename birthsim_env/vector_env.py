@@ -72,10 +72,20 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Start new episodes in all lanes. ``options["position"]`` (x, y), m, starts the end effector there, at rest."""
+        """Start new episodes in all lanes. ``options["position"]`` (x, y), m, starts the end effector there, at rest.
+
+        Where ``options["staggered"]`` is true, lane i's first episode is truncated i/N of its steps early, and from then on the
+        lanes are spread over the episode: a learner that sees all of them at the same moment of it forgets the others.
+        """
         super().reset(seed=seed if isinstance(seed, int) else None)
+        options = dict(options or {})
+        staggered = options.pop("staggered", False)
+        if not isinstance(staggered, bool):
+            raise ValueError(f"options['staggered'] = {staggered!r}; allowed: True or False")
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(np.ones(self.num_envs, dtype=np.bool_), options)
+        if staggered:
+            self._episodes.elapsed[:] = np.arange(self.num_envs) * self.steps // self.num_envs
         return self._episodes.observation(), vector_info(self._episodes.describe())
 
     def step(self, actions: NDArray[Any]) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:

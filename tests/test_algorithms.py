@@ -44,14 +44,14 @@ def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(al
     model, env, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
     rows, far = observations(native, 5)
     for inputs in (rows, far):
-        np.testing.assert_array_equal(network_of(model, env).actions(inputs), 0)
+        np.testing.assert_array_equal(network_of(model.policy, env).actions(inputs), 0)
         np.testing.assert_array_equal(model.predict(env.normalize_obs(inputs), deterministic=True)[0], 0)
     tried = model.predict(env.normalize_obs(rows), deterministic=False)[0]
     expected = np.tanh(np.exp(-1) * np.random.default_rng(0).normal(size=100_000)).std() if algorithm != "ppo" else np.exp(-1)
     assert tried.std() == pytest.approx(expected, rel=0.1)
     assert abs(tried.mean()) < 0.05
     # The layers below the last one are random: there is something to learn with.
-    assert all(weight.any() for weight, _ in network_of(model, env).layers[:-1])
+    assert all(weight.any() for weight, _ in network_of(model.policy, env).layers[:-1])
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -64,7 +64,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(tmp_path, a
     with torch.no_grad():
         # As a trained network: actions over most of [-1, 1].
         last.weight.mul_(0.5 / last.weight.norm(dim=1).max())
-    save_policy(Policy(network_of(model, env), CIRCLE, VARIABLE, {}), tmp_path)
+    save_policy(Policy(network_of(model.policy, env), CIRCLE, VARIABLE, {}), tmp_path)
     taken = load_policy(tmp_path).network
     assert taken.squashed == (algorithm != "ppo")
     assert len(taken.layers) == len(hidden) + 1

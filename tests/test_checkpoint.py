@@ -106,10 +106,10 @@ def test_a_checkpoint_brings_model_optimizers_and_normalisation_back_to_the_bit(
         np.testing.assert_array_equal(one.var, two.var)
         assert one.count == pytest.approx(two.count, rel=1e-6)
     seen = np.random.default_rng(0).normal(size=(40, env.observation_space.shape[0])).astype(np.float32)
-    np.testing.assert_array_equal(network_of(model, env).actions(seen), network_of(other, its).actions(seen))
+    np.testing.assert_array_equal(network_of(model.policy, env).actions(seen), network_of(other.policy, its).actions(seen))
     # It is a copy: what goes on does not change what was kept.
     other.learn(64, reset_num_timesteps=False)
-    assert not np.array_equal(network_of(model, env).mean, network_of(other, its).mean)
+    assert not np.array_equal(network_of(model.policy, env).mean, network_of(other.policy, its).mean)
 
 
 @pytest.mark.parametrize("algorithm", ["sac", "tqc"])
@@ -303,7 +303,7 @@ def test_what_goes_on_begins_with_what_was_learned(tmp_path, monkeypatch, brief)
     model, env = new()
     load_checkpoint(tmp_path, model, env, monitor.described(TINY, RESIDUAL, Parameters()))
     seen = np.random.default_rng(0).normal(size=(40, env.observation_space.shape[0])).astype(np.float32)
-    np.testing.assert_array_equal(network_of(model, env).actions(seen), networks[-1].actions(seen))
+    np.testing.assert_array_equal(network_of(model.average.module, env).actions(seen), networks[-1].actions(seen))
     assert np.abs(networks[-1].actions(seen)).max() > 0
 
 

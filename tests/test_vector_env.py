@@ -216,6 +216,25 @@ def test_other_episode_lengths_are_refused(limit):
         make(max_episode_steps=limit)
 
 
+def test_staggered_lanes_end_one_after_the_other_and_live_in_the_same_worlds():
+    env, together = (make(lanes=4, duration=0.4, randomize=True) for _ in range(2))
+    first, second = env.reset(seed=5, options={"staggered": True})[0], together.reset(seed=5)[0]
+    np.testing.assert_array_equal(first, second)
+    ends = []
+    for step in range(1, 121):
+        _, _, terminated, truncated, _ = env.step(np.zeros((4, 4), dtype=np.float32))
+        assert not terminated.any()
+        ends += [(step, int(lane)) for lane in np.flatnonzero(truncated)]
+    assert env.steps == 40
+    assert ends == sorted((40 * k - 10 * lane, lane) for lane in range(4) for k in range(1, 5) if 40 * k - 10 * lane <= 120)
+
+
+@pytest.mark.parametrize("staggered", [1, "yes", None])
+def test_what_is_neither_staggered_nor_not_is_refused(staggered):
+    with pytest.raises(ValueError, match=r"options\['staggered'\] = .*; allowed: True or False"):
+        make().reset(seed=0, options={"staggered": staggered})
+
+
 def test_gymnasiums_vector_wrappers_work():
     env = RecordEpisodeStatistics(make(PROBE, 3, duration=0.5))
     env.reset(seed=0)
