@@ -20,7 +20,7 @@ POLICIES := agents/policies
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,video,dev]'
 	touch $(READY)
 
 run: $(READY)

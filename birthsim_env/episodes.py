@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env import observation, reward
-from birthsim_env.assembly import FRAMES_PER_SECOND, Setup
+from birthsim_env.assembly import Setup
 from birthsim_env.info import describe
 from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
 from birthsim_env.seeding import lane_seeds
@@ -17,6 +17,7 @@ from birthsim_env.signals import Mask
 if TYPE_CHECKING:
     from birthsim_env.rendering import Renderer, Scene
 
+WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
 
 
@@ -84,13 +85,16 @@ class Episodes:
         from birthsim_env.rendering import Renderer
 
         if self._renderer is None:
-            self._renderer = Renderer(self.simulation.parameters)
+            self._renderer = Renderer(self.simulation.parameters, *self._setup.picture_size)
         if self._path is None:
             instants = np.linspace(0.0, self._setup.duration, PATH_POINTS)
             count = len(self.elapsed)
             self._path = np.stack([self.simulation.trajectory.sample(np.full(count, t))[:2] for t in instants])
         if mode == "human":
-            self._renderer.show(self._scene(0), min(FRAMES_PER_SECOND, 1 / self._setup.policy_period))
+            # Real time, at no more frames than a screen shows: steps between them are left out.
+            every = max(1, round(self._setup.frames_per_second / WINDOW_FRAMES_PER_SECOND))
+            if self.elapsed[0] % every == 0:
+                self._renderer.show(self._scene(0), self._setup.frames_per_second / every)
             return None
         return tuple(self._renderer.frame(self._scene(lane)) for lane in range(lanes))
 

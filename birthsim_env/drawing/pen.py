@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pygame
@@ -51,7 +53,10 @@ def mix(low: Colour, high: Colour, share: float) -> Colour:
 
 def drawable(points: Iterable[Point]) -> bool:
     """Whether all points (pixels) are finite and near enough for SDL."""
-    return all(abs(x) < _LARGEST_PIXEL and abs(y) < _LARGEST_PIXEL for x, y in points)
+    for x, y in points:  # noqa: SIM110 - a generator would take twice as long, 80 times a frame
+        if not (-_LARGEST_PIXEL < x < _LARGEST_PIXEL and -_LARGEST_PIXEL < y < _LARGEST_PIXEL):
+            return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -91,9 +96,16 @@ def sheet(box: Box) -> pygame.Surface:
     return pygame.Surface((box.width * FINE, box.height * FINE), 0, 32)
 
 
-def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box) -> None:
-    """Scale a fine surface down into its box of the picture."""
-    pygame.transform.smoothscale(fine, (box.width, box.height), picture.subsurface((box.x, box.y, box.width, box.height)))
+def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box, part: pygame.Rect | None = None) -> None:
+    """Scale a fine surface, or the ``part`` of it (fine px) that has changed, down into its box of the picture."""
+    if part is None:
+        part = fine.get_rect()
+    left, top = part.left // FINE, part.top // FINE
+    right, bottom = min(-(-part.right // FINE), box.width), min(-(-part.bottom // FINE), box.height)
+    if right > left and bottom > top:
+        size = right - left, bottom - top
+        source = fine.subsurface((left * FINE, top * FINE, size[0] * FINE, size[1] * FINE))
+        pygame.transform.smoothscale(source, size, picture.subsurface((box.x + left, box.y + top, *size)))
 
 
 @dataclass(frozen=True)
@@ -116,12 +128,13 @@ class Axis:
 class Pen:
     """Draws in world coordinates (m, y up) on a fine surface.
 
-    Widths and radii named ``..._px`` are pixels of the final picture.
+    Widths and radii named ``..._px`` are pixels of the final picture. ``touched`` encloses all that has been drawn, fine px.
     """
 
     def __init__(self, surface: pygame.Surface, origin: Point, pixels_per_metre: float) -> None:
         """``origin`` is where world (0, 0) lies and ``pixels_per_metre`` the scale, both in final pixels."""
         self.surface, self.scale = surface, pixels_per_metre
+        self.touched = pygame.Rect(0, 0, 0, 0)
         self._x, self._y = origin[0] * FINE, origin[1] * FINE
         self._scale = pixels_per_metre * FINE
 
@@ -131,26 +144,27 @@ class Pen:
 
     def polygon(self, points: Sequence[Point], fill: Colour, edge: Colour | None = None, edge_px: float = 1.0) -> None:
         """Draw a filled polygon of world points (m), optionally outlined."""
-        pixels = [self.pixel(point) for point in points]
+        pixels = self._pixels(points)
         if drawable(pixels):
-            pygame.draw.polygon(self.surface, fill, pixels)
+            self._touch(pygame.draw.polygon(self.surface, fill, pixels))
             if edge is not None:
-                pygame.draw.lines(self.surface, edge, True, pixels, self._width(edge_px))
+                self._touch(pygame.draw.lines(self.surface, edge, True, pixels, self._width(edge_px)))
 
     def line(self, points: Sequence[Point], colour: Colour, px: float = 1.0) -> None:
         """Open polyline of world points (m)."""
-        pixels = [self.pixel(point) for point in points]
+        pixels = self._pixels(points)
         if drawable(pixels):
-            pygame.draw.lines(self.surface, colour, False, pixels, self._width(px))
+            self._touch(pygame.draw.lines(self.surface, colour, False, pixels, self._width(px)))
 
     def curve(self, points: NDArray[np.float64], colour: Colour, px: float = 1.0) -> None:
         """Open polyline of many world points (M, 2), m, broken where a point cannot be drawn."""
         pixels = np.array([self._x, self._y]) + points * np.array([self._scale, -self._scale])
-        seen = np.all(np.abs(pixels) < _LARGEST_PIXEL, axis=1)
-        edges = np.flatnonzero(np.diff(seen)) + 1
-        for run, visible in zip(np.split(pixels, edges), np.split(seen, edges), strict=True):
+        seen = (np.abs(pixels) < _LARGEST_PIXEL).all(axis=1)
+        edges = np.flatnonzero(seen[1:] != seen[:-1]) + 1
+        runs = zip(np.split(pixels, edges), np.split(seen, edges), strict=True) if edges.size else [(pixels, seen)]
+        for run, visible in runs:
             if len(run) > 1 and visible[0]:
-                pygame.draw.lines(self.surface, colour, False, run.tolist(), self._width(px))
+                self._touch(pygame.draw.lines(self.surface, colour, False, run.tolist(), self._width(px)))
 
     def disc(
         self, centre: Point, radius_px: float, fill: Colour | None, edge: Colour | None = None, edge_px: float = 1.0
@@ -159,18 +173,25 @@ class Pen:
         pixel = self.pixel(centre)
         if drawable([pixel]):
             if fill is not None:
-                pygame.draw.circle(self.surface, fill, pixel, radius_px * FINE)
+                self._touch(pygame.draw.circle(self.surface, fill, pixel, radius_px * FINE))
             if edge is not None:
-                pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px))
+                self._touch(pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px)))
 
     def shape(self, centre: Point, corners_px: Sequence[Point], fill: Colour, edge: Colour | None = None) -> None:
         """Draw a filled polygon whose corners are pixel offsets (y down) from a world point (m)."""
         x, y = self.pixel(centre)
         pixels = [(x + dx * FINE, y + dy * FINE) for dx, dy in corners_px]
         if drawable(pixels):
-            pygame.draw.polygon(self.surface, fill, pixels)
+            self._touch(pygame.draw.polygon(self.surface, fill, pixels))
             if edge is not None:
-                pygame.draw.lines(self.surface, edge, True, pixels, FINE)
+                self._touch(pygame.draw.lines(self.surface, edge, True, pixels, FINE))
+
+    def _pixels(self, points: Sequence[Point]) -> list[Point]:
+        x0, y0, scale = self._x, self._y, self._scale
+        return [(x0 + scale * x, y0 - scale * y) for x, y in points]
+
+    def _touch(self, drawn: pygame.Rect) -> None:
+        self.touched = self.touched.union(drawn) if self.touched.width else drawn
 
     def _width(self, px: float) -> int:
         return max(1, round(px * FINE))
@@ -212,15 +233,24 @@ def arrow(pen: Pen, start: Point, end: Point, px: float) -> None:
     pen.polygon(outline, FORCE)
 
 
+def _typeface(name: str) -> Path | None:
+    """A typeface of the figures, found without loading matplotlib; None, pygame's own, where matplotlib keeps it elsewhere."""
+    found = importlib.util.find_spec("matplotlib")
+    if found is None or found.origin is None:
+        return None
+    path = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / f"{name}.ttf"
+    return path if path.is_file() else None
+
+
 class Lettering:
     """Text with every rendered string kept, since most strings return frame after frame."""
 
-    def __init__(self, size: int) -> None:
-        """``size`` is the height of the built-in typeface, px."""
+    def __init__(self, size: int, bold: bool = False) -> None:
+        """``size`` is the height of the letter m's quad, px."""
         if not pygame.font.get_init():
             pygame.font.init()
         # Rendered at four times the size and scaled down: at text size the typeface's own hinting leaves gaps inside words.
-        self._font = pygame.font.Font(None, 4 * size)
+        self._font = pygame.font.Font(_typeface("DejaVuSans-Bold" if bold else "DejaVuSans"), 4 * size)
         self.height = self._font.get_height() // 4
         self._kept: dict[tuple[str, Colour, bool], pygame.Surface] = {}
 

@@ -24,9 +24,9 @@ class Picture:
         self.width, self.height = width, height
         self._unit = unit = min(width / 640, height / 480)
         self._margin = margin = max(4, round(8 * unit))
-        self._text = Lettering(max(16, round(19 * unit)))
-        self._small = Lettering(max(15, round(17 * unit)))
-        self._heading = Lettering(max(17, round(23 * unit)))
+        self._text = Lettering(max(10, round(12 * unit)))
+        self._small = Lettering(max(9, round(11 * unit)))
+        self._heading = Lettering(max(11, round(14 * unit)), bold=True)
         header = self._heading.height + self._text.height + 2 * margin + round(3 * unit)
         side = round(min(0.27 * width, 0.45 * height))
         self._view = view = Box(0, header, width - side, height - header)
@@ -90,6 +90,7 @@ class Picture:
         self._panel.write_static(self._background)
         area = view.x * FINE, view.y * FINE, view.width * FINE, view.height * FINE
         self._view_background = fine.subsurface(area).copy()
+        self._sheet.blit(self._view_background, (0, 0))
 
     def draw(self, scene: Scene) -> None:
         """Draw ``scene`` on ``surface``."""
@@ -98,7 +99,9 @@ class Picture:
         end_effector = pose.end_effector if pose is not None else (math.nan, math.nan)
         path = np.asarray(scene.path, dtype=np.float64).reshape(-1, 2)
         picture.blit(self._background, (0, 0))
-        self._sheet.blit(self._view_background, (0, 0))
+        # Only what the last picture covered needs cleaning, and only what this one covers is scaled down.
+        self._sheet.blit(self._view_background, pen.touched, pen.touched)
+        pen.touched = pygame.Rect(0, 0, 0, 0)
         pen.curve(path, d.PATH, 2.0 * unit)
         if pose is not None:
             self._rig.draw(pen, pose, [self._panel.colour(pressure) for pressure in scene.pressures])
@@ -112,7 +115,7 @@ class Picture:
         d.compliant_marker(pen, scene.compliant_target, 1.35 * size)
         label = self._draw_force(scene.user_force, pose) if pose is not None else None
         d.end_effector_marker(pen, end_effector, 0.75 * size)
-        d.paste(self._sheet, picture, self._view)
+        d.paste(self._sheet, picture, self._view, pen.touched)
 
         if pose is not None:
             for name, place in self._rig.chamber_names(pose, 0.6 * self._small.height / self.scale):
