@@ -10,6 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
 from birthsim_env.signals import Measurement, Reference
@@ -133,6 +134,16 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def reference(self) -> Reference:
         """What is asked for now: the other input of a controller."""
         return Reference(self.simulation.reference.rows[:, 0])
+
+    @property
+    def duration(self) -> float:
+        """How long an episode is that nothing ends early, s."""
+        return self._episodes.duration
+
+    @property
+    def scene(self) -> Scene:
+        """What a frame shows now, in any render mode; see ``birthsim_env.rendering.Scene``."""
+        return self._episodes.scene(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
