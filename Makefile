@@ -1,7 +1,8 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy for about two minutes and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow
 # make lint   ruff and mypy; make bench prints speeds
-# make compare compares all controllers (an hour or so); it and make pictures redraw the README's pictures
+# make pictures redraws the pictures of the README's gallery and the studies (some minutes)
+# make compare compares all controllers (an hour or so) and redraws the pictures of its section
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
 
 VENV := .venv
@@ -20,7 +21,7 @@ POLICIES := agents/policies
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,video,dev]'
 	touch $(READY)
 
 run: $(READY)
@@ -49,6 +50,9 @@ bench: $(READY)
 pictures: $(READY)
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
+	$(BIN)/birthsim-animate --seed 1 --out docs/forceps.webp
+	$(BIN)/birthsim-evaluate --all --studies-only --out $(OUT)/studies
+	cp $(OUT)/studies/*.png docs/
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison

@@ -23,11 +23,12 @@ def draw_corrections(
             span = np.array([values.min(), values.max()])
             axes.plot(span, span, color=DARK, lw=1.0, ls="--", label="what the law leaves out")
         panels[0].plot(truth, learned, "o", color=MIDDLE, ms=3, label=f"learned, r = {correlation:.3f}")
-        panels[0].set(xlabel=r"$m g \cos\theta_1$ (N)", ylabel="correction on cylinder 2 (N)", title="weight, held still")
-        for k, (half, marker) in enumerate(zip(halves, "os", strict=True)):
-            panels[1].plot(unknown, half, f"{marker}-", color=(MIDDLE, ACCENT)[k], ms=4, lw=0.8, label=f"cylinder {k + 1}")
+        panels[0].set(xlabel=r"$m g \cos\theta_1$ (N)", ylabel="correction on cylinder 2 (N)")
+        panels[0].set_title("(a) Weight, held still", loc="left", fontsize=9.5)
+        for k, (half, style) in enumerate(zip(halves, ("o-", "s-."), strict=True)):
+            panels[1].plot(unknown, half, style, color=(MIDDLE, ACCENT)[k], ms=4, lw=0.8, label=f"cylinder {k + 1}")
         panels[1].set(xlabel=r"believed less true $F_c$ (N)", ylabel="correction, out less in, halved (N)")
-        panels[1].set_title("friction, round a circle")
+        panels[1].set_title("(b) Friction, round a circle", loc="left", fontsize=9.5)
         for axes in panels:
             axes.legend()
         return save(figure, folder, "correction")

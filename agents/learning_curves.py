@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.figures import ACCENT, DARK, MIDDLE, STYLE, save
+from baselines.figures import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
 from baselines.statistics import crossed_interval, interquartile_mean
 from birthsim_env.lanes import Array
 
 SHOWN = (
     ("pooled_mm", "pooled settled error (mm)"),
-    ("tail_mm", "95 % of the episodes (mm)"),
+    ("tail_mm", "settled error, 95 % quantile (mm)"),
     ("stiffness_error_percent", "error along the push (%)"),
     ("hunting_mm", "hunting (mm)"),
     ("saturation_percent", "time at a valve's limit (%)"),
@@ -47,20 +47,23 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
         return []
     said = [(key, label) for key, label in SHOWN if np.isfinite(over_seeds(trainings, key)[1]).any()]
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 2.8), layout="constrained", squeeze=False)
+        figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 3.2), layout="constrained", squeeze=False)
         for axes, (key, label) in zip(panels[0], said, strict=True):
             steps, (middle, low, high) = over_seeds(trainings, key)
             axes.fill_between(1e-6 * steps, low, high, color=MIDDLE, alpha=0.25, lw=0)
             for training in trainings:
                 own = [_number(point[key]) for point in training["curve"]]
-                axes.plot([1e-6 * point["steps"] for point in training["curve"]], own, color=ACCENT, lw=0.5, alpha=0.7)
-            axes.plot(1e-6 * steps, middle, color=MIDDLE, lw=1.4, label="residual (IQM, 95 %)")
+                at = [1e-6 * point["steps"] for point in training["curve"]]
+                name = "every seed" if training is trainings[0] else None
+                axes.plot(at, own, color=ACCENT, lw=0.7, ls=":", label=name)
+            axes.plot(1e-6 * steps, middle, color=MIDDLE, lw=1.6, label="interquartile mean, 95 % interval")
             law = [_number(training["law"][key]) for training in trainings]
             axes.axhline(interquartile_mean(law), color=DARK, ls="--", lw=1.0, label="law")
             axes.set(xlabel="policy steps (million)", ylabel=label)
             axes.set_ylim(bottom=0)
-        panels[0][0].legend(loc="center right")
-        panels[0][0].set_title(f"{trainings[0]['settings']['environment']}, {len(trainings)} seeds", loc="left", fontsize=8)
+        legend_below(figure, *panels[0][0].get_legend_handles_labels())
+        environment = trainings[0]["settings"]["environment"]
+        figure.suptitle(f"{environment}: validation of {len(trainings)} training seeds", fontsize=9.5)
         return save(figure, folder, "learning_curves")
 
 

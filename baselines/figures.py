@@ -19,8 +19,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from baselines.evaluation import TRACE, Evaluation
 from birthsim_env.lanes import Array
 
-DARK, MIDDLE, LIGHT, ACCENT = "#1b2a41", "#c1440e", "#7a9cc6", "#2e8b57"
-"""Colours of different luminance; line styles differ too."""
+DARK, MIDDLE, ACCENT, LIGHT = "#1b2a41", "#b23a0a", "#3f9e6a", "#8fb2dc"
+"""Colours from dark to light: in grey they lie a sixth of the way from black to white apart. Line styles differ too."""
 
 COLOURS = (DARK, MIDDLE, ACCENT, LIGHT, "#b8860b", "#8e5ea2")
 LINES = ("-", "--", "-.", ":")
@@ -34,7 +34,6 @@ STYLE: Any = {
     "grid.alpha": 0.25,
     "legend.frameon": False,
     "legend.fontsize": 8,
-    "svg.hashsalt": "birthsim",
 }
 
 
@@ -69,10 +68,11 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write ``name``.png and ``name``.svg and close the figure."""
+    """Write ``name``.png and ``name``.svg, the same bytes for the same figure, and close it; returns both paths."""
     paths = [folder / f"{name}.{kind}" for kind in ("png", "svg")]
-    for path in paths:
-        figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+    with plt.rc_context({"svg.hashsalt": name}):
+        for path in paths:
+            figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
     plt.close(figure)
     return paths
 
@@ -112,8 +112,8 @@ def _setpoints(axes: Axes, record: dict[str, Array]) -> None:
 def _pneumatic(axes: Axes, record: dict[str, Array]) -> None:
     for k, colour in ((0, DARK), (1, MIDDLE)):
         axes.plot(record["time"], record["pneumatic_stiffness"][:, k], color=colour, label=f"$K_{{pneu{k + 1}}}$")
-        target = record["pneumatic_stiffness_setpoint"][:, k]
-        axes.plot(record["time"], target, color="black", ls=":", lw=1.5, label="setpoints" if k == 0 else None)
+    setpoints = axes.plot(record["time"], record["pneumatic_stiffness_setpoint"], color="black", ls=":", lw=1.5)
+    setpoints[0].set_label("setpoints")
     axes.set(xlabel="time (s)", ylabel="pneumatic stiffness (N/m)", ylim=(0, 6000))
     axes.legend(ncol=3, loc="upper center")
     _letter(axes, "b", "Pneumatic stiffness")
@@ -126,28 +126,25 @@ def _path(axes: Axes, record: dict[str, Array]) -> None:
     for chosen, colour, style, name in ((half, LIGHT, "-", "softer half"), (~half, MIDDLE, "--", "stiffer half")):
         position = 1e3 * record["position"][chosen]
         axes.plot(position[:, 0], position[:, 1], color=colour, ls=style, label=f"end effector, {name}")
-    # Room for the legend beside the circle.
-    axes.set(xlabel="$x_c$ (mm)", ylabel="$y_c$ (mm)", xlim=(425, 645))
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="center right")
+    axes.set(xlabel="$x_c$ (mm)", ylabel="$y_c$ (mm)")
+    axes.set_aspect("equal", anchor="W")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     _letter(axes, "c", "Cartesian path")
 
 
 def _coordinates(axes: Axes, record: dict[str, Array]) -> None:
     centre = 1e3 * record["target"].mean(axis=0)
-    for k, name, shift in ((0, "x", 75.0), (1, "y", -75.0)):
-        for field, colour, style, width, label in (
-            ("target", "black", ":", 1.2, f"${name}_t$"),
-            ("compliant_target", LIGHT, "-", 3.0, f"${name}_k$ (19)"),
-            ("position", MIDDLE, "-", 1.0, f"${name}_c$"),
-        ):
-            axes.plot(
-                record["time"], 1e3 * record[field][:, k] - centre[k] + shift, color=colour, ls=style, lw=width, label=label
-            )
-    axes.set(xlabel="time (s)", ylabel="coordinate less its mean (mm)", ylim=(-165, 205))
-    axes.set_yticks([-125, -75, -25, 25, 75, 125], ["-50", "$y$ 0", "50", "-50", "$x$ 0", "50"])
-    axes.legend(ncol=6, loc="upper center", columnspacing=0.8, handlelength=1.4)
-    _letter(axes, "d", "Coordinates with target and compliant target")
+    for field, colour, style, width, label in (
+        ("target", "black", ":", 1.2, "target $x_t$, $y_t$"),
+        ("compliant_target", LIGHT, "-", 3.0, "compliant target $x_k$, $y_k$ (19)"),
+        ("position", MIDDLE, "-", 1.0, "end effector $x_c$, $y_c$"),
+    ):
+        moved = 1e3 * record[field] - centre + (75.0, -75.0)
+        axes.plot(record["time"], moved, color=colour, ls=style, lw=width)[0].set_label(label)
+    axes.set(xlabel="time (s)", ylabel="coordinate less its mean (mm)", ylim=(-145, 175))
+    axes.set_yticks([-125, -75, -25, 25, 75, 125], ["−50", "$y$ 0", "50", "−50", "$x$ 0", "50"])
+    axes.legend(ncol=3, loc="upper center", columnspacing=1.0, handlelength=1.5)
+    _letter(axes, "d", "Coordinates")
 
 
 def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path) -> list[Path]:

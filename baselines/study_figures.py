@@ -23,7 +23,7 @@ ELLIPSE_SCALE = 9e-6
 """m of the picture's workspace per N/m of a stiffness ellipse."""
 
 LEAST_HUNTING = 1e-4
-"""mm; less than that is drawn as that, since nobody could measure it."""
+"""mm; less is drawn as that, since nobody could measure it."""
 
 
 def draw_studies(studies: Mapping[str, Study], folder: Path) -> list[Path]:
@@ -60,7 +60,7 @@ def _label(name: str, values: Array) -> str:
 
 def _percent_axis(axes: Axes, linear: float) -> None:
     axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
-    axes.yaxis.set_major_formatter("{x:+g}")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("-", "−") if value else "0")
     axes.axhline(0, color="black", lw=0.8)
 
 
@@ -71,12 +71,14 @@ def stiffness_figure(study: Study, folder: Path) -> list[Path]:
         errors = _numbers(result["error_percent"])
         low, middle, high = _spread(errors)
         # Beside each other, or the ranges would hide one another.
-        place = np.array(result["setpoints"]) * 1.013 ** (k - (len(study) - 1) / 2)
+        place = np.array(result["setpoints"]) * 1.022 ** (k - (len(study) - 1) / 2)
         axes.plot(place, middle, **look(k), ms=5, lw=1, label=_label(name, errors))
         axes.vlines(place, low, high, color=look(k)["color"], lw=1)
     _percent_axis(axes, 1.0)
     axes.set(
-        xscale="log", xlabel="closed-loop stiffness setpoint (N/m)", ylabel="rendered over asked-for stiffness, less 1 (%)"
+        xscale="log",
+        xlabel="closed-loop stiffness setpoint $K_{clx} = K_{cly}$ (N/m)",
+        ylabel="error of the rendered stiffness (%)",
     )
     ticks = next(iter(study.values()))["setpoints"]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -98,7 +100,8 @@ def hunting_figure(study: Study, folder: Path) -> list[Path]:
         cases, orientation="horizontal", whis=(0, 100), widths=0.6, patch_artist=True, tick_labels=labels,
         boxprops={"facecolor": LIGHT, "edgecolor": DARK}, medianprops={"color": MIDDLE, "lw": 2},
     )  # fmt: skip
-    axes.set(xscale="log", xlabel="hunting: peak to peak over 1 s of rest or hold, larger axis (mm)")
+    axes.set(xscale="log")
+    axes.set_xlabel(f"hunting: peak to peak over 1 s of rest or hold, larger axis; at least {LEAST_HUNTING:g} (mm)")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.invert_yaxis()
@@ -133,13 +136,17 @@ def disturbance_figure(study: Study, folder: Path) -> list[Path]:
 
 
 def _panels(count: int, width: float, height: float, **options: Any) -> tuple[Figure, Iterator[Axes]]:
-    """A figure of at least ``count`` panels, at most four beside each other, and these panels; the rest is left blank."""
-    columns = min(count, 4)
+    """A figure of at least ``count`` panels, at most four beside each other, and these panels; as few as can be are blank."""
+    columns = min(count, 4) if count < 5 else min((4, 3), key=lambda across: -count % across)
     rows = math.ceil(count / columns)
     size = (width * columns, height * rows + 0.5)
     figure, panels = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)
     for axes in panels.flat[count:]:
         axes.set_visible(False)
+    if "sharex" in options:
+        # Numbers below the lowest panel of every column, which need not stand in the last row.
+        for k, axes in enumerate(panels.flat[:count]):
+            axes.tick_params(labelbottom=k + columns >= count)
     return figure, iter(panels.flat[:count])
 
 
@@ -162,6 +169,11 @@ def polar_figure(study: Study, folder: Path) -> list[Path]:
     legend_below(figure, *axes.get_legend_handles_labels())
     figure.suptitle(f"Rendered stiffness over the direction of the push (N/m); rings {setpoint / 2:g} N/m apart", fontsize=9.5)
     return save(figure, folder, "stiffness_by_direction")
+
+
+def _percent(share: float) -> str:
+    """Three digits; less than a hundredth of a percent cannot be seen."""
+    return f"{100 * share:.3g} %" if share >= 1e-4 else "< 0.01 %"
 
 
 def _range(rendered: Array) -> str:
@@ -189,11 +201,10 @@ def ellipse_figure(study: Study, folder: Path) -> list[Path]:
                 axes.plot(*(centre + 1e3 * ELLIPSE_SCALE * given @ circle), color=LIGHT, lw=2.5)
             axes.plot(*(centre + 1e3 * ELLIPSE_SCALE * wanted @ circle), color=DARK, ls="--", lw=1)
         off = [np.linalg.norm(_numbers(m) - wanted) / np.linalg.norm(wanted) for m in result["stiffness"] if m is not None]
-        worst = f"off by {100 * np.median(off):.3g} %, worst {100 * max(off):.3g} %" if off else "all lost"
+        worst = f"off by {_percent(float(np.median(off)))}, worst {_percent(float(max(off)))}" if off else "all lost"
         axes.set_title(f"{label_of(name)}\n{worst}", fontsize=8)
         axes.set_aspect("equal")
         axes.set(xlim=(355, 645), ylim=(-130, 95))
-        axes.label_outer()
         if k == 0:
             axes.plot([365, 365 + 1e6 * ELLIPSE_SCALE], [-124, -124], color="black", lw=2)
             axes.text(370 + 1e6 * ELLIPSE_SCALE, -125, "1000 N/m", fontsize=7, va="center")

@@ -17,6 +17,7 @@ from birthsim_env.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parameters import Parameters, load_parameters
 from birthsim_env.randomization import checked_ranges, documented_ranges
 from birthsim_env.references import Trajectory
+from birthsim_env.rendering import checked_size
 from birthsim_env.scenarios import SCENARIOS
 from birthsim_env.sensors import SENSORS
 from birthsim_env.simulation import Simulation
@@ -25,7 +26,6 @@ from birthsim_env.user_forces import UserForce
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
-FRAMES_PER_SECOND = 50
 
 
 def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
@@ -63,9 +63,15 @@ class Setup:
     duration: float
     policy_period: float
     title: str
+    picture_size: tuple[int, int]
     single_observation_space: spaces.Box
     single_action_space: spaces.Box
     observation_names: tuple[str, ...]
+
+    @property
+    def frames_per_second(self) -> float:
+        """Rate at which a frame per policy step shows real time."""
+        return 1 / self.policy_period
 
     @property
     def steps(self) -> int:
@@ -87,6 +93,7 @@ def assemble(
     policy_period: float = 0.01,
     duration: float | None = None,
     actuation: Actuation | None = None,
+    picture_size: tuple[int, int] = (640, 480),
     **unknown: Any,
 ) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed."""
@@ -127,6 +134,7 @@ def assemble(
         float(duration or table.duration),
         float(policy_period),
         table.title,
+        checked_size("picture_size", picture_size),
         spaces.Box(-limit, limit, (size,), np.float32),
         spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
         (*(str(entry) for entry in observation.ENTRIES), *names),

@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import FRAMES_PER_SECOND, RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
 from birthsim_env.signals import Measurement, Reference
@@ -87,7 +88,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
     - `actuation`: an object of your own between action and valves (`birthsim_env.actuation.Actuation`) instead of a mode.
-    - `render_mode`: `None`, `"rgb_array"` or `"human"`.
+    - `render_mode`: `None`, `"rgb_array"` or `"human"`, in real time; `picture_size`: (width, height) in px, (640, 480).
+      `gymnasium.wrappers.RecordVideo` needs `pip install 'birthsim[video]'`; its videos play in real time too.
 
     Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.
 
@@ -100,7 +102,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     """
 
     # Gymnasium declares it as an instance variable with a default.
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
 
     def __init__(self, scenario: str, render_mode: str | None = None, **arguments: Any) -> None:
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
@@ -109,6 +111,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self.action_space: spaces.Space[Any] = setup.single_action_space
         self.observation_names = setup.observation_names
         self.simulation = setup.simulation
+        # A recorder takes a frame per step.
+        self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
         self._steps = setup.steps
         self._episodes = Episodes(setup)
 
@@ -130,6 +134,16 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def reference(self) -> Reference:
         """What is asked for now: the other input of a controller."""
         return Reference(self.simulation.reference.rows[:, 0])
+
+    @property
+    def duration(self) -> float:
+        """How long an episode is that nothing ends early, s."""
+        return self._episodes.duration
+
+    @property
+    def scene(self) -> Scene:
+        """What a frame shows now, in any render mode; see ``birthsim_env.rendering.Scene``."""
+        return self._episodes.scene(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -154,7 +168,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         return episodes.observation()[0], float(rewards[0]), terminated, truncated, info
 
     def render(self) -> Any:
-        """A frame (480, 640, 3), uint8, in mode ``rgb_array``."""
+        """A frame (height, width, 3), uint8, in mode ``rgb_array``."""
         if self.render_mode != "rgb_array":
             return None
         frames = self._episodes.render("rgb_array", 1)

@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env import observation, reward
-from birthsim_env.assembly import FRAMES_PER_SECOND, Setup
+from birthsim_env.assembly import Setup
+from birthsim_env.drawing.scene import Scene
 from birthsim_env.info import describe
 from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
 from birthsim_env.seeding import lane_seeds
 from birthsim_env.signals import Mask
 
 if TYPE_CHECKING:
-    from birthsim_env.rendering import Renderer, Scene
+    from birthsim_env.rendering import Renderer
 
+WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
 
 
@@ -34,6 +36,11 @@ class Episodes:
         self._action: Array = np.zeros((self.action_size, lanes))
         self._renderer: Renderer | None = None
         self._path: Array | None = None
+
+    @property
+    def duration(self) -> float:
+        """Of an episode that nothing ends early, s."""
+        return self._setup.duration
 
     def seed(self, seed: int | list[int | None] | None, generator: np.random.Generator) -> None:
         """Give the lanes new seeds; without any, lanes that have seeds go on with the next episode of theirs."""
@@ -84,22 +91,23 @@ class Episodes:
         from birthsim_env.rendering import Renderer
 
         if self._renderer is None:
-            self._renderer = Renderer(self.simulation.parameters)
+            self._renderer = Renderer(self.simulation.parameters, *self._setup.picture_size)
+        if mode == "human":
+            # Real time, at no more frames than a screen shows: steps between them are left out.
+            every = max(1, round(self._setup.frames_per_second / WINDOW_FRAMES_PER_SECOND))
+            if self.elapsed[0] % every == 0:
+                self._renderer.show(self.scene(0), self._setup.frames_per_second / every)
+            return None
+        return tuple(self._renderer.frame(self.scene(lane)) for lane in range(lanes))
+
+    def scene(self, lane: int) -> Scene:
+        """What a frame of a lane shows now."""
+        simulation, reference = self.simulation, self.simulation.reference
+        state = simulation.plant.state
         if self._path is None:
             instants = np.linspace(0.0, self._setup.duration, PATH_POINTS)
             count = len(self.elapsed)
-            self._path = np.stack([self.simulation.trajectory.sample(np.full(count, t))[:2] for t in instants])
-        if mode == "human":
-            self._renderer.show(self._scene(0), min(FRAMES_PER_SECOND, 1 / self._setup.policy_period))
-            return None
-        return tuple(self._renderer.frame(self._scene(lane)) for lane in range(lanes))
-
-    def _scene(self, lane: int) -> Scene:
-        from birthsim_env.rendering import Scene
-
-        simulation, reference = self.simulation, self.simulation.reference
-        state = simulation.plant.state
-        assert self._path is not None
+            self._path = np.stack([simulation.trajectory.sample(np.full(count, t))[:2] for t in instants])
 
         def pair(values: Array) -> tuple[float, float]:
             return float(values[0, lane]), float(values[1, lane])

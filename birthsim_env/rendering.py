@@ -6,9 +6,11 @@ needs no display.
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,27 +21,50 @@ from birthsim_env.parameters import Parameters
 if TYPE_CHECKING:
     import pygame
 
-__all__ = ["Renderer", "Scene"]
+__all__ = ["PairRenderer", "Renderer", "Scene"]
+
+
+LEAST, LARGEST = (320, 240), (7680, 4320)
+"""px: sizes of a picture."""
+
+
+def checked_size(name: str, size: Sequence[int]) -> tuple[int, int]:
+    """``size`` (width, height) in px, or a ``ValueError`` that names it, its value and what is allowed."""
+    given = np.asarray(size)
+    if given.shape != (2,) or given.dtype.kind not in "iu" or np.any(given < LEAST) or np.any(given > LARGEST):
+        (w, h), (wide, high) = LEAST, LARGEST
+        raise ValueError(f"{name} = {size!r}; allowed: two whole numbers from {w} x {h} to {wide} x {high} px")
+    return int(given[0]), int(given[1])
+
+
+def _load() -> Any:
+    """Pygame without its greeting, which would end up in the output of the console commands."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    return importlib.import_module("pygame")
+
+
+def _pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
+    """A fresh copy (height, width, 3), RGB."""
+    width, height = surface.get_size()
+    pixels = np.empty((height, width, 3), dtype=np.uint8)
+    # SDL converts into the array itself, five times as fast as by way of bytes.
+    _load().image.frombuffer(pixels.data, (width, height), "RGB").blit(surface, (0, 0))
+    return pixels
 
 
 class Renderer:
     """Draws scenes of one rig; the static part, the typefaces and the scale are prepared once.
 
     ``parameters`` fix the world that is shown: the whole workspace always fits. ``width`` and ``height`` are the picture's
-    size in px, at least 320 x 240; smaller ones raise ``ValueError``.
+    size in px, from 320 x 240 to 7680 x 4320; others raise ``ValueError``.
     """
 
     def __init__(self, parameters: Parameters, width: int = 640, height: int = 480) -> None:
-        if width < 320 or height < 240:
-            raise ValueError(f"width x height = {width} x {height}; allowed: at least 320 x 240 px")
-        # Its greeting would end up in the output of the console commands.
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        import pygame
-
+        width, height = checked_size("(width, height)", (width, height))
+        self._pygame = _load()
         from birthsim_env.drawing.picture import Picture
 
         self.parameters, self.width, self.height = parameters, width, height
-        self._pygame = pygame
         self._picture = Picture(parameters, width, height)
         self._window: pygame.Surface | None = None
         self._clock: pygame.time.Clock | None = None
@@ -52,8 +77,7 @@ class Renderer:
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
         """Draw the picture of ``scene`` as (height, width, 3) RGB; a fresh array each time."""
         self._picture.draw(scene)
-        pixels = self._pygame.image.tobytes(self._picture.surface, "RGB")
-        return np.frombuffer(pixels, dtype=np.uint8).reshape(self.height, self.width, 3).copy()
+        return _pixels(self._picture.surface)
 
     def show(self, scene: Scene, frames_per_second: float) -> None:
         """Show ``scene`` in a window and wait so that calls come no faster than ``frames_per_second``.
@@ -85,3 +109,25 @@ class Renderer:
             self._pygame.display.quit()
         self._window = self._clock = None
         self._dismissed = False
+
+
+class PairRenderer:
+    """Draws two runs of the same world beside each other, ``width`` px wide: rig, magnifier and error over time of each.
+
+    ``title`` stands over both, ``names`` over each; the errors' axes reach over ``span`` (s, from and to) and to ``top`` (m).
+    """
+
+    def __init__(
+        self, parameters: Parameters, title: str, names: Sequence[str], span: tuple[float, float], top: float, width: int = 960
+    ) -> None:
+        _load()
+        from birthsim_env.drawing.pair import Pair
+
+        self._picture = Pair(parameters, title, names, span, top, width)
+
+    def frame(
+        self, scenes: Sequence[Scene], times: NDArray[np.float64], errors: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.uint8]:
+        """Draw two scenes, and the errors (m) at all ``times`` (s) so far, as (height, width, 3) RGB."""
+        self._picture.draw(scenes, times, errors)
+        return _pixels(self._picture.surface)

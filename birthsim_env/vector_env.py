@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import FRAMES_PER_SECOND, RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import vector_info
 from birthsim_env.lanes import Array
@@ -29,7 +29,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
 
     metadata: dict[str, Any] = {  # noqa: RUF012  Gymnasium declares it so
         "render_modes": list(RENDER_MODES),
-        "render_fps": FRAMES_PER_SECOND,
+        "render_fps": 100,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
@@ -49,6 +49,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             raise ValueError(f"max_episode_steps = {max_episode_steps!r}; allowed: None, -1 (no limit) or a whole number >= 1")
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         setup = assemble(int(num_envs), scenario, **arguments)
+        self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
         self.num_envs = int(num_envs)
         self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)

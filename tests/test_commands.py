@@ -104,7 +104,7 @@ def test_the_scripts_of_the_package_are_these_commands():
             "evaluate",
             (
                 *("all", "env", "controller", "policy", "episodes", "seed", "sensors", "randomize", "parameters", "jobs"),
-                *("no-studies", "out"),
+                *("no-studies", "studies-only", "out"),
             ),
         ),
         ("figure4", ("controller", "sensors", "parameters", "out")),
@@ -272,6 +272,14 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     assert {path: path.stat().st_mtime_ns for path in written} == written
     assert (tmp_path / "out" / "comparison.md").read_text() == text
     assert strict(tmp_path / "out" / "comparison.json") == content
+    # The studies alone, from what is there of them.
+    (tmp_path / "out" / "comparison.md").unlink()
+    status, alone, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out", "--studies-only")
+    assert status == 0
+    assert "settled_error.png" not in alone
+    assert "rendered_stiffness.png" in alone
+    assert not (tmp_path / "out" / "comparison.md").exists()
+    assert strict(tmp_path / "out" / "comparison.json")["studies"] == content["studies"]
 
 
 def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
@@ -441,8 +449,8 @@ BAD = [
     ("evaluate", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("evaluate", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 (kg)"),
     ("evaluate", ("--out", "{tmp}/own.py"), "own.py'"),
-    ("evaluate", ("--jobs", "2"), "--jobs and --no-studies; allowed: with --all"),
-    ("evaluate", ("--no-studies",), "--jobs and --no-studies; allowed: with --all"),
+    ("evaluate", ("--jobs", "2"), "--jobs, --no-studies and --studies-only; allowed: with --all"),
+    ("evaluate", ("--no-studies",), "--jobs, --no-studies and --studies-only; allowed: with --all"),
     ("evaluate", ("--all", "--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
     ("evaluate", ("--all", "--env", "CartPole-v1"), "--env 'CartPole-v1' with --all; allowed: BirthSIM/Circle-v0, "),
     ("evaluate", ("--all", "--env", RESIDUAL), f"--env '{RESIDUAL}' with --all; allowed: BirthSIM/Circle-v0, "),

@@ -77,7 +77,7 @@ def test_frames_are_independent_arrays_and_depend_on_the_scene_only():
 
 
 def test_too_small_a_picture_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"319 x 240.*320 x 240"):
+    with pytest.raises(ValueError, match=r"\(319, 240\).*320 x 240"):
         Renderer(RIG, 319, 240)
 
 

@@ -51,7 +51,9 @@ def main() -> None:
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--jobs", type=whole, help=f"processes side by side, with --all (default: {JOBS})")
-    parser.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
+    studies = parser.add_mutually_exclusive_group()
+    studies.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
+    studies.add_argument("--studies-only", action="store_true", help="with --all: nothing but these studies, some minutes")
     parser.add_argument(
         "--out",
         type=Path,
@@ -67,8 +69,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
             raise ValueError("--policy with --all; allowed: without it, --all compares controllers that need no policy")
         evaluate_all(arguments)
         return
-    if arguments.jobs is not None or arguments.no_studies:
-        raise ValueError("--jobs and --no-studies; allowed: with --all")
+    if arguments.jobs is not None or arguments.no_studies or arguments.studies_only:
+        raise ValueError("--jobs, --no-studies and --studies-only; allowed: with --all")
     arguments.env = arguments.env or "BirthSIM/Circle-v0"
     arguments.controller = arguments.controller or ["backstepping"]
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"

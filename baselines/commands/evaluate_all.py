@@ -32,7 +32,7 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
         if name not in CONTROLLERS and not name.rpartition(":")[0].endswith(".py"):
             raise ValueError(f"--controller {name!r} with --all; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
     settings = [controller_settings(name, rig) for name in names]
-    conditions = _conditions(arguments)
+    conditions = [] if arguments.studies_only else _conditions(arguments)
     folder, jobs = make_folder(arguments.out), arguments.jobs or JOBS
     cells = {
         (own["controller"], where): cell_task(own, where, arguments.episodes, arguments.seed)
@@ -86,12 +86,16 @@ def _write(
         "cells": in_words(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)
-    text = f"{overview(figures)}\n\n{losses(figures)}"
-    caption = (
-        f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
-        f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
-    )
-    (folder / "comparison.md").write_text(f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n", encoding="utf-8")
+    files = ["comparison.json"]
+    if not arguments.studies_only:
+        text = f"{overview(figures)}\n\n{losses(figures)}"
+        caption = (
+            f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
+            f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
+        )
+        (folder / "comparison.md").write_text(f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n", encoding="utf-8")
+        print(f"{caption}\n\n{text}\n")
+        files.append("comparison.md")
     drawn = [*draw_comparison(figures, folder), *draw_studies(by_study, folder)]
-    files = ", ".join(["comparison.json", "comparison.md", *sorted({path.stem + ".png" for path in drawn})])
-    print(f"{caption}\n\n{text}\n\nwritten to {folder}/: {files} (each picture as .svg too)")
+    files += sorted({path.stem + ".png" for path in drawn})
+    print(f"written to {folder}/: {', '.join(files)} (each picture as .svg too)")

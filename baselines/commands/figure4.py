@@ -17,6 +17,7 @@ from baselines.metrics import SETTLED
 from baselines.registry import CONTROLLERS, make_controller
 from birthsim_env.lanes import Array
 
+PICTURE: dict[str, Any] = {"render_mode": "rgb_array", "picture_size": (1280, 960)}
 PICTURE_TIME = 1.8
 """s: in the middle of the first push."""
 
@@ -45,7 +46,7 @@ def record_run(
     """
     rig = birthsim_env.parameters.load_parameters(parameters)
     period = rig.electronics.control_period
-    env = gymnasium.make("BirthSIM/Circle-v0", parameters=rig, sensors=sensors, policy_period=period, render_mode="rgb_array")
+    env = gymnasium.make("BirthSIM/Circle-v0", parameters=rig, sensors=sensors, policy_period=period, **PICTURE)
     law = make_controller(controller, rig)
     machine: Any = env.unwrapped
     _, info = env.reset(seed=0)

@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
 import pygame
-from numpy.typing import NDArray
 
 from birthsim_env.drawing import pen as d
-from birthsim_env.drawing.pen import FINE, Axis, Box, Colour, Lettering, Pen, Point
+from birthsim_env.drawing.lettering import Lettering
+from birthsim_env.drawing.magnifier import Magnifier
+from birthsim_env.drawing.pen import FINE, Box, Colour, Pen, number
 from birthsim_env.parameters import Air
 
-_WINDOWS = (0.02, 0.04, 0.08, 0.16)  # widths the magnifier may show, m
+
+def _share(pressure: float, air: Air) -> float:
+    """0 at atmospheric pressure, 1 at supply pressure."""
+    low, high = air.atmospheric_pressure, air.supply_pressure
+    return float(pressure - low) / (high - low)
 
 
-def number(value: float, form: str) -> str:
-    """Format a number for the screen; a dash where there is none."""
-    return format(value, form) if math.isfinite(value) else "-"
+def pressure_colour(pressure: float, air: Air) -> Colour:
+    """Colour of air at an absolute pressure, Pa."""
+    return d.mix(d.LOW_PRESSURE, d.HIGH_PRESSURE, _share(pressure, air))
 
 
 class Panel:
@@ -34,10 +38,10 @@ class Panel:
         self._gauges = most - 4 * row >= 0.85 * size
         if self._gauges:
             size = min(size, most - 4 * row)
-        self._inset = Box(box.x + (box.width - size) // 2, box.y + row + margin // 2, size, size)
-        self._sheet = d.sheet(self._inset)
+        inset = Box(box.x + (box.width - size) // 2, box.y + row + margin // 2, size, size)
+        self.magnifier = Magnifier(inset, text, unit)
         bottom = box.bottom - scale - (4 * row if self._gauges else 0) - margin // 2
-        top = self._inset.bottom + margin
+        top = inset.bottom + margin
         self._legend_top = top + max(0, (bottom - top - legend) // 2)
         label, value = text.width("P1") + margin, text.width("0.00") + margin // 2
         self._track = Box(box.x + margin + label, bottom + row, box.width - 2 * margin - label - value, row)
@@ -45,12 +49,7 @@ class Panel:
 
     def colour(self, pressure: float) -> Colour:
         """Colour of air at an absolute pressure, Pa."""
-        return d.mix(d.LOW_PRESSURE, d.HIGH_PRESSURE, self._share(pressure))
-
-    def _share(self, pressure: float) -> float:
-        """0 at atmospheric pressure, 1 at supply pressure."""
-        low, high = self._air.atmospheric_pressure, self._air.supply_pressure
-        return float(pressure - low) / (high - low)
+        return pressure_colour(pressure, self._air)
 
     def draw_static(self, page: Pen) -> None:
         """Legend markers and colour bar on the fine background; ``page`` counts px from the top left corner, y up."""
@@ -93,7 +92,7 @@ class Panel:
             return
         track, row = self._track, self._row
         for i, (name, pressure) in enumerate(zip(("P1", "N1", "P2", "N2"), pressures, strict=True)):
-            top, share = track.y + i * row, self._share(pressure)
+            top, share = track.y + i * row, _share(pressure, self._air)
             picture.fill(d.FAINT, (track.x, top + 2, track.width, row - 5))
             if math.isfinite(share):
                 length = round(min(max(share, 0.0), 1.0) * track.width)
@@ -102,62 +101,3 @@ class Panel:
             self._text.write(picture, name, (self.box.x + self._margin, top + row / 2), d.INK, (0, 0.5))
             value = number(pressure / 1e5, ".1f") if not pressure > 99e5 else "> 99"
             self._text.write(picture, value, (self.box.right - self._margin, top + row / 2), d.INK, (1, 0.5))
-
-    @staticmethod
-    def window(centre: Point, others: Sequence[Point]) -> float:
-        """Width of the magnifier's window around ``centre``, m: the smallest that holds the ``others`` too."""
-        offsets = [abs(p - c) for other in others for p, c in zip(other, centre, strict=True)]
-        offset = max([value for value in offsets if math.isfinite(value)], default=0.0)
-        return next((window for window in _WINDOWS if offset <= 0.42 * window), _WINDOWS[-1])
-
-    def draw_magnifier(
-        self,
-        picture: pygame.Surface,
-        target: Point,
-        compliant_target: Point,
-        end_effector: Point,
-        path: NDArray[np.float64],
-        main_scale: float,
-    ) -> None:
-        """Surroundings of the compliant target, where millimetres can be seen; ``main_scale`` is that of the rig, px/m."""
-        box, unit = self._inset, self._unit
-        window = self.window(compliant_target, (target, end_effector))
-        places = (compliant_target, end_effector, target)
-        centre = next((place for place in places if d.drawable([place])), (0.0, 0.0))
-        scale, half, step = box.width / window, window / 2, window / 4
-        pen = Pen(self._sheet, (box.width / 2 - scale * centre[0], box.width / 2 + scale * centre[1]), scale)
-        frame = Axis(centre, (1.0, 0.0))
-        self._sheet.fill((255, 255, 255))
-        for i in (-1, 0, 1):
-            pen.line([frame.at(i * step, -half), frame.at(i * step, half)], (236, 239, 242))
-            pen.line([frame.at(-half, i * step), frame.at(half, i * step)], (236, 239, 242))
-        pen.curve(path, d.PATH, 2.0 * unit)
-        pen.line([compliant_target, end_effector], d.GREY, 1.2 * unit)
-        size = max(3.5, 6 * unit)
-        d.target_marker(pen, target, 1.5 * size)
-        d.compliant_marker(pen, compliant_target, 1.3 * size)
-        d.end_effector_marker(pen, end_effector, 0.7 * size)
-        for place, colour in ((target, d.TARGET), (end_effector, d.END_EFFECTOR)):
-            self._point_out(pen, frame, place, window, colour)
-        left, foot, tick = -0.46 * window, -0.46 * window, 4 / scale
-        bar = [(left, foot + tick), (left, foot), (left + step, foot), (left + step, foot + tick)]
-        pen.line([frame.at(*corner) for corner in bar], d.INK, 1.5)
-        edge = 0.497 * window
-        border = frame.box(-edge, edge, edge)
-        pen.line([*border, border[0]], d.CAP)
-        d.paste(self._sheet, picture, box)
-        at = box.x + 0.29 * box.width + 4, box.y + 0.96 * box.height + 2
-        self._text.write(picture, f"{1e3 * step:.0f} mm", at, d.INK, (0, 1), halo=True)
-        times = f"{scale / main_scale:.0f} times"
-        heading = self._text.fit((f"magnified {times}", f"{times} larger"), self.box.width - self._margin)
-        self._text.write(picture, heading, (box.x, box.y - 2), d.INK, (0, 1))
-
-    def _point_out(self, pen: Pen, frame: Axis, place: Point, window: float, colour: Colour) -> None:
-        """Draw a triangle at the magnifier's edge that points to what lies outside it."""
-        dx, dy = place[0] - frame.origin[0], place[1] - frame.origin[1]
-        far = max(abs(dx), abs(dy))
-        if not 0.5 * window < far < math.inf:
-            return
-        size, angle = max(5.0, 8 * self._unit), math.atan2(-dy, dx)
-        corners = [(size * math.cos(angle + turn), size * math.sin(angle + turn)) for turn in (0.0, 2.4, -2.4)]
-        pen.shape(frame.at(0.44 * window * dx / far, 0.44 * window * dy / far), corners, colour, d.PAPER)

@@ -1,4 +1,4 @@
-"""Primitives: colours, a pen in metres that skips whatever is not finite, markers, the force arrow, and lettering."""
+"""Primitives: colours, a pen in metres that skips whatever is not finite, markers and the force arrow."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pygame
-import pygame.font
 from numpy.typing import NDArray
 
 Point = tuple[float, float]
@@ -49,9 +48,17 @@ def mix(low: Colour, high: Colour, share: float) -> Colour:
     )
 
 
+def number(value: float, form: str) -> str:
+    """Format a number for the screen; a dash where there is none."""
+    return format(value, form) if math.isfinite(value) else "-"
+
+
 def drawable(points: Iterable[Point]) -> bool:
     """Whether all points (pixels) are finite and near enough for SDL."""
-    return all(abs(x) < _LARGEST_PIXEL and abs(y) < _LARGEST_PIXEL for x, y in points)
+    for x, y in points:  # noqa: SIM110 - a generator would take twice as long, 80 times a frame
+        if not (-_LARGEST_PIXEL < x < _LARGEST_PIXEL and -_LARGEST_PIXEL < y < _LARGEST_PIXEL):
+            return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -91,9 +98,16 @@ def sheet(box: Box) -> pygame.Surface:
     return pygame.Surface((box.width * FINE, box.height * FINE), 0, 32)
 
 
-def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box) -> None:
-    """Scale a fine surface down into its box of the picture."""
-    pygame.transform.smoothscale(fine, (box.width, box.height), picture.subsurface((box.x, box.y, box.width, box.height)))
+def paste(fine: pygame.Surface, picture: pygame.Surface, box: Box, part: pygame.Rect | None = None) -> None:
+    """Scale a fine surface, or the ``part`` of it (fine px) that has changed, down into its box of the picture."""
+    if part is None:
+        part = fine.get_rect()
+    left, top = part.left // FINE, part.top // FINE
+    right, bottom = min(-(-part.right // FINE), box.width), min(-(-part.bottom // FINE), box.height)
+    if right > left and bottom > top:
+        size = right - left, bottom - top
+        source = fine.subsurface((left * FINE, top * FINE, size[0] * FINE, size[1] * FINE))
+        pygame.transform.smoothscale(source, size, picture.subsurface((box.x + left, box.y + top, *size)))
 
 
 @dataclass(frozen=True)
@@ -116,12 +130,13 @@ class Axis:
 class Pen:
     """Draws in world coordinates (m, y up) on a fine surface.
 
-    Widths and radii named ``..._px`` are pixels of the final picture.
+    Widths and radii named ``..._px`` are pixels of the final picture. ``touched`` encloses all that has been drawn, fine px.
     """
 
     def __init__(self, surface: pygame.Surface, origin: Point, pixels_per_metre: float) -> None:
         """``origin`` is where world (0, 0) lies and ``pixels_per_metre`` the scale, both in final pixels."""
         self.surface, self.scale = surface, pixels_per_metre
+        self.touched = pygame.Rect(0, 0, 0, 0)
         self._x, self._y = origin[0] * FINE, origin[1] * FINE
         self._scale = pixels_per_metre * FINE
 
@@ -131,26 +146,27 @@ class Pen:
 
     def polygon(self, points: Sequence[Point], fill: Colour, edge: Colour | None = None, edge_px: float = 1.0) -> None:
         """Draw a filled polygon of world points (m), optionally outlined."""
-        pixels = [self.pixel(point) for point in points]
+        pixels = self._pixels(points)
         if drawable(pixels):
-            pygame.draw.polygon(self.surface, fill, pixels)
+            self._touch(pygame.draw.polygon(self.surface, fill, pixels))
             if edge is not None:
-                pygame.draw.lines(self.surface, edge, True, pixels, self._width(edge_px))
+                self._touch(pygame.draw.lines(self.surface, edge, True, pixels, self._width(edge_px)))
 
     def line(self, points: Sequence[Point], colour: Colour, px: float = 1.0) -> None:
         """Open polyline of world points (m)."""
-        pixels = [self.pixel(point) for point in points]
+        pixels = self._pixels(points)
         if drawable(pixels):
-            pygame.draw.lines(self.surface, colour, False, pixels, self._width(px))
+            self._touch(pygame.draw.lines(self.surface, colour, False, pixels, self._width(px)))
 
     def curve(self, points: NDArray[np.float64], colour: Colour, px: float = 1.0) -> None:
         """Open polyline of many world points (M, 2), m, broken where a point cannot be drawn."""
         pixels = np.array([self._x, self._y]) + points * np.array([self._scale, -self._scale])
-        seen = np.all(np.abs(pixels) < _LARGEST_PIXEL, axis=1)
-        edges = np.flatnonzero(np.diff(seen)) + 1
-        for run, visible in zip(np.split(pixels, edges), np.split(seen, edges), strict=True):
+        seen = (np.abs(pixels) < _LARGEST_PIXEL).all(axis=1)
+        edges = np.flatnonzero(seen[1:] != seen[:-1]) + 1
+        runs = zip(np.split(pixels, edges), np.split(seen, edges), strict=True) if edges.size else [(pixels, seen)]
+        for run, visible in runs:
             if len(run) > 1 and visible[0]:
-                pygame.draw.lines(self.surface, colour, False, run.tolist(), self._width(px))
+                self._touch(pygame.draw.lines(self.surface, colour, False, run.tolist(), self._width(px)))
 
     def disc(
         self, centre: Point, radius_px: float, fill: Colour | None, edge: Colour | None = None, edge_px: float = 1.0
@@ -159,18 +175,25 @@ class Pen:
         pixel = self.pixel(centre)
         if drawable([pixel]):
             if fill is not None:
-                pygame.draw.circle(self.surface, fill, pixel, radius_px * FINE)
+                self._touch(pygame.draw.circle(self.surface, fill, pixel, radius_px * FINE))
             if edge is not None:
-                pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px))
+                self._touch(pygame.draw.circle(self.surface, edge, pixel, radius_px * FINE, self._width(edge_px)))
 
     def shape(self, centre: Point, corners_px: Sequence[Point], fill: Colour, edge: Colour | None = None) -> None:
         """Draw a filled polygon whose corners are pixel offsets (y down) from a world point (m)."""
         x, y = self.pixel(centre)
         pixels = [(x + dx * FINE, y + dy * FINE) for dx, dy in corners_px]
         if drawable(pixels):
-            pygame.draw.polygon(self.surface, fill, pixels)
+            self._touch(pygame.draw.polygon(self.surface, fill, pixels))
             if edge is not None:
-                pygame.draw.lines(self.surface, edge, True, pixels, FINE)
+                self._touch(pygame.draw.lines(self.surface, edge, True, pixels, FINE))
+
+    def _pixels(self, points: Sequence[Point]) -> list[Point]:
+        x0, y0, scale = self._x, self._y, self._scale
+        return [(x0 + scale * x, y0 - scale * y) for x, y in points]
+
+    def _touch(self, drawn: pygame.Rect) -> None:
+        self.touched = self.touched.union(drawn) if self.touched.width else drawn
 
     def _width(self, px: float) -> int:
         return max(1, round(px * FINE))
@@ -210,66 +233,3 @@ def arrow(pen: Pen, start: Point, end: Point, px: float) -> None:
     outline = [*left, end, *right]
     pen.line([*outline, outline[0]], PAPER, 3.0)
     pen.polygon(outline, FORCE)
-
-
-class Lettering:
-    """Text with every rendered string kept, since most strings return frame after frame."""
-
-    def __init__(self, size: int) -> None:
-        """``size`` is the height of the built-in typeface, px."""
-        if not pygame.font.get_init():
-            pygame.font.init()
-        # Rendered at four times the size and scaled down: at text size the typeface's own hinting leaves gaps inside words.
-        self._font = pygame.font.Font(None, 4 * size)
-        self.height = self._font.get_height() // 4
-        self._kept: dict[tuple[str, Colour, bool], pygame.Surface] = {}
-
-    def width(self, text: str) -> int:
-        """Width of a text, px."""
-        return math.ceil(self._font.size(text)[0] / 4)
-
-    def fit(self, choices: Sequence[str], width: float) -> str:
-        """Return the first choice that fits in ``width`` px, else the last one cut short."""
-        for text in choices:
-            if self.width(text) <= width:
-                return text
-        text = choices[-1]
-        while text and self.width(text + "...") > width:
-            text = text[:-1]
-        return text + "..." if text else ""
-
-    def write(
-        self,
-        surface: pygame.Surface,
-        text: str,
-        at: Point,
-        colour: Colour = INK,
-        anchor: Point = (0.0, 0.0),
-        halo: bool = False,
-    ) -> None:
-        """Write ``text`` with the point ``anchor`` of its box, (0, 0) top left to (1, 1) bottom right, at the pixel ``at``."""
-        if not drawable([at]):
-            return
-        key = (text, colour, halo)
-        image = self._kept.get(key)
-        if image is None:
-            if len(self._kept) > 4000:
-                self._kept.clear()
-            image = self._kept[key] = self._render(text, colour, halo)
-        surface.blit(image, (round(at[0] - anchor[0] * image.get_width()), round(at[1] - anchor[1] * image.get_height())))
-
-    def _render(self, text: str, colour: Colour, halo: bool) -> pygame.Surface:
-        plain = self._small(text, colour)
-        if not halo:
-            return plain
-        image = pygame.Surface((plain.get_width() + 4, plain.get_height() + 4), pygame.SRCALPHA)
-        light = self._small(text, PAPER)
-        for dx in range(5):
-            for dy in range(5):
-                image.blit(light, (dx, dy))
-        image.blit(plain, (2, 2))
-        return image
-
-    def _small(self, text: str, colour: Colour) -> pygame.Surface:
-        large = self._font.render(text, True, colour)
-        return pygame.transform.smoothscale(large, (math.ceil(large.get_width() / 4), math.ceil(large.get_height() / 4)))

@@ -103,7 +103,8 @@ def head(pen: Pen, axis: Axis, radius: float) -> None:
     """Fetal head in profile around the origin of ``axis``, crown first, face to the right of the axis; ``radius`` m."""
 
     def placed(shape: Sequence[Point]) -> list[Point]:
-        return [axis.at(radius * s, -radius * n) for s, n in shape]
+        (ox, oy), ax, ay = axis.origin, radius * axis.along[0], radius * axis.along[1]
+        return [(ox + s * ax + n * ay, oy + s * ay - n * ax) for s, n in shape]
 
     pen.polygon(placed(_PROFILE), SKIN, SKIN_EDGE, 1.5)
     for feature in (_EYE, _MOUTH, [*_EAR, _EAR[0]]):

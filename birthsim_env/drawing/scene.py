@@ -30,3 +30,8 @@ class Scene:
     """Reference path (M, 2), m; M may be 0."""
     title: str = ""
     """First line of the picture."""
+
+
+def path_of(scene: Scene) -> NDArray[np.float64]:
+    """The reference path as (M, 2), m."""
+    return np.asarray(scene.path, dtype=np.float64).reshape(-1, 2)

@@ -1,0 +1,160 @@
+"""birthsim-animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
+
+import re
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from PIL import Image
+
+import birthsim_env
+from baselines.commands import animate
+from baselines.commands.animate import SAMPLE, main, take
+from baselines.registry import make_controller
+from birthsim_env.rendering import PairRenderer, Scene
+
+RIG = birthsim_env.Parameters()
+
+
+def command(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["birthsim-animate", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        return end.code
+    return 0
+
+
+def scene(**values):
+    fixed = {
+        "time": 1.0,
+        "piston": (0.0, 0.02),
+        "target": (0.5, 0.0),
+        "compliant_target": (0.52, 0.0),
+        "user_force": (100.0, 0.0),
+        "pressures": (2e5, 3e5, 4e5, 5e5),
+        "stiffness": (4000.0, 4000.0),
+        "path": np.zeros((0, 2)),
+        "title": "test",
+    }
+    return Scene(**{**fixed, **values})
+
+
+@pytest.fixture
+def pair():
+    return PairRenderer(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
+
+
+@pytest.mark.parametrize("suffix", ["webp", "gif"])
+def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, capsys):
+    path = tmp_path / "deeper" / f"pull.{suffix}"
+    options = ("--seed", 1, "--begin", 0.5, "--end", 1.5, "--rate", 10, "--out", path)
+    assert command(monkeypatch, *options) == 0
+    with Image.open(path) as image:
+        assert (image.n_frames, image.size) == (11, (960, 634))
+        durations, frames = [], []
+        for k in range(11):
+            image.seek(k)
+            frames.append(np.asarray(image.convert("RGB"), dtype=int))
+            durations.append(image.info["duration"])
+    assert durations[:-1] == [100] * 10
+    assert image.info["loop"] == 0
+    # Before the pull begins at 1 s the law alone moves; afterwards both do.
+    assert np.abs(frames[10] - frames[0])[:, :480].max() > 100
+    assert np.abs(frames[10] - frames[0])[:, 480:].max() > 100
+    printed = capsys.readouterr().out
+    assert f"written to {path}: 11 frames" in printed
+    rms = [float(value) for value in re.findall(r"([\d.]+) mm RMS", printed)]
+    assert rms[0] > 2 * rms[1] > 0
+
+
+def test_a_take_shows_the_run_of_the_environment():
+    env = gymnasium.make("BirthSIM/Forceps-v0", randomize=True, policy_period=0.001)
+    found = take(env, make_controller("backstepping", RIG), 3, (0.5, 1.5), 25, lambda count: None)
+    law = make_controller("backstepping", RIG)
+    _, info = env.reset(seed=3)
+    times, errors = [0.0], [np.hypot(*info["tracking_error"])]
+    for _ in range(1500):
+        _, _, _, _, info = env.step(law.command(env.unwrapped.measurement, env.unwrapped.reference))
+        times.append(info["time"])
+        errors.append(np.hypot(*info["tracking_error"]))
+    np.testing.assert_array_equal(found.errors, errors[500 :: round(SAMPLE / 0.001)])
+    np.testing.assert_allclose([scene.time for scene in found.scenes], 0.5 + 0.04 * np.arange(26))
+    np.testing.assert_allclose(found.scenes[-1].piston, info["piston_position"])
+    assert found.scenes[-1].user_force == pytest.approx(tuple(info["user_force"]))
+
+
+def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
+    class Slam:
+        def reset(self, lanes=None):
+            pass
+
+        def command(self, measurement, reference):
+            return np.array([1.0, -1.0, 1.0, -1.0])
+
+    env = gymnasium.make("BirthSIM/Forceps-v0", policy_period=0.001)
+    found = take(env, Slam(), 0, (0.0, 1.5), 10, lambda count: None)
+    assert np.isinf(found.errors[-1])
+    assert found.scenes[-1].piston == found.scenes[-2].piston
+    assert found.scenes[-1].time == pytest.approx(1.5)
+    other = take(env, make_controller("pid", RIG), 0, (0.0, 1.5), 10, lambda count: None)
+    frames = animate.draw([found, other], RIG, "lost", ["slam", "pid"], (0.0, 1.5), 10, lambda count: None)
+    assert len(frames) == 16
+
+
+def test_both_halves_have_one_scale_and_their_own_error(pair):
+    times = np.array([0.0, 0.5, 1.0])
+    same = pair.frame((scene(), scene()), times, 2 * (np.array([0.0, 0.005, 0.003]),))
+    left, right = same[70:595, :478], same[70:595, 482:960]
+    assert np.abs(left[:, 2:476].astype(int) - right[:, :474]).mean() < 1.0
+    other = pair.frame((scene(), scene()), times, (np.array([0.0, 0.005, 0.003]), np.array([0.0, 0.001, 0.009])))
+    assert (other[:, :480] == same[:, :480]).all()
+    assert (other[:, 480:] != same[:, 480:]).any()
+
+
+def test_a_frame_depends_on_what_it_shows_only(pair):
+    times, errors = np.array([0.0, 1.0]), 2 * (np.array([0.0, 0.004]),)
+    first = pair.frame((scene(), scene(piston=(0.03, -0.05))), times, errors)
+    pair.frame((scene(piston=(-0.05, 0.15)), scene(user_force=(0.0, 0.0))), np.arange(0.0, 2.0, 0.1), 2 * (np.full(20, 0.02),))
+    np.testing.assert_array_equal(pair.frame((scene(), scene(piston=(0.03, -0.05))), times, errors), first)
+
+
+@pytest.mark.parametrize(
+    "values", [{"piston": (np.nan, 0.0)}, {"user_force": (np.nan, 0.0)}, {"compliant_target": (np.inf, 0)}]
+)
+def test_what_is_not_finite_is_left_out(values, pair):
+    assert pair.frame(
+        (scene(**values), scene()), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
+    ).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--out", "pull.png"], "--out 'pull.png'; allowed: a file that ends in .webp or .gif"),
+        (["--end", "99", "--out", "a.gif"], "allowed: from 0 to 15 s"),
+        (["--begin", "2", "--end", "2.5", "--out", "a.gif"], "allowed: from 0 to 15 s, a second apart"),
+        (["--begin", "nan", "--out", "a.gif"], "allowed: from 0 to 15 s"),
+        (["--controller", "backstepping", "nobody", "--out", "a.gif"], "controller = 'nobody'; allowed: backstepping, "),
+        (["--controller", "backstepping", "--out", "a.gif"], "expected 2 arguments"),
+        (["--env", "BirthSIM/Moon-v0", "--out", "a.gif"], "--env 'BirthSIM/Moon-v0'; allowed: BirthSIM/Circle-v0"),
+        (["--rate", "30", "--out", "a.gif"], "invalid choice: 30"),
+        (["--parameters", "nowhere.toml", "--out", "a.gif"], "parameters = 'nowhere.toml' cannot be read"),
+    ],
+)
+def test_bad_input_is_one_plain_line(arguments, complaint, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert command(monkeypatch, *arguments) == 2
+    assert complaint in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_ends_without_a_file(monkeypatch, capsys, tmp_path):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(animate, "take", interrupted)
+    assert command(monkeypatch, "--out", tmp_path / "a.webp") == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,120 @@
+"""Frames as videos: Gymnasium's recorders take them, and what they write shows what was drawn."""
+
+import math
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.wrappers import RecordVideo
+from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
+from imageio_ffmpeg import read_frames
+
+import birthsim_env
+from birthsim_env.rendering import Renderer, Scene
+
+# moviepy leaves the pipes to its encoder to the garbage collector.
+pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+RIG = birthsim_env.Parameters()
+
+
+def frames_of(path):
+    """Frames (T, H, W, 3) and rate of a video file."""
+    reader = read_frames(str(path))
+    about = next(reader)
+    width, height = about["size"]
+    return np.stack([np.frombuffer(frame, dtype=np.uint8).reshape(height, width, 3) for frame in reader]), about["fps"]
+
+
+def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_path):
+    env = gymnasium.make("BirthSIM/Forceps-v0", render_mode="rgb_array", policy_period=0.02, max_episode_steps=20)
+    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda episode: True, name_prefix="pull")
+    drawn = []
+    for episode in range(2):
+        env.reset(seed=episode)
+        drawn.append(env.render())
+        for _ in range(20):
+            env.step(np.array([-0.2, 0.2, 0.3, -0.3], dtype=np.float32))
+            drawn.append(env.render())
+    env.close()
+    assert sorted(path.name for path in (tmp_path / "videos").iterdir()) == ["pull-episode-0.mp4", "pull-episode-1.mp4"]
+    for episode in range(2):
+        frames, rate = frames_of(tmp_path / "videos" / f"pull-episode-{episode}.mp4")
+        assert (frames.shape, rate) == ((21, 480, 640, 3), 50)
+        # The codec loses some colour at edges, nothing in the mean.
+        wanted = np.stack(drawn[21 * episode :][:21])
+        assert np.abs(frames.astype(float) - wanted).mean() < 3.0
+        assert np.abs(frames.astype(float) - wanted[::-1]).mean() > 1.1 * np.abs(frames.astype(float) - wanted).mean()
+
+
+@pytest.mark.filterwarnings("ignore:.*autoreset mode is same-step:UserWarning")
+def test_several_environments_are_recorded_side_by_side(tmp_path):
+    envs = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, render_mode="rgb_array", policy_period=0.02)
+    recorder = RecordVectorVideo(envs, str(tmp_path / "videos"), video_length=4, video_aspect_ratio=(3, 1))
+    recorder.reset(seed=0)
+    for _ in range(5):
+        recorder.step(np.zeros((3, 4), dtype=np.float32))
+    recorder.close()
+    (path,) = (tmp_path / "videos").iterdir()
+    recorded, rate = frames_of(path)
+    assert (recorded.shape[1:], rate) == ((480, 1920, 3), 50)
+
+
+@pytest.mark.parametrize("period", [0.001, 0.01, 0.04])
+def test_a_recording_plays_in_real_time(period):
+    single = gymnasium.make("BirthSIM/Circle-v0", policy_period=period)
+    several = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=period)
+    assert single.metadata["render_fps"] == several.metadata["render_fps"] == 1 / period
+
+
+def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypatch):
+    shown = []
+    monkeypatch.setattr(Renderer, "show", lambda self, scene, rate: shown.append((scene.time, rate)))
+    for period, times, rate in ((0.001, (0.0, 0.02, 0.04), 50.0), (0.01, (0.0, 0.02, 0.04), 50.0), (0.04, (0.0, 0.04), 25.0)):
+        shown.clear()
+        env = gymnasium.make("BirthSIM/Circle-v0", policy_period=period, render_mode="human")
+        env.reset(seed=0)
+        for _ in range(round(0.04 / period)):
+            env.step(np.zeros(4, dtype=np.float32))
+        assert shown == [pytest.approx((time, rate)) for time in times]
+
+
+def test_frames_come_in_the_size_asked_for():
+    env = gymnasium.make("BirthSIM/Probe-v0", render_mode="rgb_array", picture_size=(1280, 960))
+    env.reset(seed=0)
+    assert env.render().shape == (960, 1280, 3)
+    envs = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
+    envs.reset(seed=0)
+    assert [frame.shape for frame in envs.render()] == 2 * [(300, 400, 3)]
+
+
+@pytest.mark.parametrize("size", [(319, 480), (640, 239), (7681, 480), (640.0, 480.0), (640,), "640x480", None, (True, 480)])
+def test_an_impossible_size_is_refused_by_name(size):
+    with pytest.raises(ValueError, match=r"picture_size = .*allowed: two whole numbers from 320 x 240 to 7680 x 4320 px"):
+        gymnasium.make("BirthSIM/Probe-v0", picture_size=size)
+
+
+def test_without_moviepy_gymnasium_says_so_before_anything_runs(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "moviepy", None)
+    env = gymnasium.make("BirthSIM/Circle-v0", render_mode="rgb_array")
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match="MoviePy"):
+        RecordVideo(env, str(tmp_path / "videos"))
+
+
+@pytest.mark.parametrize("size", [(640, 480), (641, 487)])
+def test_a_frame_does_not_depend_on_those_before(size):
+    """Only what changes is drawn anew: nothing of it may stay behind or be missing."""
+    rng, renderer = np.random.default_rng(0), Renderer(RIG, *size)
+    for k in range(12):
+        target = rng.uniform((0.3, -0.2), (0.7, 0.2))
+        scene = Scene(
+            time=0.1 * k,
+            piston=tuple(rng.uniform((-0.09, -0.18), (0.09, 0.18))) if k % 5 else (math.nan, 0.0),
+            target=tuple(target),
+            compliant_target=tuple(target + rng.normal(0, 0.03, 2)),
+            user_force=tuple(rng.normal(0, 60, 2)),
+            pressures=tuple(rng.uniform(1e5, 7e5, 4)),
+            stiffness=(1e3 * k, 2e3),
+            path=rng.uniform((0.2, -0.3), (0.9, 0.3), (k, 2)),
+        )
+        np.testing.assert_array_equal(renderer.frame(scene), Renderer(RIG, *size).frame(scene))
