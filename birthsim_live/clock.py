@@ -141,23 +141,25 @@ class Clock(threading.Thread):
     def run(self) -> None:
         """Slice after slice, until ``stop``."""
         self._pace.restart(time.perf_counter())
-        shown = -IDLE_FRAME
+        shown, unshown = 0.0, True
         while not self._stopped:
+            news = bool(self._asked)
             while self._asked:
                 self._asked.popleft()()
-                shown = -IDLE_FRAME
-            now = time.perf_counter()
+            begun = time.perf_counter()
             running = not (self.paused or self._source.halted)
             if running:
-                self._advance(now)
+                self._advance(begun)
             else:
-                self._pace.skip(now)
+                self._pace.skip(begun)
+            unshown = unshown or news
             now = time.perf_counter()
-            between = FRAME if running else IDLE_FRAME
-            if now - shown >= between - SLICE / 4:
-                shown = now
+            between = FRAME if running or unshown else IDLE_FRAME
+            if now >= shown + between:
+                # From when it was due, so that lateness does not add up, unless it is a frame late already.
+                shown, unshown = max(shown + between, now - between), False
                 self._emit(running)
-            self._wake.wait(max(0.0, SLICE - (time.perf_counter() - now)) if running else SLICE * 4)
+            self._wake.wait(max(0.0, begun + SLICE - time.perf_counter()))
             self._wake.clear()
 
     def _advance(self, now: float) -> None:

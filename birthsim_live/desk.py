@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import asdict
@@ -18,6 +17,7 @@ from birthsim_live import protocol
 from birthsim_live.clock import Clock, Source
 from birthsim_live.hand import DRAG_LIMIT
 from birthsim_live.settings import Choices
+from birthsim_live.shapes import shapes
 from birthsim_live.windows import Window
 
 T = TypeVar("T")
@@ -44,12 +44,22 @@ class Desk(ABC):
         self.clock.start()
 
     async def close(self) -> None:
-        """Stop the clock."""
-        await asyncio.to_thread(self.clock.stop)
+        """Stop the clock and finish what is unfinished."""
+        await asyncio.to_thread(self.finish)
+
+    def finish(self) -> None:
+        """What ``close`` does, outside the event loop; once is enough."""
+        self.clock.stop()
 
     async def join(self, window: Window) -> None:
-        """Tell a new window everything."""
-        news = await self.ask(self.news)
+        """Tell a new window everything, and from then on the news."""
+        loop = asyncio.get_running_loop()
+        # From the clock's thread, like all news: what changes meanwhile comes after, not before.
+        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, window, self.news()))
+
+    def _welcome(self, window: Window, news: dict[str, dict[str, Any]]) -> None:
+        if window.closed:
+            return
         hello = {"type": "hello", "protocol": protocol.VERSION, "mode": self.mode, **self._surroundings}
         hello["settings"], hello["state"] = news["settings"]["settings"], news["state"]
         window.tell("hello", protocol.encode(hello))
@@ -59,6 +69,7 @@ class Desk(ABC):
 
     def leave(self, window: Window) -> None:
         """Forget a closed window."""
+        window.closed = True
         self._windows.discard(window)
 
     async def receive(self, window: Window, text: str | bytes) -> None:
@@ -103,6 +114,11 @@ class Desk(ABC):
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._publish, texts, shown)
 
+    def announce(self, message: dict[str, Any]) -> None:
+        """Send a message to every window, in the event loop."""
+        for window in self._windows:
+            window.answer(message)
+
     def _publish(self, texts: list[tuple[str, str]], frame: str) -> None:
         for window in self._windows:
             for kind, text in texts:
@@ -131,8 +147,8 @@ def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
             "k2": g.k2,
             "half_stroke1": rig.cylinder1.stroke / 2,
             "half_stroke2": rig.cylinder2.stroke / 2,
-            "bounds": _bounds(rig),
             "workspace": workspace(rig),
+            **shapes(rig),
         },
         "air": {"supply": air.supply_pressure, "atmosphere": air.atmospheric_pressure},
         "drag_limit": DRAG_LIMIT,
@@ -145,12 +161,3 @@ def workspace(rig: Parameters) -> list[list[float]]:
     half2 = np.full(EDGE, rig.cylinder2.stroke / 2)
     near, far = end_effector(np.stack([y1, -half2]), rig), end_effector(np.stack([y1, half2]), rig)
     return [[round(float(x), 6), round(float(y), 6)] for x, y in np.concatenate([near, far[:, ::-1]], axis=1).T]
-
-
-def _bounds(rig: Parameters) -> list[float]:
-    """Of all that the drawing of the rig takes in any pose, m: xmin, ymin, xmax, ymax."""
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    from birthsim_env.drawing.rig import Rig
-
-    low, high = Rig(rig).extent()
-    return [*map(float, low), *map(float, high)]

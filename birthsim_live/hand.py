@@ -11,8 +11,9 @@ from birthsim_env.lanes import Array
 from birthsim_env.user_forces import UserForce
 from birthsim_live.bridge import Fade
 
-DRAG_LIMIT = 150.0
-"""N, assumed: the person's hand pulls no harder, however far the pointer is."""
+DRAG_LIMIT = 100.0
+"""N, assumed: the person's hand pulls no harder, however far the pointer is. At 120 N downwards, more than cylinder 1 can
+hold, it slams into its end stop so fast that the pressure there leaves what the model describes; at 100 N it never did."""
 
 DRAG_DAMPING = 20.0
 """N s/m, assumed: a hand is no bare spring; it acts only while the pointer holds."""

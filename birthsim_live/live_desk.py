@@ -37,21 +37,27 @@ class LiveDesk(Desk):
         self._wake, self._idle = asyncio.Event(), asyncio.Event()
         self._idle.set()
         self._settling: asyncio.Task[None] | None = None
-        self._file: Path | None = None
         self._last: str | None = None
+        self._paths, self._path = session.paths, session.path()
 
     async def open(self) -> None:
         await super().open()
         self._settling = asyncio.create_task(self._settle())
 
     async def close(self) -> None:
-        """Stop everything; a running recording is finished."""
         if self._settling is not None:
             self._settling.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await self._settling
         await super().close()
-        self.finish_recording()
+
+    def finish(self) -> None:
+        """Stop the clock; a running recording is finished."""
+        super().finish()
+        recorder = self._take_recorder()
+        if recorder is not None:
+            recorder.save()
+            print(f"recording finished: {recorder.path}", flush=True)
 
     def leave(self, window: Window) -> None:
         super().leave(window)
@@ -72,8 +78,8 @@ class LiveDesk(Desk):
                 await self.ask(self._reset)
             case protocol.Record(on=True):
                 await self._idle.wait()
-                self._file = await asyncio.to_thread(_new_file, self.folder)
-                await self.ask(self._begin_recording)
+                path = await asyncio.to_thread(_new_file, self.folder)
+                await self.ask(lambda: self._begin_recording(path))
             case protocol.Record(on=False):
                 await self._end_recording()
             case _:
@@ -84,9 +90,7 @@ class LiveDesk(Desk):
         recorder = session.recorder
         if recorder is not None and recorder.full and self._loop is not None:
             self._loop.call_soon_threadsafe(lambda: asyncio.ensure_future(self._end_recording()))
-        recording = None
-        if recorder is not None and self._file is not None:
-            recording = {"file": self._file.name, "seconds": int(recorder.seconds)}
+        recording = None if recorder is None else {"file": recorder.path.name, "seconds": int(recorder.seconds)}
         state = {
             "type": "state",
             "paused": clock.paused,
@@ -96,16 +100,13 @@ class LiveDesk(Desk):
             "dragging": session.hands.hold is not None,
             "duration": session.duration,
         }
-        if self._path_told != session.paths:
-            self._path_told, self._path = session.paths, session.path()
+        if self._paths != session.paths:
+            self._paths, self._path = session.paths, session.path()
         return {
             "settings": {"type": "settings", "settings": session.shown_settings()},
             "state": state,
             "path": {"type": "path", "points": self._path},
         }
-
-    _path_told = -1
-    _path: list[list[float]]
 
     def _release(self, window: Window) -> None:
         if self._holder is window:
@@ -146,26 +147,24 @@ class LiveDesk(Desk):
             controller = await asyncio.to_thread(build_controller, name, session.rig)
         await self.ask(lambda: session.change(changes, controller))
 
-    def _begin_recording(self) -> None:
+    def _begin_recording(self, path: Path) -> None:
         if self._session.recorder is None:
-            self._session.recorder = Recorder(self._session)
+            self._session.recorder = Recorder(self._session, path)
 
     async def _end_recording(self) -> None:
         recorder = await self.ask(self._take_recorder)
-        if recorder is not None and self._file is not None:
-            await asyncio.to_thread(recorder.save, self._file)
-            self._last = self._file.name
+        if recorder is None:
+            return
+        try:
+            await asyncio.to_thread(recorder.save)
+        except OSError as error:
+            self.announce(protocol.error(f"recording {recorder.path} is lost: {error.strerror or error}"))
+        else:
+            self._last = recorder.path.name
 
     def _take_recorder(self) -> Recorder | None:
         recorder, self._session.recorder = self._session.recorder, None
         return recorder
-
-    def finish_recording(self) -> None:
-        """Save a recording that is still running; once the clock has stopped."""
-        recorder = self._take_recorder()
-        if recorder is not None and self._file is not None:
-            recorder.save(self._file)
-            print(f"recording finished: {self._file}")
 
 
 def _new_file(folder: Path) -> Path:

@@ -39,9 +39,10 @@ EVENTS = ("settings", "path", "lost")
 
 
 class Recorder:
-    """Takes a session down, from now on, into memory."""
+    """Takes a session down, from now on, into memory; ``path`` is where ``save`` writes it."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, path: Path) -> None:
+        self.path = path
         self._rig, self._interval = session.rig, EVERY * session.period
         self._rows: list[Array] = []
         self._events: list[dict[str, Any]] = []
@@ -75,7 +76,7 @@ class Recorder:
             self._known[kind] = value
             self._events.append({"row": len(self._rows), kind: value})
 
-    def save(self, path: Path) -> None:
+    def save(self) -> None:
         """Write the file, as a whole or not at all."""
         header = {
             "format": FORMAT,
@@ -85,10 +86,10 @@ class Recorder:
             "interval": self._interval,
             "events": self._events,
         }
-        partial = path.with_suffix(".partial")
+        partial = self.path.with_suffix(".partial")
         with partial.open("wb") as file:
             np.savez_compressed(file, rows=np.array(self._rows), header=np.array(json.dumps(header)))
-        partial.replace(path)
+        partial.replace(self.path)
 
 
 @dataclass(frozen=True)
@@ -138,18 +139,16 @@ def _checked(rows: Any, header: Any) -> Recording:
     events, last = header["events"], 0
     for event in events:
         kinds = [kind for kind in EVENTS if kind in event]
-        if len(event) != 2 or len(kinds) != 1 or not last <= event["row"] < len(rows) or not _EVENTS[kinds[0]](event[kinds[0]]):
+        if len(event) != 2 or len(kinds) != 1 or not last <= event["row"] < len(rows) or not _fits(kinds[0], event[kinds[0]]):
             raise ValueError(f"event {str(event)[:80]}; allowed: a row in order, and settings, a path or lost")
         last = event["row"]
     return Recording(Parameters.from_dict(header["rig"]), rows, interval, events)
 
 
-def _is_path(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and np.array(value, dtype=np.float64).shape == (len(value), 2)
-
-
-_EVENTS = {
-    "settings": lambda value: isinstance(value, dict) and all(isinstance(v, (str, float, bool)) for v in value.values()),
-    "path": _is_path,
-    "lost": lambda value: value is None or isinstance(value, str),
-}
+def _fits(kind: str, value: Any) -> bool:
+    """Whether an event of a kind may have this value."""
+    if kind == "settings":
+        return isinstance(value, dict) and all(isinstance(entry, (str, float, bool)) for entry in value.values())
+    if kind == "path":
+        return isinstance(value, list) and bool(value) and np.array(value, dtype=np.float64).shape == (len(value), 2)
+    return value is None or isinstance(value, str)

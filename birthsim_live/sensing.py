@@ -38,7 +38,7 @@ class ExchangeableSensors:
         """As every sensor model; the times that it tells are those of the caller's clock."""
         if self._first is None:
             self._first = int(ticks[0])
-        since = ticks - self._first
-        begun = self._first * self._electronics.control_period
-        seen = self._sensors.measure(since, since * self._electronics.control_period, motion, pressures, force)
+        since, period = ticks - self._first, self._electronics.control_period
+        begun = self._first * period
+        seen = self._sensors.measure(since, since.astype(np.float64) * period, motion, pressures, force)
         return replace(seen, time=time, position_time=seen.position_time + begun)

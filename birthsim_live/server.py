@@ -121,7 +121,8 @@ def create_app(desk: Desk, hosts: Collection[str] = LOOPBACK, recordings: Path |
         finally:
             desk.leave(window)
             sending.cancel()
-            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+            # However a socket broke, it is closed.
+            with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending
 
     app.mount("/static", StaticFiles(directory=PAGE), name="static")

@@ -49,7 +49,6 @@ class Session:
         self.recorder: Recorder | None = None
         self.controller = build_controller(self.settings.controller, rig)
         self._seed, self._episode = seed, 0
-        self._refused = False
         now = self.settings
         self.duration = SCENARIOS[now.scenario].duration
         trajectory, force, schedule = SCENARIOS[now.scenario].nominal()
@@ -89,9 +88,8 @@ class Session:
         """Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay."""
         now = self.settings
         self._simulation.plant.lane_parameters[:] = parameter_column(true_rig(self.rig, now))[:, None]
-        self._episode, self.lost, self._refused = 0, None, False
-        if now.stiffness_source == "sliders":
-            self._setpoints.choose(_chosen(now), 0.0)
+        self._episode, self.lost = 0, None
+        self._setpoints.choose(_chosen(now), 0.0)
         lane = np.ones(1, dtype=np.bool_)
         self._simulation.begin(lane, [self._seed], np.zeros(1, dtype=np.int64), self.duration)
         self.controller.reset()
@@ -115,10 +113,8 @@ class Session:
         if parts is not None:
             self.duration, self._episode = SCENARIOS[after.scenario].duration, 0
             self._follow(parts)
-        if after.stiffness_source == "sliders":
+        if _chosen(after) != _chosen(before):
             self._setpoints.choose(_chosen(after), now)
-        elif before.stiffness_source == "sliders":
-            self._setpoints.choose(None, now)
         if after.sensors != before.sensors:
             self._sensors.exchange(after.sensors, self._world("sensors"))
         if after.valves != before.valves:
@@ -126,8 +122,6 @@ class Session:
         if after.scenario_force != before.scenario_force:
             self.hands.want(after.scenario_force, now)
         self.hands.stiffness = after.drag_stiffness
-        if self._refused:
-            self.lost, self._refused = None, False
 
     def advance(self, periods: int, until: float = math.inf) -> int:
         """Run at least one and up to ``periods`` control periods, none begun after ``until`` (``time.perf_counter``, s); how
@@ -144,8 +138,9 @@ class Session:
         simulation = self._simulation
         try:
             commanded = openings(self.controller, simulation.measurement, simulation.reference, self.settings.damping)
-        except ValueError as error:
-            self.lost, self._refused = f"{self.settings.controller} refuses: {error}", True
+        except Exception as error:
+            # Whatever a controller of the bench trips over, the page says it and waits.
+            self.lost = f"{self.settings.controller} gives up: {error}"
             return
         try:
             simulation.step(as_action(commanded, self._actuation.size))
@@ -208,5 +203,6 @@ class Session:
         return dict(zip(STIFFNESSES, (round(float(value), 3) for value in asked[:4]), strict=True))
 
 
-def _chosen(settings: Settings) -> Array:
-    return np.array([getattr(settings, name) for name in STIFFNESSES])
+def _chosen(settings: Settings) -> tuple[float, ...] | None:
+    """The setpoints that take the scenario's place, N/m."""
+    return tuple(getattr(settings, name) for name in STIFFNESSES) if settings.stiffness_source == "sliders" else None

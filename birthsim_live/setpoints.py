@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from birthsim_env.lanes import Array
@@ -52,10 +54,10 @@ class Setpoints(StiffnessSchedule):
         self._schedule, self.begins = schedule, now
         self._pass_over(before, now)
 
-    def choose(self, values: Array | None, now: float) -> None:
-        """From ``now``, s, on ask for Kclx, Kcly, Kpneu1, Kpneu2 (4,), N/m; None gives them back to the schedule."""
+    def choose(self, values: Sequence[float] | None, now: float) -> None:
+        """From ``now``, s, on ask for Kclx, Kcly, Kpneu1, Kpneu2, N/m; None gives them back to the schedule."""
         before = self._at(now)
-        self._chosen = values
+        self._chosen = None if values is None else np.array(values)
         self._pass_over(before, now)
 
     def scenario(self, now: float) -> Array:

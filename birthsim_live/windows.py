@@ -18,6 +18,7 @@ class Window:
 
     def __init__(self, send: Callable[[str], Awaitable[None]]) -> None:
         self._send = send
+        self.closed = False
         self._news: dict[str, str] = {}
         self._answers: deque[str] = deque(maxlen=ANSWERS)
         self._frame: str | None = None

@@ -17,7 +17,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="birthsim-live",
         description="One rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, "
-        "valves and sensors while it moves, record it for birthsim-replay. Works without internet; served to this machine alone.",
+        "valves and sensors while it moves, record it for birthsim-replay. Works without internet, for this machine alone.",
     )
     add_address(parser, 8000)
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ipaddress
 import os
 import socket
@@ -23,8 +24,7 @@ def add_address(parser: argparse.ArgumentParser, port: int) -> None:
     parser.add_argument(
         "--host",
         default="127.0.0.1",
-        help="address or name to serve; other than the loopback it lets everybody who can reach it push the rig "
-        "(default: %(default)s)",
+        help="address or name to serve; other than the loopback it lets in everybody who can reach it (default: %(default)s)",
     )
 
 
@@ -52,7 +52,12 @@ def serve(desk: Desk, host: str, port: int, title: str, recordings: Path | None 
         app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
     )  # fmt: skip
-    uvicorn.Server(options).run(sockets=[listening])
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            uvicorn.Server(options).run(sockets=[listening])
+    finally:
+        # After a second interrupt the server leaves without closing the desk.
+        desk.finish()
 
 
 def listen(host: str, port: int) -> socket.socket:
