@@ -5,11 +5,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Any
 
-import numpy as np
-
 from birthsim_env.lanes import Array
 from birthsim_live.frames import SLICES, frame_of
 from birthsim_live.recording import EVENTS, Recording
+
+
+ROUNDING = 1e-6
+"""Of the time between two rows: nearer to a row than that is at it."""
 
 
 class Player:
@@ -50,7 +52,7 @@ class Player:
         rows = self.recording.rows
         here, there = rows[k], rows[min(k + 1, len(rows) - 1)]
         # A pointer that is not there (NaN) before or after is not there between.
-        row = np.asarray(here + part * (there - here))
+        row: Array = here + part * (there - here) if part > ROUNDING else here.copy()
         row[SLICES["time"]] = self.position
         return row
 
@@ -60,6 +62,5 @@ class Player:
 
     def _place(self) -> tuple[int, float]:
         """The row before the present instant, and how far it is to the next."""
-        # Rounding must not make the instant of a row belong to the row before.
-        place = self.position / self.recording.interval + 1e-9
+        place = self.position / self.recording.interval + ROUNDING / 2
         return int(place), place % 1.0

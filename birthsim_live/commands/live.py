@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_env.parameters import load_parameters
-from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.commands.serving import add_address, listen, serve
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.session import Session
 
@@ -28,11 +28,12 @@ def main() -> None:
 
 
 def _live(arguments: argparse.Namespace) -> None:
+    listening = listen(arguments.host, arguments.port)
     session = Session(load_parameters(arguments.parameters))
     session.advance(1)  # compiles what is not cached yet, before anybody looks
     session.reset()
     desk = LiveDesk(session, arguments.record_dir)
-    serve(desk, arguments.host, arguments.port, "birthsim-live", arguments.record_dir)
+    serve(desk, listening, arguments.host, "birthsim-live", arguments.record_dir)
 
 
 if __name__ == "__main__":

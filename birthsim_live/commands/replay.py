@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.commands.serving import add_address, listen, serve
 from birthsim_live.player import Player
 from birthsim_live.recording import load_recording
 from birthsim_live.replay_desk import ReplayDesk
@@ -24,9 +24,10 @@ def main() -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
+    listening = listen(arguments.host, arguments.port)
     recording = load_recording(arguments.file)
     title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
-    serve(ReplayDesk(Player(recording)), arguments.host, arguments.port, title)
+    serve(ReplayDesk(Player(recording)), listening, arguments.host, title)
 
 
 if __name__ == "__main__":

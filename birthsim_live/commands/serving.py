@@ -35,9 +35,8 @@ def port_number(text: str) -> int:
     return int(text)
 
 
-def serve(desk: Desk, host: str, port: int, title: str, recordings: Path | None = None) -> None:
-    """Serve a desk until an interrupt. Raises ``ValueError`` where the address cannot be served."""
-    listening = listen(host, port)
+def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
+    """Serve a desk on a bound socket (``listen``), by the name ``host``, until an interrupt."""
     loopback = is_loopback(host)
     shown = f"[{host}]" if ":" in host else host
     print(f"{title}: http://{shown}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True)
