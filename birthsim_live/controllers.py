@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.admittance_backstepping import AdmittanceBackstepping
 from baselines.backstepping import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
+from baselines.rivals.follower import Follower
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.signals import Measurement, Reference
 from birthsim_live.settings import RESIDUAL
+
+DAMPED = (BacksteppingController, AdmittanceBackstepping, Follower)
+"""Laws that can be told to damp more."""
 
 
 def build_controller(name: str, rig: Parameters) -> Controller:
@@ -21,12 +26,12 @@ def build_controller(name: str, rig: Parameters) -> Controller:
 
 def has_damping(controller: Controller) -> bool:
     """Whether the law can be told to damp more."""
-    return isinstance(controller, BacksteppingController)
+    return isinstance(controller, DAMPED)
 
 
 def openings(controller: Controller, measurement: Measurement, reference: Reference, damping: float) -> Array:
     """Spool openings (4, 1) of one control period, ``damping`` times the least damped where the law has one."""
-    if isinstance(controller, BacksteppingController):
+    if isinstance(controller, DAMPED):
         return controller.command(measurement, reference, damping_factor=np.array([damping]))
     return controller.command(measurement, reference)
 

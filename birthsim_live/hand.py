@@ -55,7 +55,7 @@ class Hands(UserForce):
         self.scenario_now: Array = np.zeros(2)
         self.drag_now: Array = np.zeros(2)
         self._fade: Fade | None = None
-        self._motion: Array = np.zeros((4, 1))
+        self._motion: tuple[Array, Array] = np.zeros((2, 1)), np.zeros((2, 1))
 
     def prepare(self, num_envs: int) -> None:
         self._force.prepare(num_envs)
@@ -65,7 +65,7 @@ class Hands(UserForce):
         self.begins, self._fade = 0.0, None
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
-        self._motion = np.concatenate([position, velocity])
+        self._motion = position, velocity
         now = float(time[0, 0])
         forces = self._scenario_at(now)
         if self._fade is not None and not self._fade.over(now):
@@ -96,7 +96,7 @@ class Hands(UserForce):
         if not self.wanted:
             return np.zeros((1, 2, 1))
         instant = np.full((1, 1), now - self.begins)
-        return np.array(self._force.force(instant, self._motion[:2], self._motion[2:]))
+        return np.array(self._force.force(instant, *self._motion))
 
     def _pass_over(self, now: float) -> None:
         self._fade = Fade(now, TRANSITION, self.scenario_now - self._scenario_at(now)[0, :, 0])

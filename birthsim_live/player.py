@@ -9,7 +9,6 @@ from birthsim_env.lanes import Array
 from birthsim_live.frames import SLICES, frame_of
 from birthsim_live.recording import EVENTS, Recording
 
-
 ROUNDING = 1e-6
 """Of the time between two rows: nearer to a row than that is at it."""
 

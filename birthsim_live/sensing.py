@@ -38,6 +38,8 @@ class ExchangeableSensors:
         """As every sensor model; the times that it tells are those of the caller's clock."""
         if self._first is None:
             self._first = int(ticks[0])
+        if self._first == 0:
+            return self._sensors.measure(ticks, time, motion, pressures, force)
         since, period = ticks - self._first, self._electronics.control_period
         begun = self._first * period
         seen = self._sensors.measure(since, since.astype(np.float64) * period, motion, pressures, force)

@@ -11,7 +11,7 @@ import numpy as np
 
 from baselines.controller import Controller
 from birthsim_env.actuation import ValveActuation
-from birthsim_env.lanes import PRESSURES, TEMPERATURES, Array, parameter_column
+from birthsim_env.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_env.scenarios import SCENARIOS, Parts
@@ -27,6 +27,11 @@ from birthsim_live.setpoints import Setpoints
 from birthsim_live.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
 
 PATH_POINTS = 400
+
+LOWEST, HIGHEST = np.full(STATES, -np.inf), np.full(STATES, np.inf)
+"""Of every row of the state: what the model holds for, as in the environments' rewards."""
+for _rows, _range in ((PRESSURES, PRESSURE_RANGE), (TEMPERATURES, TEMPERATURE_RANGE)):
+    LOWEST[list(_rows)], HIGHEST[list(_rows)] = _range
 
 
 class Session:
@@ -154,6 +159,8 @@ class Session:
 
     def _left_range(self) -> str | None:
         state = self.state[:, 0]
+        if ((state > LOWEST) & (state < HIGHEST)).all():
+            return None
         if not np.isfinite(state).all():
             return "the state is no longer finite"
         for name, unit, rows, (low, high) in (
@@ -163,7 +170,7 @@ class Session:
             for chamber, row in zip(("P1", "N1", "P2", "N2"), rows, strict=True):
                 if not low < state[row] < high:
                     return f"{name} of chamber {chamber} = {state[row]:g} {unit}; the model holds from {low:g} to {high:g}"
-        return None
+        raise AssertionError("a state out of range has a row out of range")
 
     @property
     def halted(self) -> bool:

@@ -16,6 +16,7 @@ from birthsim_env.geometry import inverse_geometry
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.scenarios import SCENARIOS
+from birthsim_live.bridge import Course
 from birthsim_live.frames import SLICES, frame_of
 from birthsim_live.hand import DRAG_DAMPING, DRAG_LIMIT, Hold, drag_force
 from birthsim_live.protocol import encode
@@ -180,12 +181,11 @@ def test_the_next_episode_follows_without_a_jump() -> None:
 
 @pytest.mark.parametrize(("first", "second"), list(permutations(SCENARIOS, 2)))
 def test_bridges_between_scenarios_stay_in_the_workspace(first: str, second: str) -> None:
-    for moment in (700, 2900):
-        one = session(scenario=first)
-        course = one._course
-        now = moment / 1000
-        trajectory, _, _ = SCENARIOS[second].nominal()
-        course.follow(trajectory, np.random.default_rng(0), now)
+    for now in (0.7, 2.9):
+        course, rng = Course(SCENARIOS[first].nominal()[0]), np.random.default_rng(0)
+        course.prepare(1)
+        course.begin(0, rng)
+        course.follow(SCENARIOS[second].nominal()[0], rng, now)
         samples = np.concatenate([course.sample(np.array([t]))[:2] for t in np.arange(now, now + 4, 0.02)], axis=1)
         inverse_geometry(samples, RIG)
 
@@ -208,6 +208,23 @@ def test_releasing_lets_go() -> None:
     assert np.isnan(part(one, "pointer")).all()
     one.advance(1000)
     assert frame_of(one.row(), RIG)["error_mm"] < 0.1
+
+
+@pytest.mark.parametrize("controller", ["backstepping-frozen", "admittance-backstepping", "pid"])
+def test_more_damping_is_a_slower_answer(controller: str) -> None:
+    """Without dry friction: how far the hand has come 60 ms after it begins to pull."""
+    rig = RIG.replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
+    ways = []
+    for damping in (1.0, 2.0):
+        one = Session(rig, replace(default_settings(rig), controller=controller, damping=damping))
+        assert one.shown_settings()["damping_applies"] is True
+        one.advance(10)
+        one.hands.hold = Hold(np.array([0.53, 0.0]), 1)
+        one.advance(60)
+        ways.append(part(one, "position")[0] - 0.5)
+        one.advance(1500)
+        assert frame_of(one.row(), rig)["error_mm"] < 0.3
+    assert ways[1] < 0.85 * ways[0]
 
 
 def test_a_lost_rig_waits_for_reset() -> None:
@@ -234,7 +251,7 @@ def test_a_lost_rig_waits_for_reset() -> None:
 def test_a_controller_that_gives_up_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     one = session()
 
-    def command(*_: Any) -> Array:
+    def command(*_: Any, **__: Any) -> Array:
         raise RuntimeError("no solution")
 
     monkeypatch.setattr(one.controller, "command", command)
@@ -245,14 +262,14 @@ def test_a_controller_that_gives_up_is_named(monkeypatch: pytest.MonkeyPatch) ->
 def test_settings_show_the_setpoints_that_hold() -> None:
     one = session(scenario="circle")
     assert one.shown_settings()["Kpneu1"] == 4600.0
-    assert one.shown_settings()["damping_applies"] is False
+    assert one.shown_settings()["damping_applies"] is True
     one.change({"Kclx": 3000.0})
     shown = one.shown_settings()
     assert (shown["stiffness_source"], shown["Kclx"], shown["Kcly"], shown["Kpneu1"]) == ("sliders", 3000.0, 2000.0, 4600.0)
-    one.change({"scenario": "forceps", "controller": "backstepping"})
+    one.change({"scenario": "forceps", "controller": "residual:circle"})
     shown = one.shown_settings()
     assert (shown["stiffness_source"], shown["Kclx"], shown["Kpneu1"]) == ("scenario", 4000.0, 4200.0)
-    assert shown["damping_applies"] is True
+    assert shown["damping_applies"] is False
 
 
 def test_what_is_wrong_changes_nothing() -> None:
