@@ -16,12 +16,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from birthsim_live.addresses import LOOPBACK
 from birthsim_live.desk import Desk
 from birthsim_live.windows import Window
 
 PAGE = Path(__file__).resolve().parent / "page"
-
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 HEADERS = {
     "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",

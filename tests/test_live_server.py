@@ -17,7 +17,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from birthsim_env.parameters import Parameters
 from birthsim_live import protocol
-from birthsim_live.commands.serving import is_loopback, listen
+from birthsim_live.addresses import is_loopback, listen
+from birthsim_live.commands.serving import serve
 from birthsim_live.frames import FIELDS
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.player import Player
@@ -278,6 +279,12 @@ def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path:
     assert f"recording finished: {tmp_path / message['recording']['file']}" in rest
     assert "Traceback" not in rest
     assert load_recording(tmp_path / message["recording"]["file"]).rows.shape[0] >= 1
+
+
+def test_without_the_extra_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    with socket.socket() as any_socket, pytest.raises(ValueError, match=r"pip install 'birthsim\[live\]'"):
+        serve(None, any_socket, "127.0.0.1", "")  # type: ignore[arg-type]
 
 
 def test_commands_refuse_in_one_line(tmp_path: Path) -> None:

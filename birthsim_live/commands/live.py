@@ -7,7 +7,8 @@ from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_env.parameters import load_parameters
-from birthsim_live.commands.serving import add_address, listen, serve
+from birthsim_live.addresses import listen
+from birthsim_live.commands.serving import add_address, serve
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.session import Session
 

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_live.commands.serving import add_address, listen, serve
+from birthsim_live.addresses import listen
+from birthsim_live.commands.serving import add_address, serve
 from birthsim_live.player import Player
 from birthsim_live.recording import load_recording
 from birthsim_live.replay_desk import ReplayDesk

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import ipaddress
-import os
 import socket
 from pathlib import Path
 
-import uvicorn
-
+from birthsim_live.addresses import LOOPBACK, is_loopback
 from birthsim_live.desk import Desk
-from birthsim_live.server import LOOPBACK, create_app
 
 LARGEST = 1 << 20
 """Bytes of a message that is still answered by an error; a larger one closes the socket."""
@@ -36,7 +32,14 @@ def port_number(text: str) -> int:
 
 
 def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
-    """Serve a desk on a bound socket (``listen``), by the name ``host``, until an interrupt."""
+    """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; ``ValueError`` without the extra."""
+    try:
+        import uvicorn
+        import websockets  # noqa: F401  uvicorn's own import would name no extra
+
+        from birthsim_live.server import create_app
+    except ImportError as error:
+        raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
     loopback = is_loopback(host)
     shown = f"[{host}]" if ":" in host else host
     print(f"{title}: http://{shown}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True)
@@ -57,34 +60,3 @@ def serve(desk: Desk, listening: socket.socket, host: str, title: str, recording
     finally:
         # After a second interrupt the server leaves without closing the desk.
         desk.finish()
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A socket bound to the address; ``ValueError`` where it is taken, unknown or all addresses at once."""
-    try:
-        family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
-    except (OSError, UnicodeError) as error:
-        raise ValueError(f"host = {host!r} is unknown ({error}); allowed: an address or name of this machine") from error
-    if ipaddress.ip_address(address[0]).is_unspecified:
-        raise ValueError(f"host = {host!r} means every address; allowed: one address or name, by which pages are opened")
-    listening = socket.socket(family, kind, number)
-    # Without it a port stays taken for a minute after its server has ended.
-    if os.name == "posix":
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind(address)
-        listening.listen()
-    except OSError as error:
-        listening.close()
-        raise ValueError(
-            f"port = {port} of {host} cannot be served ({error.strerror}); allowed: a free port, --port 0 finds one"
-        ) from error
-    return listening
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach ``host``."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host in LOOPBACK
