@@ -10,7 +10,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.error
 import urllib.request
 from pathlib import Path
 
@@ -69,7 +68,7 @@ class Server:
     def __enter__(self):
         end = time.monotonic() + 2 * PATIENCE
         while time.monotonic() < end and self.process.poll() is None:
-            with contextlib.suppress(urllib.error.URLError, ConnectionError), urllib.request.urlopen(self.url, timeout=2):
+            with contextlib.suppress(OSError), urllib.request.urlopen(self.url, timeout=2):
                 return self
             time.sleep(0.1)
         self.process.kill()

@@ -5,7 +5,7 @@ const LEAP = 1; // s
 export class History {
   constructor(names, capacity, gap) {
     this.capacity = capacity;
-    this.gap = gap; // s; frames nearer than this, as in slow motion, are left out
+    this.gap = gap; // s; frames nearer than this are left out: a plot has no room for them
     this.columns = Object.fromEntries(["time", ...names].map((name) => [name, new Float64Array(2 * capacity)]));
     this.clear();
   }

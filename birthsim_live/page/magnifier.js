@@ -75,7 +75,7 @@ export class Magnifier {
     context.strokeStyle = pen.INK;
     context.lineWidth = 1.5;
     context.stroke();
-    world.text(`${(1e3 * step).toFixed(0)} mm`, [right + 6, foot - 4], pen.INK, 12, "left", "500");
+    world.text(`${(1e3 * step).toFixed(0)} mm`, [right + 6, foot - 4], { align: "left", weight: 500 });
   }
 
   /** A triangle at the edge that points to what lies outside the window. */

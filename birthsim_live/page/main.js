@@ -5,7 +5,6 @@ import { NAMES, rowOf } from "./curves.js";
 import { Drag, belongsToAnother } from "./drag.js";
 import { Gauges } from "./gauges.js";
 import { History } from "./history.js";
-import { drawLegend } from "./legend.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
@@ -29,7 +28,7 @@ window.birthsim = rig;
 const scene = new Scene(byId("rig"));
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
-const history = new History(NAMES, 1024, 0.0085);
+const history = new History(NAMES, 512, 0.03);
 const plots = new Plots(byId("plots"), history);
 const readouts = new Readouts(byId("readouts"), byId("status"));
 const notices = new Notices(byId("notices"));
@@ -135,5 +134,4 @@ window.addEventListener("keydown", (event) => {
   }
 });
 
-drawLegend(document);
 requestAnimationFrame(draw);

@@ -124,19 +124,39 @@ export class Pen {
   }
 
   /** Text at a pixel, with a light rim that lifts it off what lies below. */
-  text(words, [x, y], colour = INK, size = 12, align = "center", weight = "600") {
-    const { context } = this;
-    context.font = `${weight} ${size}px ${FONT}`;
-    context.textAlign = align;
-    context.textBaseline = "middle";
-    context.lineJoin = "round";
-    context.strokeStyle = PAPER;
-    context.lineWidth = 4;
-    context.strokeText(words, x, y);
-    context.lineJoin = "miter";
-    context.fillStyle = colour;
-    context.fillText(words, x, y);
+  text(words, [x, y], look) {
+    const { image, width, height, ratio } = lettered(words, { ...PLAIN, ...look });
+    const shift = { left: 2, center: width / 2, right: width - 2 }[look?.align ?? PLAIN.align];
+    const whole = (value) => Math.round(value * ratio) / ratio; // between pixels of the screen letters blur
+    this.context.drawImage(image, whole(x - shift), whole(y - height / 2), image.width / ratio, image.height / ratio);
   }
+}
+
+const PLAIN = { colour: INK, size: 12, weight: 600, align: "center" };
+const MOST_TEXTS = 500;
+const texts = new Map();
+
+/** A picture of some words, kept since most words return frame after frame and rims are slow to draw. */
+function lettered(words, { colour, size, weight }) {
+  const ratio = Math.min(window.devicePixelRatio || 1, 3);
+  const name = `${words}|${colour}|${size}|${weight}|${ratio}`;
+  if (texts.has(name)) return texts.get(name);
+  if (texts.size > MOST_TEXTS) texts.clear();
+  const image = document.createElement("canvas");
+  const context = image.getContext("2d");
+  const font = `${weight} ${size}px ${FONT}`;
+  context.font = font;
+  const width = Math.ceil(context.measureText(words).width) + 4;
+  const height = Math.ceil(1.4 * size) + 4;
+  image.width = Math.ceil(width * ratio);
+  image.height = Math.ceil(height * ratio);
+  context.scale(ratio, ratio);
+  Object.assign(context, { font, textBaseline: "middle", lineJoin: "round", strokeStyle: PAPER, lineWidth: 4, fillStyle: colour });
+  context.strokeText(words, 2, height / 2);
+  context.fillText(words, 2, height / 2);
+  const text = { image, width, height, ratio };
+  texts.set(name, text);
+  return text;
 }
 
 /** Hollow ring with four ticks: it leaves free what lies inside it. */

@@ -1,4 +1,4 @@
-// Rolling plots: a few of them are redrawn with each frame, in turn, and only those that can be seen.
+// Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
 
 import uPlot from "/static/vendor/uPlot.esm.js";
 import { PLOTS } from "./curves.js";
@@ -7,7 +7,8 @@ import { formula } from "./symbols.js";
 
 const WINDOW = 8; // s
 const RATE = 15; // redraws of each plot per second, where the machine bears it
-const SHARE = 0.12; // of the time is the most that redrawing may take: the rig comes first
+const LATE = 25; // ms between frames of the screen that show that it does not: the rig comes first
+const LEAST_SHARE = 0.25; // of RATE
 const HEADING_FONT = `11px ${FONT}`;
 const GRID = { stroke: "rgb(232, 235, 239)", width: 1 };
 
@@ -110,7 +111,7 @@ class Plot {
       return gaps && name.startsWith("rendered") ? Array.from(values, (value) => (Number.isNaN(value) ? null : value)) : values;
     };
     const data = [this.history.view("time"), ...this.definition.curves.map(column)];
-    this.chart.batch(() => this.chart.setData(data)); // at once, so that its time can be taken
+    this.chart.setData(data);
   }
 }
 
@@ -147,21 +148,20 @@ export class Plots {
     this.plots = PLOTS.map((definition) => new Plot(definition, history, parent));
     this.next = 0;
     this.due = 0;
-    this.cost = 1; // ms of one redraw, smoothed
+    this.share = 1;
     this.last = performance.now();
   }
 
-  /** Redraw as many plots as are due; called with each frame so that the work is spread evenly. */
+  /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. */
   step(now) {
     const visible = this.plots.filter((plot) => plot.visible);
-    const perMillisecond = Math.min((visible.length * RATE) / 1e3, SHARE / this.cost);
-    this.due = Math.min(this.due + perMillisecond * (now - this.last), 2);
+    const gap = now - this.last;
     this.last = now;
-    for (; this.due >= 1 && visible.length; this.due -= 1) {
-      this.next = (this.next + 1) % visible.length;
-      const begun = performance.now();
-      visible[this.next].redraw();
-      this.cost += 0.1 * (performance.now() - begun - this.cost);
-    }
+    this.share = gap > LATE ? Math.max(0.8 * this.share, LEAST_SHARE) : Math.min(this.share + 0.01, 1);
+    this.due = Math.min(this.due + (visible.length * RATE * this.share * gap) / 1e3, 1);
+    if (this.due < 1 || visible.length === 0) return;
+    this.due = 0;
+    this.next = (this.next + 1) % visible.length;
+    visible[this.next].redraw();
   }
 }

@@ -56,7 +56,7 @@ export class Scene {
     context.strokeStyle = pen.INK;
     context.lineWidth = 1.5;
     context.stroke();
-    ground.text("100 mm", [left + length + 6, foot - 4], pen.INK, 12, "left", "500");
+    ground.text("100 mm", [left + length + 6, foot - 4], { align: "left", weight: 500 });
     this.backdrop = context;
   }
 
@@ -87,7 +87,7 @@ export class Scene {
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
     if (pose) this.drawNames(pose);
-    if (label) world.text(label.words, label.at, pen.FORCE, 14, "center", "700");
+    if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));
   }
 
@@ -131,12 +131,12 @@ export class Scene {
   drawNames(pose) {
     const away = 9 / this.pen.scale;
     for (const [name, place] of chamberNames(pose, this.geometry, away)) {
-      this.pen.text(name, this.pen.pixel(place), pen.INK, 12, "center", "700");
+      this.pen.text(name, this.pen.pixel(place), { weight: 700 });
     }
   }
 
   drawNote(note) {
-    if (note) this.pen.text(note, [this.sheet.width - MARGIN, this.sheet.height - 14], pen.FORCE, 13, "right");
+    if (note) this.pen.text(note, [this.sheet.width - MARGIN, this.sheet.height - 14], { colour: pen.FORCE, size: 13, align: "right" });
   }
 
   /** Where the spring ends, px from the end effector, or null. */
