@@ -92,8 +92,8 @@ def launch(playwright):
 class Window:
     """One tab with the page; ``complaints`` collects console errors, ``foreign`` requests that left this machine."""
 
-    def __init__(self, browser, url, size=WIDE):
-        self.context = browser.new_context(viewport=size, accept_downloads=True)
+    def __init__(self, browser, url, size=WIDE, touch=False):
+        self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
         self.page = self.context.new_page()
         self.complaints, self.foreign = [], []
         self.page.on("console", lambda message: message.type in ("error", "warning") and self.complaints.append(message.text))

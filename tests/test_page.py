@@ -153,6 +153,30 @@ def test_keys_pause_push_and_reset(window):
     window.wait(f"birthsim.frame.time < {time}")
 
 
+def test_a_finger_drags_the_head_and_scrolls_beside_it(chromium, server):
+    with Window(chromium, server.url, NARROW, touch=True) as window:
+        session = window.context.new_cdp_session(window.page)
+
+        def touch(kind, *points):
+            places = [{"x": x, "y": y} for x, y in points]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+        x, y = window.end_effector()
+        touch("touchStart", (x, y))
+        for k in range(1, 6):
+            touch("touchMove", (x - 4 * k, y + 8 * k))
+        window.wait("birthsim.frame.force[1] < -10")
+        assert window.value("scrollY") == 0
+        touch("touchEnd")
+        window.wait("birthsim.frame.pointer === null")
+        touch("touchStart", (x, y + 150))
+        for k in range(1, 9):
+            touch("touchMove", (x, y + 150 - 15 * k))
+        window.wait("scrollY > 20")
+        touch("touchEnd")
+        assert window.complaints == []
+
+
 def test_slow_motion(window):
     window.page.locator("#speed").select_option("0.1")
     window.wait("birthsim.state.speed === 0.1")

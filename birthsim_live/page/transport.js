@@ -22,6 +22,7 @@ export class Transport {
     document.body.dataset.mode = mode;
     this.replay = mode === "replay";
     byId("mode").textContent = mode;
+    document.title = `BirthSIM ${mode}`;
     byId("reset").querySelector("span").textContent = this.replay ? "Start" : "Reset";
   }
 
