@@ -15,6 +15,9 @@ T = TypeVar("T")
 SLICE = 0.004
 """s of wall time, about: the newest pointer and settings count from the next slice on."""
 
+BREATH = 0.001
+"""s of rest after each slice, however late it is: a slow controller must leave the interpreter to the windows' thread."""
+
 FRAME, IDLE_FRAME = 1 / 60, 0.1
 """s between frames, in motion and at rest."""
 
@@ -159,7 +162,7 @@ class Clock(threading.Thread):
                 # From when it was due, so that lateness does not add up, unless it is a frame late already.
                 shown, unshown = max(shown + between, now - between), False
                 self._emit(running)
-            self._wake.wait(max(0.0, begun + SLICE - time.perf_counter()))
+            self._wake.wait(max(BREATH, begun + SLICE - time.perf_counter()))
             self._wake.clear()
 
     def _advance(self, now: float) -> None:
