@@ -2,10 +2,12 @@
 
 const LEAST_GAP = 1000 / 120; // ms between messages
 const PUSH = 20; // N of an arrow key
+// Raw updates come when the mouse moves, other moves only when the screen is due: that costs up to a frame.
+const MOVE = "onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove";
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Drag {
-  /** `rig`: { scene, frame(), stiffness(), send(message), sent(id, time) }. */
+  /** `rig`: { scene, frame(), stiffness(), enabled(), send(message), sent(id, time) }. */
   constructor(canvas, rig) {
     this.canvas = canvas;
     this.rig = rig;
@@ -22,7 +24,8 @@ export class Drag {
   listen() {
     const { canvas } = this;
     canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    canvas.addEventListener("pointermove", (event) => this.move(event));
+    canvas.addEventListener(MOVE, (event) => event.pointerId === this.pointer && this.move(event));
+    canvas.addEventListener("pointermove", (event) => event.pointerId !== this.pointer && this.hover(event));
     for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) {
       canvas.addEventListener(type, (event) => event.pointerId === this.pointer && this.release());
     }
@@ -68,11 +71,12 @@ export class Drag {
     this.move(event);
   }
 
+  hover(event) {
+    const near = event.pointerType === "mouse" && this.rig.enabled() && this.reach(event, false) !== null;
+    this.canvas.classList.toggle("near", near);
+  }
+
   move(event) {
-    if (event.pointerId !== this.pointer) {
-      if (event.pointerType === "mouse" && this.rig.enabled()) this.canvas.classList.toggle("near", this.reach(event, false) !== null);
-      return;
-    }
     const [x, y] = this.place(event);
     this.aim([x - this.held[0], y - this.held[1]], event.timeStamp);
   }
