@@ -21,7 +21,7 @@ POLICIES := agents/policies
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,video,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,video,live,dev]'
 	touch $(READY)
 
 run: $(READY)
@@ -40,8 +40,8 @@ test-slow: $(READY)
 	$(BIN)/python -m pytest -n 2 -m slow
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents tests
-	$(BIN)/ruff format --check birthsim_env baselines agents tests
+	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests
+	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests
 	$(BIN)/mypy
 
 bench: $(READY)

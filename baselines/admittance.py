@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import require_stiffness
+from baselines.controller import require_stiffness, told_of
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters
@@ -67,12 +67,14 @@ def advance(
 
 @kernel
 def _update(
-    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, fresh: Array, motion: Array
-) -> None:
-    """``offset`` (4, N): xr - xt and its rate, carried on by one period where ``fresh`` (N,) is 0. ``motion`` (8, N)."""
+    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, fresh: Array,
+    motion: Array,
+) -> None:  # fmt: skip
+    """``offset`` (4, N): xr - xt and its rate, carried on by one period where ``fresh`` (N,) is 0; ``factor`` (N,) of the
+    damping, at least 1. ``motion`` (8, N)."""
     for i in range(offset.shape[1]):
         kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
-        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
+        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio * max(1.0, factor[i]))
         if fresh[i] > 0.0:
             offset[0, i], offset[1, i], offset[2, i], offset[3, i] = 0.0, 0.0, 0.0, 0.0
         ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
@@ -131,18 +133,18 @@ class Admittance:
         elif self._offset.shape[1]:
             self._fresh[lanes] = 1.0
 
-    def update(self, measurement: Measurement, reference: Reference) -> Array:
+    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
         """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
 
-        Called once per control period, with signals over N lanes. Raises ``ValueError`` for a stiffness that is not positive
-        definite.
+        Called once per control period, with signals over N lanes. ``damping_factor`` (N,) multiplies B; below 1 it is 1. Raises
+        ``ValueError`` for a stiffness that is not positive definite, and for a factor of another shape.
         """
         require_stiffness(reference, 0.0)
         lanes = reference.rows.shape[1]
         if self._offset.shape[1] != lanes:
             self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)
-        motion = np.empty((8, lanes))
-        _update(self._offset, reference.rows, measurement.user_force, *self._numbers, self._fresh, motion)
+        motion, factor = np.empty((8, lanes)), told_of(lanes, None, None, damping_factor)[4]
+        _update(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
         self._fresh[:] = 0.0
         return motion
 

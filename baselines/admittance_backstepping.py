@@ -119,15 +119,17 @@ class AdmittanceBackstepping:
         reference: Reference,
         believed_force: Array | None = None,
         believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
     ) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
         Called once per control period. ``believed_force`` (2, N), N, along the cylinders, and its rate ``believed_rate``,
-        N/s, are believed in beside what is observed. Raises ``ValueError`` for signals over different numbers of lanes, and for
-        a stiffness setpoint that is not positive definite.
+        N/s, are believed in beside what is observed. ``damping_factor`` (N,) multiplies the damping that the hand feels; below
+        1 it is 1. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness setpoint that is not
+        positive definite.
         """
         if measurement.position.ndim == 1:
-            given = (believed_force, believed_rate)
+            given = (believed_force, believed_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
@@ -136,7 +138,7 @@ class AdmittanceBackstepping:
             self._memory = np.repeat(FRESH, lanes, axis=1)
         kind = "lab" if measurement.sampled else "ideal"
         g, awareness = self._gains[kind], self._awareness[kind]
-        now = awareness.update(measurement, reference)
+        now = awareness.update(measurement, reference, damping_factor)
         openings = np.empty((4, lanes))
         quickness = 1.0 - math.exp(-self._period / g["lead_time"])
         admittance_law.command(

@@ -91,15 +91,15 @@ class Awareness:
         for part in (self._admittance, self._friction, self._chambers, self._pistons):
             part.reset(lanes)
 
-    def update(self, measurement: Measurement, reference: Reference) -> Situation:
-        """Take one control period's signals over N lanes.
+    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Situation:
+        """Take one control period's signals over N lanes. ``damping_factor`` (N,) multiplies the damping of the motion.
 
         Raises ``ValueError`` for signals over different numbers of lanes, and a stiffness that is not positive definite.
         """
         lanes = lanes_of(measurement, reference)
         if self._joints.shape[1] != lanes:
             self._joints = np.zeros((4, lanes))
-        motion = self._admittance.update(measurement, reference)
+        motion = self._admittance.update(measurement, reference, damping_factor)
         pressures = self._chambers.update(measurement.pressures, self._joints)
         measurement = replace(measurement, pressures=pressures)
         force = np.ascontiguousarray(measurement.user_force)

@@ -170,6 +170,21 @@ def test_damping_ratio_and_mass_are_those_asked_for(ratio: float) -> None:
         assert peak <= 1 + 1e-12
 
 
+def test_a_damping_factor_multiplies_the_damping_of_each_lane() -> None:
+    """Lane by lane the motion of an admittance with that much more damping, bit for bit; below 1 it says nothing."""
+    factors, force = np.array([0.0, 1.0, 1.5, 2.0]), np.full((2, 4), 20.0)
+    reference = asked(np.zeros((2, 4)), np.repeat([COUPLED], 4, axis=0))
+    model = Admittance(Parameters(), 0.8)
+    plain = [Admittance(Parameters(), 0.8 * max(1.0, factor)) for factor in factors]
+    for _ in range(300):
+        motion = model.update(pushed(force), reference, factors)
+        for lane, one in enumerate(plain):
+            alone = Reference(reference.rows[:, lane : lane + 1])
+            assert np.array_equal(motion[:, lane : lane + 1], one.update(pushed(force[:, :1]), alone))
+    with pytest.raises(ValueError, match=r"damping_factor has shape \(3,\); allowed: \(4,\)"):
+        model.update(pushed(force), reference, np.ones(3))
+
+
 def test_reset_of_some_lanes_starts_only_those_on_the_target() -> None:
     reference, force = asked(np.full((2, 3), 0.2), springs(3)), np.full((2, 3), 20.0)
     model, kept = Admittance(Parameters()), Admittance(Parameters())

@@ -82,18 +82,20 @@ class Follower(ABC):
         elif self._integral.shape[1]:
             self._fresh[lanes] = 1.0
 
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
+    def command(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes.
+        Called once per control period. ``damping_factor`` (N,) multiplies the damping that the hand feels; below 1 it is 1.
+        Raises ``ValueError`` for signals over different numbers of lanes.
         """
         if measurement.position.ndim == 1:
-            return self.command(*one_lane(measurement, reference))[:, 0]
+            factor = None if damping_factor is None else np.asarray(damping_factor, dtype=np.float64)[..., None]
+            return self.command(*one_lane(measurement, reference), factor)[:, 0]
         lanes = lanes_of(measurement, reference)
         if self._integral.shape[1] != lanes:
             self._integral, self._fresh = np.zeros((2, lanes)), np.ones(lanes)
         force = np.ascontiguousarray(measurement.user_force)
-        motion = self._admittance.update(measurement, reference)
+        motion = self._admittance.update(measurement, reference, damping_factor)
         if measurement.sampled:
             moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
             seen = np.ascontiguousarray(self._observer.update(measurement, force, moving=moving))

@@ -1,0 +1,41 @@
+"""birthsim-live: the rig in the browser, in real time, to see and to push."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from baselines.commands.shared import run
+from birthsim_env.parameters import load_parameters
+from birthsim_live.addresses import listen
+from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.live_desk import LiveDesk
+from birthsim_live.session import Session
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-live",
+        description="One rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, "
+        "valves and sensors while it moves, record it for birthsim-replay. Works without internet, for this machine alone.",
+    )
+    add_address(parser, 8000)
+    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    parser.add_argument(
+        "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
+    )
+    run(parser, _live)
+
+
+def _live(arguments: argparse.Namespace) -> None:
+    listening = listen(arguments.host, arguments.port)
+    session = Session(load_parameters(arguments.parameters))
+    session.advance(1)  # compiles what is not cached yet, before anybody looks
+    session.reset()
+    desk = LiveDesk(session, arguments.record_dir)
+    serve(desk, listening, arguments.host, "birthsim-live", arguments.record_dir)
+
+
+if __name__ == "__main__":
+    main()

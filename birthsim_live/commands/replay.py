@@ -1,0 +1,35 @@
+"""birthsim-replay: a recording of birthsim-live in the same page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from baselines.commands.shared import run
+from birthsim_live.addresses import listen
+from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.player import Player
+from birthsim_live.recording import load_recording
+from birthsim_live.replay_desk import ReplayDesk
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-replay",
+        description="Play a recording of birthsim-live in the page that it was made with: pause, seek, slow motion.",
+    )
+    parser.add_argument("file", type=Path, help="what birthsim-live wrote, .npz")
+    add_address(parser, 8001)
+    run(parser, _replay)
+
+
+def _replay(arguments: argparse.Namespace) -> None:
+    listening = listen(arguments.host, arguments.port)
+    recording = load_recording(arguments.file)
+    title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
+    serve(ReplayDesk(Player(recording)), listening, arguments.host, title)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""What birthsim-live and birthsim-replay share: address, port, and the server's run."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import socket
+from pathlib import Path
+
+from birthsim_live.addresses import LOOPBACK, is_loopback
+from birthsim_live.desk import Desk
+
+LARGEST = 1 << 20
+"""Bytes of a message that is still answered by an error; a larger one closes the socket."""
+
+
+def add_address(parser: argparse.ArgumentParser, port: int) -> None:
+    """The options --port and --host."""
+    parser.add_argument("--port", type=port_number, default=port, help="0 takes any that is free (default: %(default)s)")
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address or name to serve; other than the loopback it lets in everybody who can reach it (default: %(default)s)",
+    )
+
+
+def port_number(text: str) -> int:
+    """A port, for argparse."""
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to 65535")
+    return int(text)
+
+
+def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
+    """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; ``ValueError`` without the extra."""
+    try:
+        import uvicorn
+        import websockets  # noqa: F401  uvicorn's own import would name no extra
+
+        from birthsim_live.server import create_app
+    except ImportError as error:
+        raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
+    loopback = is_loopback(host)
+    shown = f"[{host}]" if ":" in host else host
+    print(f"{title}: http://{shown}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True)
+    if not loopback:
+        print(
+            f"exposed: everybody who can reach {host} may watch and push this rig, change its settings and fetch its "
+            "recordings; there is no password and no encryption. Pages must be opened by exactly this name.",
+            flush=True,
+        )
+    app = create_app(desk, LOOPBACK if loopback else (host,), recordings)
+    options = uvicorn.Config(
+        app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
+        timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
+    )  # fmt: skip
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            uvicorn.Server(options).run(sockets=[listening])
+    finally:
+        # After a second interrupt the server leaves without closing the desk.
+        desk.finish()

@@ -1,0 +1,45 @@
+"""Controllers of the bench as the page uses them: by the names of its choice, and with a damping where they have one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.admittance_backstepping import AdmittanceBackstepping
+from baselines.backstepping import BacksteppingController
+from baselines.controller import Controller
+from baselines.registry import make_controller
+from baselines.rivals.follower import Follower
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters
+from birthsim_env.signals import Measurement, Reference
+from birthsim_live.settings import RESIDUAL
+
+DAMPED = (BacksteppingController, AdmittanceBackstepping, Follower)
+"""Laws that can be told to damp more."""
+
+
+def build_controller(name: str, rig: Parameters) -> Controller:
+    """The controller of a choice such as ``pid`` or ``residual:circle``, that believes in ``rig``."""
+    kind, _, policy = name.partition(":")
+    return make_controller(RESIDUAL, rig, policy=policy) if kind == RESIDUAL else make_controller(name, rig)
+
+
+def has_damping(controller: Controller) -> bool:
+    """Whether the law can be told to damp more."""
+    return isinstance(controller, DAMPED)
+
+
+def openings(controller: Controller, measurement: Measurement, reference: Reference, damping: float) -> Array:
+    """Spool openings (4, 1) of one control period, ``damping`` times the least damped where the law has one."""
+    if isinstance(controller, DAMPED):
+        return controller.command(measurement, reference, damping_factor=np.array([damping]))
+    return controller.command(measurement, reference)
+
+
+def as_action(commanded: Array, size: int) -> Array:
+    """Openings (4, N) as the action of a valve layout with ``size`` valves.
+
+    One 5/3 valve per cylinder gets half the difference of what its chambers should: what moves the piston. Of a law for such
+    valves, whose openings are opposite, that is the opening of chamber P.
+    """
+    return np.ascontiguousarray(commanded if size == 4 else (commanded[[0, 2]] - commanded[[1, 3]]) / 2)

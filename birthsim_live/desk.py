@@ -1,0 +1,163 @@
+"""What all windows share: one clock, its news, and what they ask for."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+import numpy as np
+
+from birthsim_env.geometry import end_effector
+from birthsim_env.parameters import Parameters
+from birthsim_live import protocol
+from birthsim_live.clock import Clock, Source
+from birthsim_live.hand import DRAG_LIMIT
+from birthsim_live.settings import Choices
+from birthsim_live.shapes import shapes
+from birthsim_live.windows import Window
+
+T = TypeVar("T")
+
+EDGE = 33
+"""Points along each long edge of the workspace."""
+
+
+class Desk(ABC):
+    """All windows' messages in, news out. It lives in the event loop, its source in the clock's thread."""
+
+    mode: str
+
+    def __init__(self, source: Source, rig: Parameters, choices: Choices) -> None:
+        self.clock = Clock(source, self._from_clock)
+        self._surroundings = surroundings(rig, choices)
+        self._windows: set[Window] = set()
+        self._told: dict[str, Any] = {}
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    async def open(self) -> None:
+        """Start the clock."""
+        self._loop = asyncio.get_running_loop()
+        self.clock.start()
+
+    async def close(self) -> None:
+        """Stop the clock and finish what is unfinished."""
+        await asyncio.to_thread(self.finish)
+
+    def finish(self) -> None:
+        """What ``close`` does, outside the event loop; once is enough."""
+        self.clock.stop()
+
+    async def join(self, window: Window) -> None:
+        """Tell a new window everything, and from then on the news."""
+        loop = asyncio.get_running_loop()
+        # From the clock's thread, like all news: what changes meanwhile comes after, not before.
+        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, window, self.news()))
+
+    def _welcome(self, window: Window, news: dict[str, dict[str, Any]]) -> None:
+        if window.closed:
+            return
+        hello = {"type": "hello", "protocol": protocol.VERSION, "mode": self.mode, **self._surroundings}
+        hello["settings"], hello["state"] = news["settings"]["settings"], news["state"]
+        window.tell("hello", protocol.encode(hello))
+        for kind, message in news.items():
+            window.tell(kind, protocol.encode(message))
+        self._windows.add(window)
+
+    def leave(self, window: Window) -> None:
+        """Forget a closed window."""
+        window.closed = True
+        self._windows.discard(window)
+
+    async def receive(self, window: Window, text: str | bytes) -> None:
+        """Act on what a window has sent; what is wrong is answered by an error."""
+        try:
+            message = protocol.parse(text)
+            match message:
+                case protocol.Ping(id=identity):
+                    window.answer({"type": "pong", "id": identity})
+                case protocol.Pause(paused=paused):
+                    await self.ask(lambda: self.pause(paused))
+                case protocol.Speed(speed=speed):
+                    await self.ask(lambda: self.clock.set_speed(speed))
+                case _:
+                    await self.act(window, message)
+        except (ValueError, OSError) as error:
+            window.answer(protocol.error(str(error)))
+
+    async def ask(self, action: Callable[[], T]) -> T:
+        """Let the clock's thread do something; its result."""
+        return await asyncio.wrap_future(self.clock.ask(action))
+
+    def pause(self, paused: bool) -> None:
+        """In the clock's thread: stand still or go on."""
+        self.clock.pause(paused)
+
+    @abstractmethod
+    async def act(self, window: Window, message: protocol.Message) -> None:
+        """Act on a message that is not common to all desks."""
+
+    @abstractmethod
+    def news(self) -> dict[str, dict[str, Any]]:
+        """In the clock's thread: kind -> message, of all that a window must know beside the frames."""
+
+    def _from_clock(self, frame: dict[str, Any]) -> None:
+        texts = []
+        for kind, message in self.news().items():
+            if self._told.get(kind) != message:
+                self._told[kind] = message
+                texts.append((kind, protocol.encode(message)))
+        shown = protocol.encode(frame)
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._publish, texts, shown)
+
+    def announce(self, message: dict[str, Any]) -> None:
+        """Send a message to every window, in the event loop."""
+        for window in self._windows:
+            window.answer(message)
+
+    def _publish(self, texts: list[tuple[str, str]], frame: str) -> None:
+        for window in self._windows:
+            for kind, text in texts:
+                window.tell(kind, text)
+            window.show(frame)
+
+
+def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
+    """What a page must know of a rig and of what can be set."""
+    g, air = rig.geometry, rig.air
+    pivot1 = [g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3)]
+    return {
+        "choices": {
+            "scenario": choices.words["scenario"],
+            "controller": choices.controllers,
+            "valves": choices.words["valves"],
+            "sensors": choices.words["sensors"],
+        },
+        "ranges": {name: asdict(slider) for name, slider in choices.sliders.items()},
+        "geometry": {
+            "pivot1": pivot1,
+            "pivot2": [0.0, 0.0],
+            "d3": g.d3,
+            "d6": g.d6,
+            "k1": g.k1,
+            "k2": g.k2,
+            "half_stroke1": rig.cylinder1.stroke / 2,
+            "half_stroke2": rig.cylinder2.stroke / 2,
+            "workspace": workspace(rig),
+            **shapes(rig),
+        },
+        "air": {"supply": air.supply_pressure, "atmosphere": air.atmospheric_pressure},
+        "drag_limit": DRAG_LIMIT,
+    }
+
+
+def workspace(rig: Parameters) -> list[list[float]]:
+    """Outline of where the end effector can be, m: out along cylinder 2's shortest length, back along its longest."""
+    y1 = np.linspace(-rig.cylinder1.stroke / 2, rig.cylinder1.stroke / 2, EDGE)
+    half2 = np.full(EDGE, rig.cylinder2.stroke / 2)
+    near, far = end_effector(np.stack([y1, -half2]), rig), end_effector(np.stack([y1, half2]), rig)
+    return [[round(float(x), 6), round(float(y), 6)] for x, y in np.concatenate([near, far[:, ::-1]], axis=1).T]

@@ -1,0 +1,176 @@
+"""The desk of a rig in motion: drags, settings, resets and recordings."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from birthsim_live import protocol
+from birthsim_live.clock import LOG
+from birthsim_live.controllers import build_controller
+from birthsim_live.desk import Desk
+from birthsim_live.hand import Hold
+from birthsim_live.recording import Recorder
+from birthsim_live.session import Session
+from birthsim_live.settings import combined
+from birthsim_live.windows import Window
+
+
+class LiveDesk(Desk):
+    """All windows see and push the rig of one session; recordings go to ``folder``."""
+
+    mode = "live"
+
+    def __init__(self, session: Session, folder: Path) -> None:
+        super().__init__(session, session.rig, session.choices)
+        self.folder = folder
+        self._session = session
+        self._holder: Window | None = None
+        self._pending: dict[str, Any] = {}
+        self._askers: set[Window] = set()
+        self._wake, self._idle = asyncio.Event(), asyncio.Event()
+        self._idle.set()
+        self._settling: asyncio.Task[None] | None = None
+        self._last: str | None = None
+        self._paths, self._path = session.paths, session.path()
+
+    async def open(self) -> None:
+        await super().open()
+        self._settling = asyncio.create_task(self._settle())
+
+    async def close(self) -> None:
+        if self._settling is not None:
+            self._settling.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._settling
+        await super().close()
+
+    def finish(self) -> None:
+        """Stop the clock; a running recording is finished."""
+        super().finish()
+        recorder = self._take_recorder()
+        if recorder is not None:
+            recorder.save()
+            print(f"recording finished: {recorder.path}", flush=True)
+
+    def leave(self, window: Window) -> None:
+        super().leave(window)
+        self._askers.discard(window)
+        self._release(window)
+
+    async def act(self, window: Window, message: protocol.Message) -> None:
+        match message:
+            case protocol.Drag(position=position, id=identity):
+                self._holder = window
+                self._session.hands.hold = Hold(np.array(position), identity)
+            case protocol.Release():
+                self._release(window)
+            case protocol.Set(settings=settings):
+                self._set(window, settings)
+            case protocol.Reset():
+                await self._idle.wait()
+                await self.ask(self._reset)
+            case protocol.Record(on=True):
+                await self._idle.wait()
+                path = await asyncio.to_thread(_new_file, self.folder)
+                await self.ask(lambda: self._begin_recording(path))
+            case protocol.Record(on=False):
+                await self._end_recording()
+            case _:
+                raise ValueError(f"{type(message).__name__.lower()} in a live session; allowed: in a replay")
+
+    def news(self) -> dict[str, dict[str, Any]]:
+        session, clock = self._session, self.clock
+        recorder = session.recorder
+        if recorder is not None and recorder.full and self._loop is not None:
+            self._loop.call_soon_threadsafe(lambda: asyncio.ensure_future(self._end_recording()))
+        recording = None if recorder is None else {"file": recorder.path.name, "seconds": int(recorder.seconds)}
+        state = {
+            "type": "state",
+            "paused": clock.paused,
+            "speed": clock.speed,
+            "recording": recording,
+            "last_recording": self._last,
+            "dragging": session.hands.hold is not None,
+            "duration": session.duration,
+        }
+        if self._paths != session.paths:
+            self._paths, self._path = session.paths, session.path()
+        return {
+            "settings": {"type": "settings", "settings": session.shown_settings()},
+            "state": state,
+            "path": {"type": "path", "points": self._path},
+        }
+
+    def _release(self, window: Window) -> None:
+        if self._holder is window:
+            self._holder = self._session.hands.hold = None
+
+    def _reset(self) -> None:
+        self._session.reset()
+        self.clock.restart()
+
+    def _set(self, window: Window, settings: Mapping[str, Any]) -> None:
+        self._pending = combined(self._pending, self._session.choices.checked(settings))
+        self._askers.add(window)
+        self._idle.clear()
+        self._wake.set()
+
+    async def _settle(self) -> None:
+        """Apply what is set, all at once what came in since the last time: a flood of events is one change."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            changes, self._pending = self._pending, {}
+            askers, self._askers = self._askers, set()
+            try:
+                await self._change(changes)
+            except Exception as error:
+                if not isinstance(error, ValueError):
+                    LOG.exception("settings %s", changes)
+                for window in askers:
+                    window.answer(protocol.error(str(error)))
+            if not self._pending:
+                self._idle.set()
+
+    async def _change(self, changes: dict[str, Any]) -> None:
+        session, name = self._session, changes.get("controller")
+        controller = None
+        if name is not None and name != session.settings.controller:
+            # Some take a while to build; the rig runs on with the one it has.
+            controller = await asyncio.to_thread(build_controller, name, session.rig)
+        await self.ask(lambda: session.change(changes, controller))
+
+    def _begin_recording(self, path: Path) -> None:
+        if self._session.recorder is None:
+            self._session.recorder = Recorder(self._session, path)
+
+    async def _end_recording(self) -> None:
+        recorder = await self.ask(self._take_recorder)
+        if recorder is None:
+            return
+        try:
+            await asyncio.to_thread(recorder.save)
+        except OSError as error:
+            self.announce(protocol.error(f"recording {recorder.path} is lost: {error.strerror or error}"))
+        else:
+            self._last = recorder.path.name
+
+    def _take_recorder(self) -> Recorder | None:
+        recorder, self._session.recorder = self._session.recorder, None
+        return recorder
+
+
+def _new_file(folder: Path) -> Path:
+    """A name in ``folder`` that no file has; the folder is made if it is missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    stem, k = time.strftime("birthsim-%Y%m%d-%H%M%S"), 1
+    while (path := folder / f"{stem}{'' if k == 1 else f'-{k}'}.npz").exists():
+        k += 1
+    return path

@@ -1,0 +1,92 @@
+// Surroundings of the compliant target, where millimetres can be seen (birthsim_env/drawing/panel.py).
+
+import * as pen from "./pen.js";
+import { Axis, Pen, finite } from "./pen.js";
+import { Sheet } from "./sheet.js";
+
+const WINDOWS = [0.02, 0.04, 0.08, 0.16]; // widths the magnifier may show, m
+
+/** Width of the window around `centre`, m: the smallest that holds the `others` too. */
+export function windowAround(centre, others) {
+  const offsets = others.flatMap(([x, y]) => [Math.abs(x - centre[0]), Math.abs(y - centre[1])]).filter(Number.isFinite);
+  const offset = Math.max(0, ...offsets);
+  return WINDOWS.find((window) => offset <= 0.42 * window) ?? WINDOWS.at(-1);
+}
+
+export class Magnifier {
+  /** `heading` is the element that says how many times larger the picture is. */
+  constructor(canvas, heading) {
+    this.heading = heading;
+    this.path = [];
+    this.times = "";
+    this.sheet = new Sheet(canvas, { opaque: true });
+  }
+
+  setPath(points) {
+    this.path = points;
+  }
+
+  /** `mainScale` is that of the main view, px/m. */
+  draw(frame, mainScale) {
+    this.sheet.check();
+    const { width, height, context } = this.sheet;
+    if (!width) return;
+    const { target, compliant, position } = frame;
+    const window = windowAround(compliant, [target, position]);
+    const centre = [compliant, position, target].find(finite) ?? [0, 0];
+    const scale = Math.min(width, height) / window;
+    const world = new Pen(context, [width / 2 - scale * centre[0], height / 2 + scale * centre[1]], scale);
+    const step = window / 4;
+    context.fillStyle = "white";
+    context.fillRect(0, 0, width, height);
+    this.drawGrid(world, centre, step);
+    world.line(this.path, pen.PATH, 2);
+    world.line([compliant, position], pen.GREY, 1.2);
+    pen.targetMarker(world, target, 9);
+    pen.compliantMarker(world, compliant, 7.8);
+    pen.endEffectorMarker(world, position, 4.2);
+    for (const [place, colour] of [[target, pen.TARGET], [position, pen.END_EFFECTOR]]) this.pointOut(world, centre, place, colour);
+    this.drawScale(world, step);
+    this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
+  }
+
+  name(words) {
+    if (words !== this.times) this.heading.textContent = this.times = words;
+  }
+
+  drawGrid(world, centre, step) {
+    const { width, height } = this.sheet;
+    const frame = new Axis(centre, [1, 0]);
+    const [across, up] = [width / 2 / world.scale, height / 2 / world.scale];
+    for (let i = -Math.floor(across / step); i <= across / step; i += 1) {
+      world.line([frame.at(i * step, -up), frame.at(i * step, up)], "rgb(236, 239, 242)");
+    }
+    for (let i = -Math.floor(up / step); i <= up / step; i += 1) {
+      world.line([frame.at(-across, i * step), frame.at(across, i * step)], "rgb(236, 239, 242)");
+    }
+  }
+
+  drawScale(world, step) {
+    const { context } = world;
+    const [left, foot] = [10, this.sheet.height - 10];
+    const right = left + step * world.scale;
+    context.beginPath();
+    for (const [x, y] of [[left, foot - 4], [left, foot], [right, foot], [right, foot - 4]]) context.lineTo(x, y);
+    context.strokeStyle = pen.INK;
+    context.lineWidth = 1.5;
+    context.stroke();
+    world.text(`${(1e3 * step).toFixed(0)} mm`, [right + 6, foot - 4], { align: "left", weight: 500 });
+  }
+
+  /** A triangle at the edge that points to what lies outside the window. */
+  pointOut(world, centre, place, colour) {
+    if (!finite(place)) return;
+    const [dx, dy] = [place[0] - centre[0], place[1] - centre[1]];
+    const half = [this.sheet.width / 2 / world.scale, this.sheet.height / 2 / world.scale];
+    const far = Math.max(Math.abs(dx) / half[0], Math.abs(dy) / half[1]);
+    if (far <= 1) return;
+    const angle = Math.atan2(-dy, dx);
+    const corners = [0, 2.4, -2.4].map((turn) => [8 * Math.cos(angle + turn), 8 * Math.sin(angle + turn)]);
+    world.shape([centre[0] + (0.88 * dx) / far, centre[1] + (0.88 * dy) / far], corners, colour, pen.PAPER);
+  }
+}

@@ -1,0 +1,137 @@
+// Puts the page together: what comes from the server, what is drawn when, and what the keys do.
+
+import { Connection } from "./connection.js";
+import { NAMES, rowOf } from "./curves.js";
+import { Drag, belongsToAnother } from "./drag.js";
+import { Gauges } from "./gauges.js";
+import { History } from "./history.js";
+import { Magnifier } from "./magnifier.js";
+import { Monitor } from "./monitor.js";
+import { Notices } from "./notices.js";
+import { Plots } from "./plots.js";
+import { Readouts } from "./readouts.js";
+import { Scene } from "./scene.js";
+import { Settings } from "./settings.js";
+import { Transport } from "./transport.js";
+
+const byId = (id) => document.getElementById(id);
+
+/**
+ * What the page knows, for tests and for the curious:
+ * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
+ * `connected` whether it is there, `monitor` what the page measures of itself, `pixel([x, y])` the place of a point (m)
+ * on the screen in CSS px from the corner of the window.
+ */
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), pixel };
+window.birthsim = rig;
+
+const scene = new Scene(byId("rig"));
+const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
+const gauges = new Gauges(byId("gauges"));
+const history = new History(NAMES, 512, 0.025);
+const plots = new Plots(byId("plots"), history);
+const readouts = new Readouts(byId("readouts"), byId("status"));
+const notices = new Notices(byId("notices"));
+const send = (message) => connection.send(message);
+const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
+const transport = new Transport(send);
+const drag = new Drag(byId("rig"), {
+  scene,
+  send,
+  frame: () => rig.frame,
+  stiffness: () => rig.settings.drag_stiffness,
+  enabled: () => rig.connected && rig.hello.mode === "live",
+  sent: (id, time) => rig.monitor.sent(id, time),
+});
+
+const connection = new Connection({
+  opened: () => {},
+  closed: (seconds) => {
+    rig.connected = false;
+    drag.release();
+    banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
+    readouts.say("offline", "connection lost");
+  },
+  hello: (message) => {
+    rig.hello = message;
+    rig.connected = true;
+    rig.frame = null;
+    history.clear();
+    scene.setUp(message.geometry, message.air);
+    gauges.setUp(message.air);
+    transport.setUp(message);
+    banner("offline", "");
+    if (message.mode === "live") settings.setUp(message);
+    showSettings(message.settings);
+    showState(message.state);
+  },
+  settings: (message) => showSettings(message.settings),
+  state: (message) => showState(message),
+  path: ({ points }) => {
+    scene.setPath(points);
+    magnifier.setPath(points);
+  },
+  frame: (message) => {
+    rig.frame = message;
+    rig.monitor.received += 1;
+    history.push(message.time, rowOf(message));
+    drag.follow(message);
+  },
+  error: ({ message }) => notices.show(message),
+});
+
+function showSettings(values) {
+  if (!values) return;
+  rig.settings = values;
+  if (rig.hello.mode === "live") settings.show(values);
+}
+
+function showState(values) {
+  if (!values) return;
+  rig.state = values;
+  transport.show(values);
+}
+
+function banner(id, words) {
+  const element = byId(id);
+  if (element.textContent !== words) element.textContent = words;
+  element.hidden = !words;
+}
+
+function pixel(point) {
+  const [x, y] = scene.pen.pixel(point);
+  const box = byId("rig").getBoundingClientRect();
+  return [box.left + x, box.top + y];
+}
+
+let drawn = null;
+
+/** The newest frame is drawn as it came; nothing is made up between frames. */
+function draw(now) {
+  requestAnimationFrame(draw);
+  const { frame, state } = rig;
+  if (!frame || !state || !scene.pen) return;
+  if (frame !== drawn || !rig.connected) {
+    drawn = frame;
+    scene.draw(frame, drag.held);
+    magnifier.draw(frame, scene.pen.scale);
+    rig.monitor.drew(frame);
+    banner("lost", frame.lost ? `${frame.lost} Press R to reset.` : "");
+  }
+  transport.step(frame);
+  gauges.step(frame.pressures, now);
+  plots.step(now);
+  if (rig.connected) readouts.step(frame, state, now);
+}
+
+window.addEventListener("keydown", (event) => {
+  if (event.repeat || belongsToAnother(event) || !rig.connected) return;
+  if (event.key === " " && event.target.tagName !== "BUTTON") {
+    event.preventDefault();
+    transport.togglePause();
+  } else if (event.key === "r" || event.key === "R") {
+    transport.reset();
+  }
+});
+
+requestAnimationFrame(draw);

@@ -1,0 +1,167 @@
+// Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
+
+import uPlot from "/static/vendor/uPlot.esm.js";
+import { PLOTS } from "./curves.js";
+import { FONT, INK } from "./pen.js";
+import { formula } from "./symbols.js";
+
+const WINDOW = 8; // s
+const RATE = 15; // redraws of each plot per second, where the machine bears it
+const LATE = 25; // ms between frames of the screen that show that it does not: the rig comes first
+const LEAST_SHARE = 0.25; // of RATE
+const HEADING_FONT = `11px ${FONT}`;
+const GRID = { stroke: "rgb(232, 235, 239)", width: 1 };
+
+/** Round range around the data that grows at once and shrinks only when the data leave much of it empty. */
+function calmRange(least, zero) {
+  let kept = null;
+  return (low, high) => {
+    if (!(low <= high)) return kept ?? [0, least];
+    const [from, to] = zero ? [Math.min(0, low), high] : [low, high];
+    const span = Math.max(to - from, least);
+    const step = niceStep(span / 4);
+    const middle = (from + to) / 2;
+    const bottom = zero && from === 0 ? 0 : Math.floor((middle - 0.53 * span) / step) * step;
+    const top = Math.ceil((zero && from === 0 ? 1.06 * span : middle + 0.53 * span) / step) * step;
+    const rim = kept && !(zero && from === 0) ? 0.02 * (kept[1] - kept[0]) : 0; // no curve on the frame
+    const fits = kept && from >= kept[0] + rim && to <= kept[1] - rim && top - bottom > 0.6 * (kept[1] - kept[0]);
+    if (!fits) kept = [bottom, top];
+    return kept;
+  };
+}
+
+function niceStep(rough) {
+  const decade = 10 ** Math.floor(Math.log10(rough));
+  return decade * ([1, 2, 5].find((factor) => factor * decade >= rough) ?? 10);
+}
+
+/** Extremes of what is finite in several series. */
+function extremes(columns) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const column of columns) {
+    for (const value of column) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  return [low, high];
+}
+
+class Plot {
+  constructor(definition, history, parent) {
+    this.definition = definition;
+    this.history = history;
+    this.visible = true;
+    this.range = calmRange(definition.least, definition.zero);
+    const figure = document.createElement("figure");
+    figure.append(heading(definition));
+    this.place = document.createElement("div");
+    this.place.className = "plot";
+    figure.append(this.place);
+    parent.append(figure);
+    this.chart = new uPlot(this.options(), [[], ...definition.curves.map(() => [])], this.place);
+    new ResizeObserver(() => this.resize()).observe(this.place);
+    new IntersectionObserver((entries) => {
+      this.visible = entries.at(-1).isIntersecting;
+    }).observe(this.place);
+  }
+
+  options() {
+    const axis = { stroke: INK, font: HEADING_FONT, grid: GRID, ticks: { ...GRID, size: 4 } };
+    return {
+      width: Math.max(this.place.clientWidth, 120),
+      height: Math.max(this.place.clientHeight, 60),
+      padding: [6, 16, 0, 0],
+      cursor: { show: false },
+      legend: { show: false },
+      select: { show: false },
+      scales: {
+        x: { time: false, range: () => this.timeRange() },
+        y: { range: () => this.valueRange() },
+      },
+      axes: [
+        { ...axis, size: 20, gap: 2, space: 45, values: (_, splits) => splits.map((s) => `${s} s`) },
+        { ...axis, size: 46, gap: 4, space: 24, values: (_, splits) => splits.map((value) => String(Math.round(1e6 * value) / 1e6)) },
+      ],
+      series: [{}, ...this.definition.curves.map(({ colour, width, dash }) => ({ stroke: colour, width, dash, points: { show: false } }))],
+    };
+  }
+
+  timeRange() {
+    const newest = this.history.newest;
+    return newest > WINDOW ? [newest - WINDOW, newest] : [0, WINDOW];
+  }
+
+  valueRange() {
+    const { curves, follow } = this.definition;
+    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.history.view(name)));
+    return this.range(low, follow ? 1.5 * high : high);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.place;
+    if (width && height) this.chart.setSize({ width, height });
+  }
+
+  redraw() {
+    const gaps = this.definition.follow !== undefined;
+    const column = ({ name }) => {
+      const values = this.history.view(name);
+      // uPlot leaves a gap where a value is null, and typed arrays have none.
+      return gaps && name.startsWith("rendered") ? Array.from(values, (value) => (Number.isNaN(value) ? null : value)) : values;
+    };
+    const data = [this.history.view("time"), ...this.definition.curves.map(column)];
+    this.chart.setData(data);
+  }
+}
+
+/** Title, unit and a key to the curves. */
+function heading({ title, unit, curves }) {
+  const caption = document.createElement("figcaption");
+  const name = document.createElement("span");
+  name.className = "title";
+  name.textContent = `${title} `;
+  const inUnit = document.createElement("small");
+  inUnit.textContent = unit;
+  name.append(inUnit);
+  caption.append(name, ...curves.filter(({ symbol }) => symbol).map(key));
+  return caption;
+}
+
+function key({ symbol, colour, width, dash }) {
+  const item = document.createElement("span");
+  item.className = "key";
+  const space = "http://www.w3.org/2000/svg";
+  const swatch = document.createElementNS(space, "svg");
+  swatch.setAttribute("viewBox", "0 0 18 8");
+  swatch.setAttribute("aria-hidden", "true");
+  const line = document.createElementNS(space, "path");
+  const look = { d: "M0 4H18", stroke: colour, "stroke-width": width, "stroke-dasharray": dash.join(" ") };
+  for (const [attribute, value] of Object.entries(look)) line.setAttribute(attribute, value);
+  swatch.append(line);
+  item.append(swatch, formula(symbol));
+  return item;
+}
+
+export class Plots {
+  constructor(parent, history) {
+    this.plots = PLOTS.map((definition) => new Plot(definition, history, parent));
+    this.next = 0;
+    this.due = 0;
+    this.share = 1;
+    this.last = performance.now();
+  }
+
+  /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. */
+  step(now) {
+    const visible = this.plots.filter((plot) => plot.visible);
+    const gap = now - this.last;
+    this.last = now;
+    this.share = gap > LATE ? Math.max(0.8 * this.share, LEAST_SHARE) : Math.min(this.share + 0.01, 1);
+    this.due = Math.min(this.due + (visible.length * RATE * this.share * gap) / 1e3, 1);
+    if (this.due < 1 || visible.length === 0) return;
+    this.due = 0;
+    this.next = (this.next + 1) % visible.length;
+    visible[this.next].redraw();
+  }
+}

@@ -1,0 +1,71 @@
+// Figures under the rig, and the line that says how the machine keeps up.
+
+import { formula } from "./symbols.js";
+
+const RATE = 8; // updates per second: faster, digits cannot be read
+const SPOKEN_GAP = 2000; // ms between changes of the status line, which screen readers speak
+const KEEPS_UP = 0.98;
+
+const signed = (value, digits) =>
+  Number.isFinite(value) ? `${value < 0 || Object.is(Math.round(value * 10 ** digits), -0) ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
+const pair = (values, digits, factor = 1) => values.map((value) => signed(factor * value, digits)).join("  ");
+const difference = (a, b) => [a[0] - b[0], a[1] - b[1]];
+
+const FIGURES = [
+  ["time", [["t"]], "s", (frame) => frame.time.toFixed(2)],
+  ["user force", [["F", "us,x"], ", ", ["F", "us,y"]], "N", (frame) => pair(frame.force, 1)],
+  ["displacement", [["x", "c"], " − ", ["x", "t"], ", ", ["y", "c"], " − ", ["y", "t"]], "mm", (frame) => pair(difference(frame.position, frame.target), 1, 1e3)],
+  ["force over stiffness", [["F", "us"], "/", ["K", "cl"]], "mm", (frame) => pair(difference(frame.compliant, frame.target), 1, 1e3)],
+  ["error", [], "mm", (frame) => (Number.isFinite(frame.error_mm) ? frame.error_mm.toFixed(2) : "–")],
+];
+
+export class Readouts {
+  constructor(list, status) {
+    this.status = status;
+    this.last = 0;
+    this.spoken = -Infinity;
+    this.values = FIGURES.map(([title, symbol, unit]) => {
+      const box = document.createElement("div");
+      const term = document.createElement("dt");
+      term.append(`${title} `, formula(symbol));
+      const value = document.createElement("dd");
+      const digits = document.createElement("output");
+      const inUnit = document.createElement("small");
+      inUnit.textContent = ` ${unit}`;
+      value.append(digits, inUnit);
+      box.append(term, value);
+      list.append(box);
+      return digits;
+    });
+  }
+
+  step(frame, state, now) {
+    if (now - this.last < 1e3 / RATE) return;
+    this.last = now;
+    FIGURES.forEach(([, , , words], i) => {
+      const text = words(frame);
+      if (this.values[i].textContent !== text) this.values[i].textContent = text;
+    });
+    this.say(...pace(frame, state), now);
+  }
+
+  /** Change the status line, at once where its kind changes, else seldom. */
+  say(kind, words, now = performance.now()) {
+    if (words === this.status.textContent) return;
+    if (kind === this.status.dataset.kind && now - this.spoken < SPOKEN_GAP) return;
+    this.spoken = now;
+    this.status.dataset.kind = kind;
+    this.status.textContent = words;
+  }
+}
+
+/** How the physics keeps pace with the clock, in words. */
+function pace(frame, state) {
+  if (state.paused) return ["paused", "paused"];
+  if (frame.real_time == null) return ["waiting", "waiting"];
+  const share = Math.round(100 * frame.real_time);
+  const goal = state.speed < 1 ? `1 : ${Math.round(1 / state.speed)}` : "real time";
+  const behind = frame.behind >= 0.05 ? `${frame.behind.toFixed(1)} s behind` : "";
+  if (frame.real_time < KEEPS_UP) return ["slow", [`physics at ${share} % of ${goal}`, behind].filter(Boolean).join("; ")];
+  return ["well", `in ${goal === "real time" ? goal : `slow motion, ${goal}`}${behind && `; ${frame.behind.toFixed(1)} s lost earlier`}`];
+}

@@ -1,0 +1,189 @@
+// The main view: rig, path, targets, the user's force and the spring to the pointer (birthsim_env/drawing/picture.py).
+
+import * as pen from "./pen.js";
+import { Pen } from "./pen.js";
+import { windowAround } from "./magnifier.js";
+import { chamberNames, drawGround, drawRig, extent, noteOf, poseOf } from "./rig.js";
+import { Sheet } from "./sheet.js";
+
+const MARGIN = 10;
+const STRIP = 8; // px below the rig, for scale bar and notes
+const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
+
+export class Scene {
+  constructor(canvas) {
+    this.geometry = null;
+    this.path = [];
+    this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
+  }
+
+  setUp(geometry, air) {
+    this.geometry = geometry;
+    this.air = air;
+    this.layOut();
+  }
+
+  setPath(points) {
+    this.path = points;
+  }
+
+  /** Scale and origin so that all poses fill the room, and all that does not move on a backdrop. */
+  layOut() {
+    if (!this.geometry || !this.sheet?.width) return;
+    const { width, height } = this.sheet;
+    const [low, high] = extent(this.geometry);
+    const room = [width - 2 * MARGIN, height - STRIP - 2 * MARGIN];
+    const scale = Math.min(room[0] / (high[0] - low[0]), room[1] / (high[1] - low[1]));
+    const origin = [
+      width / 2 - (scale * (low[0] + high[0])) / 2,
+      MARGIN + room[1] / 2 + (scale * (low[1] + high[1])) / 2,
+    ];
+    this.unit = Math.min(Math.max(scale / 490, 0.6), 1.5); // 490 px/m is the scale of the 640x480 drawing
+    this.pen = new Pen(this.sheet.context, origin, scale);
+    this.drawBackdrop(origin, scale);
+  }
+
+  drawBackdrop(origin, scale) {
+    const { width, height } = this.sheet;
+    const context = this.sheet.backdrop();
+    const ground = new Pen(context, origin, scale);
+    context.fillStyle = pen.PAPER;
+    context.fillRect(0, 0, width, height);
+    drawGround(ground, this.geometry);
+    const [left, foot, length] = [2 * MARGIN, height - MARGIN, 0.1 * scale];
+    context.beginPath();
+    for (const [x, y] of [[left, foot - 4], [left, foot], [left + length, foot], [left + length, foot - 4]]) context.lineTo(x, y);
+    context.strokeStyle = pen.INK;
+    context.lineWidth = 1.5;
+    context.stroke();
+    ground.text("100 mm", [left + length + 6, foot - 4], { align: "left", weight: 500 });
+    this.backdrop = context;
+  }
+
+  /** Where the end effector is held, px: the radius of the head, but never less than a finger needs. */
+  grip(coarse) {
+    return Math.max(1.1 * this.geometry.head.radius * this.pen.scale, coarse ? 34 : 18);
+  }
+
+  /** `held` is the offset, m, from end effector to the place where this window holds it, or null. */
+  draw(frame, held) {
+    if (!this.pen) return;
+    this.sheet.check();
+    const { pen: world, unit, geometry } = this;
+    this.sheet.lay(this.backdrop);
+    world.context.lineJoin = "miter";
+    world.line(this.path, pen.PATH, 2 * unit);
+    const pose = poseOf(frame, geometry);
+    const { supply, atmosphere } = this.air;
+    if (pose) {
+      drawRig(world, pose, geometry, frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere))));
+    }
+    world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
+    this.drawWindow(frame);
+    const size = Math.max(2.8, 3.8 * unit);
+    pen.targetMarker(world, frame.target, 1.75 * size);
+    pen.compliantMarker(world, frame.compliant, 1.35 * size);
+    const label = pose && this.drawForce(frame.force, pose, this.hand(frame, held ?? [0, 0]));
+    if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
+    pen.endEffectorMarker(world, frame.position, 0.75 * size);
+    if (pose) this.drawNames(pose);
+    if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
+    this.drawNote(noteOf(frame, geometry));
+  }
+
+  /** Frame of what the magnifier shows. */
+  drawWindow(frame) {
+    const half = windowAround(frame.compliant, [frame.target, frame.position]) / 2;
+    const [x, y] = frame.compliant;
+    this.pen.line([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half], [x - half, y - half]], pen.GREY, 0.8);
+  }
+
+  /** The spring from the hand's hold on the end effector to the pointer. */
+  drawSpring(frame, [hx, hy]) {
+    const { context } = this.pen;
+    const from = this.pen.pixel([frame.position[0] + hx, frame.position[1] + hy]);
+    const to = this.pen.pixel([frame.pointer[0] + hx, frame.pointer[1] + hy]);
+    const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+    const turns = 5;
+    context.beginPath();
+    context.moveTo(...from);
+    if (length > 8) {
+      const [ux, uy] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+      const lead = Math.min(6, length / 6);
+      for (let i = 0; i <= 2 * turns; i += 1) {
+        const along = lead + ((length - 2 * lead) * i) / (2 * turns);
+        const aside = i === 0 || i === 2 * turns ? 0 : 4.5 * (i % 2 ? 1 : -1);
+        context.lineTo(from[0] + ux * along - uy * aside, from[1] + uy * along + ux * aside);
+      }
+    }
+    context.lineTo(...to);
+    context.lineJoin = "round";
+    context.strokeStyle = pen.PAPER;
+    context.lineWidth = 3.5;
+    context.stroke();
+    context.strokeStyle = pen.CAP;
+    context.lineWidth = 1.5;
+    context.stroke();
+    const end = [frame.pointer[0] + hx, frame.pointer[1] + hy];
+    this.pen.disc(end, 5, pen.PAPER, pen.CAP, 2);
+  }
+
+  drawNames(pose) {
+    const away = 9 / this.pen.scale;
+    for (const [name, place] of chamberNames(pose, this.geometry, away)) {
+      this.pen.text(name, this.pen.pixel(place), { weight: 700 });
+    }
+  }
+
+  drawNote(note) {
+    if (note) this.pen.text(note, [this.sheet.width - MARGIN, this.sheet.height - 14], { colour: pen.FORCE, size: 13, align: "right" });
+  }
+
+  /** Where the spring ends, px from the end effector, or null. */
+  hand({ pointer, position }, [hx, hy]) {
+    return pointer && [(pointer[0] + hx - position[0]) * this.pen.scale, -(pointer[1] + hy - position[1]) * this.pen.scale];
+  }
+
+  /**
+   * Arrow of the user's force at the head, or beyond the `hand` where that pulls the same way; returns the arrow's label and
+   * where that belongs, px.
+   */
+  drawForce([fx, fy], pose, hand) {
+    const newtons = Math.hypot(fx, fy);
+    if (!(newtons > LEAST_FORCE && Number.isFinite(newtons))) return null;
+    const { unit } = this;
+    const [x, y] = this.pen.pixel(pose.endEffector);
+    const [dx, dy] = [fx / newtons, -fy / newtons];
+    const edge = 1.2 * this.geometry.head.radius * this.pen.scale;
+    const along = hand ? dx * hand[0] + dy * hand[1] : 0;
+    const start = hand && Math.abs(dx * hand[1] - dy * hand[0]) < 0.5 * along ? Math.max(edge, along + 9) : edge;
+    const length = unit * Math.min(14 + 0.8 * newtons, 110);
+    const words = `${newtons < 1e5 ? newtons.toFixed(0) : newtons.toExponential(1)} N`;
+    const half = [4.2 * words.length + 4, 9];
+    const inside = (at, room) =>
+      at[0] > room[0] && at[0] < this.sheet.width - room[0] && at[1] > room[1] && at[1] < this.sheet.height - STRIP - room[1];
+    const free = (distance) => inside([x + dx * distance, y + dy * distance], [4, 4]);
+    // Clear of the cylinders where there is room: a pull leaves the head, a force into the machine ends at it as a push.
+    const pull = [start, start + length];
+    const push = [-edge - length, -edge];
+    const [ax, ay] = pose.axes[1].along;
+    const intoMachine = fx * ax + fy * ay < -0.5 * newtons;
+    const [tail, tip] = (intoMachine ? free(push[0]) || !free(pull[1]) : !free(pull[1]) && free(push[0])) ? push : pull;
+    pen.arrow(this.pen.context, [x + dx * tail, y + dy * tail], [x + dx * tip, y + dy * tip], 5 * unit);
+    const far = tail > 0 ? tip : tail;
+    const middle = (tail + tip) / 2;
+    const beyond = far + Math.sign(far) * (Math.abs(dx) * half[0] + Math.abs(dy) * half[1] + 2 * unit);
+    const aside = Math.abs(dy) * half[0] + Math.abs(dx) * half[1] + 8 * unit;
+    const places = [
+      [x + dx * beyond, y + dy * beyond],
+      ...[aside, -aside].map((s) => [x + dx * middle - dy * s, y + dy * middle + dx * s]),
+    ];
+    return { words, at: places.find((place) => inside(place, half)) ?? this.nearest(places[0], half) };
+  }
+
+  /** Off limits, a label stays in the picture on the side where the head has left it. */
+  nearest([x, y], [halfWidth, halfHeight]) {
+    const clip = (value, least, most) => Math.min(Math.max(value, least), most);
+    return [clip(x, halfWidth, this.sheet.width - halfWidth), clip(y, halfHeight, this.sheet.height - STRIP - halfHeight)];
+  }
+}

@@ -1,0 +1,95 @@
+// Lists and sliders for everything that can be set while the rig runs.
+
+import { NumberField } from "./slider.js";
+
+const LISTS = { scenario: "Scenario", controller: "Controller", valves: "Valves", sensors: "Sensors" };
+const GROUPS = {
+  "Rendered stiffness": { Kclx: ["along x ", ["K", "clx"]], Kcly: ["along y ", ["K", "cly"]] },
+  "Pneumatic stiffness": { Kpneu1: ["cylinder 1 ", ["K", "pneu1"]], Kpneu2: ["cylinder 2 ", ["K", "pneu2"]] },
+  "Law and rig": { damping: ["damping ", ["B"]], mass: ["mass ", ["M"]], friction: ["friction"] },
+  "Your hand": { drag_stiffness: ["spring to the pointer"] },
+};
+const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
+
+export class Settings {
+  /** `change(settings)` asks the server; what it answers comes back through `show`. */
+  constructor(form, change) {
+    this.form = form;
+    this.change = change;
+    form.addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  setUp({ choices, ranges }) {
+    this.form.replaceChildren();
+    this.lists = {};
+    this.fields = {};
+    const lists = group("Experiment");
+    for (const [name, title] of Object.entries(LISTS)) lists.append(this.list(name, title, choices[name]));
+    lists.append(this.ownHand());
+    this.form.append(lists);
+    for (const [title, names] of Object.entries(GROUPS)) {
+      const box = group(title);
+      for (const name in names) {
+        this.fields[name] = new NumberField(name, names[name], ranges[name], (value) => this.change({ [name]: value }));
+        box.append(this.fields[name].element);
+      }
+      if ("Kpneu1" in names) box.append(this.giveBack());
+      this.form.append(box);
+    }
+  }
+
+  list(name, title, choices) {
+    const label = document.createElement("label");
+    label.className = "list";
+    const select = document.createElement("select");
+    select.name = name;
+    for (const choice of choices) {
+      const { name: value, title: words = value, missing } = typeof choice === "string" ? { name: choice } : choice;
+      const option = new Option(missing ? `${words} (${missing})` : words.replaceAll("_", " "), value);
+      option.disabled = Boolean(missing);
+      select.add(option);
+    }
+    select.addEventListener("change", () => this.change({ [name]: select.value }));
+    label.append(title, select);
+    this.lists[name] = select;
+    return label;
+  }
+
+  ownHand() {
+    const label = document.createElement("label");
+    label.className = "check";
+    this.scenarioForce = document.createElement("input");
+    this.scenarioForce.type = "checkbox";
+    this.scenarioForce.name = "scenario_force";
+    this.scenarioForce.addEventListener("change", () => this.change({ scenario_force: this.scenarioForce.checked }));
+    label.append(this.scenarioForce, "the scenario's own pushes act too");
+    return label;
+  }
+
+  giveBack() {
+    this.source = document.createElement("button");
+    this.source.type = "button";
+    this.source.id = "stiffness-source";
+    this.source.addEventListener("click", () => this.change({ stiffness_source: "scenario" }));
+    return this.source;
+  }
+
+  show(settings) {
+    for (const name in this.lists) this.lists[name].value = settings[name];
+    for (const name in this.fields) this.fields[name].show(settings[name]);
+    this.scenarioForce.checked = settings.scenario_force;
+    const own = settings.stiffness_source === "scenario";
+    this.source.disabled = own;
+    this.source.textContent = own ? "these are the scenario's setpoints" : "back to the scenario's setpoints";
+    for (const name of SETPOINTS) this.fields[name].element.classList.toggle("given", own);
+    this.fields.damping.enable(settings.damping_applies, "this controller has no damping to set");
+  }
+}
+
+function group(title) {
+  const box = document.createElement("fieldset");
+  const legend = document.createElement("legend");
+  legend.textContent = title;
+  box.append(legend);
+  return box;
+}

@@ -1,0 +1,89 @@
+// Pause, reset, slow motion, recording, and the scrubber of a replay.
+
+const byId = (id) => document.getElementById(id);
+
+export class Transport {
+  constructor(send) {
+    this.send = send;
+    this.state = { paused: false, speed: 1, recording: null };
+    byId("pause").addEventListener("click", () => this.togglePause());
+    byId("reset").addEventListener("click", () => this.reset());
+    byId("speed").addEventListener("change", (event) => send({ type: "speed", speed: Number(event.target.value) }));
+    byId("record").addEventListener("click", () => send({ type: "record", on: !this.state.recording }));
+    this.scrub = byId("scrub");
+    this.held = false;
+    this.asked = null;
+    this.scrub.addEventListener("input", () => this.seek());
+    this.scrub.addEventListener("pointerdown", () => (this.held = true));
+    for (const type of ["pointerup", "pointercancel", "blur"]) this.scrub.addEventListener(type, () => (this.held = false));
+  }
+
+  setUp({ mode }) {
+    document.body.dataset.mode = mode;
+    this.replay = mode === "replay";
+    byId("mode").textContent = mode;
+    document.title = `BirthSIM ${mode}`;
+    byId("reset").querySelector("span").textContent = this.replay ? "Start" : "Reset";
+  }
+
+  togglePause() {
+    this.send({ type: "pause", paused: !this.state.paused });
+  }
+
+  /** A replay has no state to reset: it goes back to its start. */
+  reset() {
+    this.send(this.replay ? { type: "seek", time: 0 } : { type: "reset" });
+  }
+
+  seek() {
+    if (this.asked === null) {
+      requestAnimationFrame(() => {
+        this.send({ type: "seek", time: this.asked });
+        this.asked = null;
+      });
+    }
+    this.asked = this.scrub.valueAsNumber;
+    this.writeTime(this.asked);
+  }
+
+  show(state) {
+    this.state = state;
+    const pause = byId("pause");
+    pause.classList.toggle("paused", state.paused);
+    pause.querySelector("span").textContent = state.paused ? "Run" : "Pause";
+    const speed = byId("speed");
+    if (![...speed.options].some(({ value }) => Number(value) === state.speed)) {
+      speed.add(new Option(`1 : ${Number((1 / state.speed).toPrecision(3))}`, state.speed));
+    }
+    speed.value = state.speed;
+    if (this.replay) this.scrub.max = this.duration = state.duration;
+    else this.showRecording(state);
+  }
+
+  showRecording({ recording, last_recording: last }) {
+    const record = byId("record");
+    record.setAttribute("aria-pressed", String(Boolean(recording)));
+    record.querySelector("span").textContent = recording ? `Stop, ${recording.seconds.toFixed(0)} s` : "Record";
+    const download = byId("download");
+    download.hidden = Boolean(recording) || !last;
+    if (last) {
+      download.href = `/recordings/${encodeURIComponent(last)}`;
+      download.download = last;
+      download.textContent = `save ${last}`;
+    }
+  }
+
+  /** Called with each frame of the screen: the scrubber moves along unless somebody holds it. */
+  step(frame) {
+    if (this.replay && !this.held && this.asked === null) {
+      this.scrub.value = frame.time;
+      this.writeTime(frame.time);
+    }
+  }
+
+  writeTime(time) {
+    const words = `${time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
+    const output = byId("scrub-time");
+    if (output.textContent !== words) output.textContent = words;
+  }
+}

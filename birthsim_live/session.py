@@ -1,0 +1,215 @@
+"""One rig that a person plays with: no web and no clock, only control periods one after the other."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from baselines.controller import Controller
+from birthsim_env.actuation import ValveActuation
+from birthsim_env.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
+from birthsim_env.parameters import Parameters
+from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
+from birthsim_env.scenarios import SCENARIOS, Parts
+from birthsim_env.seeding import stream
+from birthsim_env.simulation import Simulation
+from birthsim_live.bridge import Course
+from birthsim_live.controllers import as_action, build_controller, has_damping, openings
+from birthsim_live.frames import frame_of, row_of
+from birthsim_live.hand import Hands
+from birthsim_live.recording import Recorder
+from birthsim_live.sensing import ExchangeableSensors
+from birthsim_live.setpoints import Setpoints
+from birthsim_live.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
+
+PATH_POINTS = 400
+
+LOWEST, HIGHEST = np.full(STATES, -np.inf), np.full(STATES, np.inf)
+"""Of every row of the state: what the model holds for, as in the environments' rewards."""
+for _rows, _range in ((PRESSURES, PRESSURE_RANGE), (TEMPERATURES, TEMPERATURE_RANGE)):
+    LOWEST[list(_rows)], HIGHEST[list(_rows)] = _range
+
+
+class Session:
+    """A rig under a controller, a scenario and hands; settings change while it moves.
+
+    Arguments: ``rig`` as its owner describes it, which is what the controller believes; ``settings`` to start with;
+    ``seed`` of the world, episode after episode.
+
+    ``settings`` is what is set; ``lost`` says why the rig stands still, or is None; ``hands.hold`` is the person's pointer;
+    ``paths`` counts the changes of the target's path; ``recorder`` takes every instant, where there is one. Time runs on
+    through every change; only ``reset`` starts it anew.
+    """
+
+    def __init__(self, rig: Parameters, settings: Settings | None = None, seed: int = 0) -> None:
+        self.rig, self.choices = rig, Choices(rig)
+        self.settings = settings or default_settings(rig)
+        self.period = rig.electronics.control_period
+        self.lost: str | None = None
+        self.paths = 0
+        self.recorder: Recorder | None = None
+        self.controller = build_controller(self.settings.controller, rig)
+        self._seed, self._episode = seed, 0
+        now = self.settings
+        self.duration = SCENARIOS[now.scenario].duration
+        trajectory, force, schedule = SCENARIOS[now.scenario].nominal()
+        self._course, self._setpoints = Course(trajectory), Setpoints(schedule)
+        self.hands = Hands(force, now.scenario_force, now.drag_stiffness)
+        self._sensors = ExchangeableSensors(now.sensors, rig.electronics, self._world("sensors"))
+        self._actuation = ValveActuation(now.valves)
+        self._simulation = Simulation(
+            1, rig, {}, self._course, self.hands, self._setpoints, now.sensors, self._actuation, periods=1
+        )
+        self._simulation.sensors = self._sensors
+        self.reset()
+
+    @property
+    def time(self) -> float:
+        """s since the last reset."""
+        return float(self._simulation.time[0])
+
+    @property
+    def episode_time(self) -> float:
+        """s since the scenario's present episode began."""
+        return self.time - self._course.begins
+
+    @property
+    def state(self) -> Array:
+        """State of the plant, (18, 1)."""
+        return self._simulation.plant.state
+
+    def shown_settings(self) -> dict[str, Any]:
+        """The settings as the page shows them: with the scenario's setpoints where they hold."""
+        shown = {name: getattr(self.settings, name) for name in Settings.__dataclass_fields__}
+        if self.settings.stiffness_source == "scenario":
+            shown.update(self._scenario_setpoints())
+        return {**shown, "damping_applies": has_damping(self.controller)}
+
+    def reset(self) -> None:
+        """Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay."""
+        now = self.settings
+        self._simulation.plant.lane_parameters[:] = parameter_column(true_rig(self.rig, now))[:, None]
+        self._episode, self.lost = 0, None
+        self._setpoints.choose(_chosen(now), 0.0)
+        lane = np.ones(1, dtype=np.bool_)
+        self._simulation.begin(lane, [self._seed], np.zeros(1, dtype=np.int64), self.duration)
+        self.controller.reset()
+        self.paths += 1
+
+    def change(self, changes: Mapping[str, Any], controller: Controller | None = None) -> None:
+        """Apply settings; the rig keeps its state and its motion.
+
+        ``controller`` is the one that ``changes`` ask for, where it has been built already. Raises ``ValueError`` naming what
+        is not allowed; nothing is changed then.
+        """
+        changes = self.choices.checked(changes)
+        before, after = self.settings, merged(self.settings, changes, self._scenario_setpoints())
+        plant = parameter_column(true_rig(self.rig, after))
+        parts = self._parts(after.scenario) if "scenario" in changes and after.scenario != before.scenario else None
+        if after.controller != before.controller:
+            self.controller = controller or build_controller(after.controller, self.rig)
+            self.controller.reset()
+        self.settings, now = after, self.time
+        self._simulation.plant.lane_parameters[:] = plant[:, None]
+        if parts is not None:
+            self.duration, self._episode = SCENARIOS[after.scenario].duration, 0
+            self._follow(parts)
+        if _chosen(after) != _chosen(before):
+            self._setpoints.choose(_chosen(after), now)
+        if after.sensors != before.sensors:
+            self._sensors.exchange(after.sensors, self._world("sensors"))
+        if after.valves != before.valves:
+            self._actuation = self._simulation.actuation = ValveActuation(after.valves)
+        if after.scenario_force != before.scenario_force:
+            self.hands.want(after.scenario_force, now)
+        self.hands.stiffness = after.drag_stiffness
+
+    def advance(self, periods: int, until: float = math.inf) -> int:
+        """Run at least one and up to ``periods`` control periods, none begun after ``until`` (``time.perf_counter``, s); how
+        many have run. Where the rig is or gets lost none run."""
+        done = 0
+        while done < periods and self.lost is None and (done == 0 or clock.perf_counter() < until):
+            self._advance_one()
+            done += 1
+            if self.recorder is not None:
+                self.recorder.take(self)
+        return done
+
+    def _advance_one(self) -> None:
+        simulation = self._simulation
+        try:
+            commanded = openings(self.controller, simulation.measurement, simulation.reference, self.settings.damping)
+        except Exception as error:
+            # Whatever a controller of the bench trips over, the page says it and waits.
+            self.lost = f"{self.settings.controller} gives up: {error}"
+            return
+        try:
+            simulation.step(as_action(commanded, self._actuation.size))
+        except ValueError as error:
+            self.lost = self._left_range() or str(error)
+            return
+        self.lost = self._left_range()
+        if self.lost is None and self.episode_time > self.duration - self.period / 2:
+            self._episode += 1
+            self._follow(self._parts(self.settings.scenario))
+
+    def _left_range(self) -> str | None:
+        state = self.state[:, 0]
+        if ((state > LOWEST) & (state < HIGHEST)).all():
+            return None
+        if not np.isfinite(state).all():
+            return "the state is no longer finite"
+        for name, unit, rows, (low, high) in (
+            ("pressure", "Pa", PRESSURES, PRESSURE_RANGE),
+            ("temperature", "K", TEMPERATURES, TEMPERATURE_RANGE),
+        ):
+            for chamber, row in zip(("P1", "N1", "P2", "N2"), rows, strict=True):
+                if not low < state[row] < high:
+                    return f"{name} of chamber {chamber} = {state[row]:g} {unit}; the model holds from {low:g} to {high:g}"
+        raise AssertionError("a state out of range has a row out of range")
+
+    @property
+    def halted(self) -> bool:
+        """True where only another setting or ``reset`` makes it go on."""
+        return self.lost is not None
+
+    def frame(self) -> dict[str, Any]:
+        """The present instant as the page shows it."""
+        return {**frame_of(self.row(), self.rig), "pointer_id": self.hands.used, "lost": self.lost}
+
+    def row(self) -> Array:
+        """The present instant, as ``frames.frame_of`` takes it."""
+        return row_of(self._simulation, self.hands, self.episode_time)
+
+    def path(self) -> list[list[float]]:
+        """The target's path of the running episode, m; one point where it rests."""
+        points = np.round(self._course.path(self.duration, PATH_POINTS), 6)
+        return [[float(x), float(y)] for x, y in (points if np.ptp(points, axis=0).any() else points[:1])]
+
+    def _parts(self, scenario: str) -> Parts:
+        return SCENARIOS[scenario].nominal()
+
+    def _follow(self, parts: Parts) -> None:
+        """Go over to the start of an episode with these parts."""
+        trajectory, force, schedule = parts
+        self._course.follow(trajectory, self._world("reference"), self.time)
+        self.hands.follow(force, self._world("user_force"), self.time)
+        self._setpoints.follow(schedule, self._world("stiffness"), self.time)
+        self.paths += 1
+
+    def _world(self, part: str) -> np.random.Generator:
+        return stream(self._seed, self._episode, part)
+
+    def _scenario_setpoints(self) -> dict[str, float]:
+        """What the scenario asks for at this time."""
+        asked = self._setpoints.scenario(self.time)
+        return dict(zip(STIFFNESSES, (round(float(value), 3) for value in asked[:4]), strict=True))
+
+
+def _chosen(settings: Settings) -> tuple[float, ...] | None:
+    """The setpoints that take the scenario's place, N/m."""
+    return tuple(getattr(settings, name) for name in STIFFNESSES) if settings.stiffness_source == "sliders" else None

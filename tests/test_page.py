@@ -1,0 +1,252 @@
+"""The live page in headless Chromium, pushed and looked at as a person would: a real server, real mouse and key events."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests import browser
+from tests.browser import NARROW, WIDE, Server, Window, displacement, rendered
+
+LACK = browser.missing()
+pytestmark = pytest.mark.skipif(bool(LACK), reason=LACK)
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        opened = browser.launch(playwright)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
+        yield running
+
+
+@pytest.fixture
+def window(chromium, server):
+    """A window on a rig that runs and that nobody holds."""
+    with Window(chromium, server.url) as opened:
+        opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
+        yield opened
+        assert opened.complaints == []
+        assert opened.foreign == []
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """Folder for screenshots: BIRTHSIM_SCREENSHOTS, or one that pytest throws away."""
+    folder = Path(os.environ.get("BIRTHSIM_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def slide(window, name, value):
+    """Move a slider with the arrow keys until the server has taken ``value`` over."""
+    slider = window.page.locator(f"#set-{name}")
+    for _ in range(200):
+        now = window.value(f"birthsim.settings.{name}")
+        if now == pytest.approx(value):
+            return
+        slider.press("ArrowRight" if value > now else "ArrowLeft")
+        window.wait(f"birthsim.settings.{name} !== {now!r}")
+    raise AssertionError(f"{name} never became {value}")
+
+
+def test_displacement_is_force_over_stiffness_and_halves_at_twice_the_stiffness(window):
+    # A soft spring held far away pulls almost as hard when the end effector gives way.
+    window.page.locator("#set-drag_stiffness").press("Home")
+    window.wait("birthsim.settings.drag_stiffness === birthsim.hello.ranges.drag_stiffness.min")
+    window.hold(across=90)
+    soft = window.settle(least=10)
+    stiffness = soft["stiffness"][0]
+    assert displacement(soft)[0] > 5e-3
+    assert displacement(soft)[0] == pytest.approx(rendered(soft)[0], rel=0.1)
+
+    window.page.wait_for_timeout(300)  # figures are written a few times a second
+    shown = window.page.locator("#readouts output").all_inner_texts()[2]
+    assert [float(part) for part in shown.replace("−", "-").split()] == pytest.approx(
+        [1e3 * part for part in displacement(soft)], abs=0.5
+    )
+
+    slide(window, "Kclx", 2 * stiffness)
+    window.wait(f"birthsim.frame.stiffness[0] > {1.99 * stiffness}")
+    stiff = window.settle(least=10)
+    assert displacement(stiff)[0] == pytest.approx(rendered(stiff)[0], rel=0.1)
+    assert displacement(stiff)[0] / displacement(soft)[0] == pytest.approx(0.5, rel=0.1)
+
+    window.page.mouse.up()
+    window.wait("birthsim.frame.pointer === null && Math.hypot(...birthsim.frame.force) === 0")
+    window.page.locator("#stiffness-source").click()
+    window.wait(f"birthsim.settings.stiffness_source === 'scenario' && birthsim.settings.Kclx === {stiffness}")
+    slide(window, "drag_stiffness", window.value("birthsim.hello.ranges.drag_stiffness.default"))
+
+
+@pytest.mark.parametrize(("name", "size"), [("wide", WIDE), ("narrow", NARROW)])
+def test_screenshots_have_no_sideways_scrolling_and_no_text_cut_off(chromium, server, pictures, name, size):
+    with Window(chromium, server.url, size) as window:
+        window.hold(across=25, up=25)
+        window.wait("Math.hypot(...birthsim.frame.force) > 5")
+        window.page.wait_for_timeout(1500)  # some history for the plots
+        window.page.screenshot(path=pictures / f"live_{name}.png")
+        if name == "narrow":
+            for part in ("settings", "plots"):
+                window.page.locator(f"#{part}").evaluate("(element) => element.scrollIntoView()")
+                window.page.wait_for_timeout(1000)  # plots are drawn only while they can be seen
+                window.page.screenshot(path=pictures / f"live_{name}_{part}.png")
+        window.page.mouse.up()
+        assert window.value("document.documentElement.scrollWidth") <= size["width"]
+        if name == "wide":
+            assert window.value("document.documentElement.scrollHeight") <= size["height"]
+        cut = window.value(
+            "[...document.querySelectorAll('label, button, figcaption, legend, dt, dd, .status, .hint, h1')]"
+            ".filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"
+        )
+        assert cut == []
+        assert window.value("document.querySelectorAll('.plot canvas').length") == 6
+        assert window.complaints == []
+
+
+def test_every_input_has_a_name_and_every_choice_is_offered(window):
+    nameless = window.value(
+        "[...document.querySelectorAll('input, select, button')]"
+        ".filter((e) => !(e.labels?.length || e.textContent.trim() || e.ariaLabel)).map((e) => e.outerHTML)"
+    )
+    assert nameless == []
+    for name in ("scenario", "controller", "valves", "sensors"):
+        offered = window.value(f"document.querySelector('select[name={name}]').options.length")
+        assert offered == window.value(f"birthsim.hello.choices.{name}.length")
+
+
+def test_a_choice_changes_the_running_rig_without_a_break(window):
+    before = window.frame()
+    window.page.locator("select[name=scenario]").select_option("circle")
+    window.wait("birthsim.settings.scenario === 'circle'")
+    after = window.wait("birthsim.frame.time > " + str(before["time"] + 0.2) + " && birthsim.frame")
+    # Bridged: the target leaves where it was, it does not jump.
+    assert max(abs(a - b) for a, b in zip(after["position"], before["position"], strict=True)) < 0.1
+    window.page.locator("select[name=scenario]").select_option("probe")
+    window.wait("birthsim.settings.scenario === 'probe'")
+
+
+def test_keys_pause_push_and_reset(window):
+    body = window.page.locator("body")
+    body.press(" ")
+    window.wait("birthsim.state.paused")
+    body.press(" ")
+    window.wait("!birthsim.state.paused")
+    window.page.keyboard.down("ArrowUp")
+    pushed = window.settle(least=15)
+    assert pushed["force"][1] == pytest.approx(20, abs=4)
+    assert pushed["force"][0] == pytest.approx(0, abs=2)
+    window.page.keyboard.up("ArrowUp")
+    window.wait("birthsim.frame.pointer === null")
+    time = window.frame()["time"]
+    body.press("r")
+    window.wait(f"birthsim.frame.time < {time}")
+
+
+def test_a_finger_drags_the_head_and_scrolls_beside_it(chromium, server):
+    with Window(chromium, server.url, NARROW, touch=True) as window:
+        session = window.context.new_cdp_session(window.page)
+
+        def touch(kind, *points):
+            places = [{"x": x, "y": y} for x, y in points]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+        x, y = window.end_effector()
+        touch("touchStart", (x, y))
+        for k in range(1, 6):
+            touch("touchMove", (x - 4 * k, y + 8 * k))
+        window.wait("birthsim.frame.force[1] < -10")
+        assert window.value("scrollY") == 0
+        touch("touchEnd")
+        window.wait("birthsim.frame.pointer === null")
+        touch("touchStart", (x, y + 150))
+        for k in range(1, 9):
+            touch("touchMove", (x, y + 150 - 15 * k))
+        window.wait("scrollY > 20")
+        touch("touchEnd")
+        assert window.complaints == []
+
+
+def test_slow_motion(window):
+    window.page.locator("#speed").select_option("0.1")
+    window.wait("birthsim.state.speed === 0.1")
+    window.page.locator("#speed").select_option("1")
+    window.wait("birthsim.state.speed === 1")
+
+
+def test_two_windows_see_one_rig(chromium, server, window):
+    with Window(chromium, server.url, NARROW) as other:
+        window.hold(across=40)
+        other.wait("birthsim.frame.pointer !== null && birthsim.frame.force[0] > 10")
+        window.page.mouse.up()
+        other.wait("birthsim.frame.pointer === null")
+        other.page.locator("#set-Kcly").press("ArrowRight")
+        window.wait("birthsim.settings.stiffness_source === 'sliders'")
+        wanted = other.value("birthsim.settings.Kcly")
+        window.wait(f"birthsim.settings.Kcly === {wanted}")
+        assert window.value("document.querySelector('#set-Kcly').ariaValueText") == other.value(
+            "document.querySelector('#set-Kcly').ariaValueText"
+        )
+        window.page.locator("#stiffness-source").click()
+        other.wait("birthsim.settings.stiffness_source === 'scenario'")
+        assert other.complaints == []
+
+
+def test_a_reload_and_a_closed_tab_let_go(chromium, server, window):
+    with Window(chromium, server.url) as other:
+        other.hold(across=40)
+        window.wait("birthsim.frame.force[0] > 10")
+        other.page.reload()
+        other.wait("birthsim.connected && birthsim.frame?.pointer === null")
+        other.page.mouse.up()
+        other.hold(across=40)
+        window.wait("birthsim.frame.force[0] > 10")
+    window.wait("birthsim.frame.pointer === null && birthsim.frame.force[0] === 0")
+
+
+@pytest.mark.slow
+def test_a_server_that_comes_back_is_found_again(chromium, tmp_path):
+    with Server("live", "--record-dir", tmp_path) as first:
+        window = Window(chromium, first.url)
+        window.hold(across=30)
+    with window:
+        window.wait("!birthsim.connected && !document.querySelector('#offline').hidden")
+        with Server("live", "--record-dir", tmp_path, port=first.port):
+            window.wait("birthsim.connected && document.querySelector('#offline').hidden && birthsim.frame?.pointer === null")
+
+
+def test_a_recording_is_saved_played_and_searched(chromium, window, tmp_path, pictures):
+    page = window.page
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording !== null")
+    began = window.frame()["time"]
+    window.hold(across=40)
+    window.wait(f"birthsim.frame.time > {began + 1.5}")
+    page.mouse.up()
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording === null && birthsim.state.last_recording !== null")
+    with page.expect_download() as download:
+        page.locator("#download").click()
+    file = tmp_path / "pull.npz"
+    download.value.save_as(file)
+    with Server("replay", file) as replay, Window(chromium, replay.url) as viewer:
+        duration = viewer.value("birthsim.state.duration")
+        assert duration > 1.4
+        viewer.wait("birthsim.frame.pointer !== null && birthsim.frame.force[0] > 10")
+        assert not viewer.page.locator("#settings").is_visible()
+        viewer.page.locator("body").press(" ")
+        viewer.wait("birthsim.state.paused")
+        viewer.page.locator("#scrub").fill("0.3")
+        viewer.wait("Math.abs(birthsim.frame.time - 0.3) < 0.05")
+        viewer.page.screenshot(path=pictures / "replay.png")
+        assert viewer.complaints == []
