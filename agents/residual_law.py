@@ -3,7 +3,8 @@
 An action in [-1, 1] passes a first-order low-pass at the control rate, z' = (a - z)/T. Its first two entries, times the
 authority in N, are added to what the law believes acts on the pistons; the law knows their rate too. Where the impedance is
 variable, the next two set the stiffness K' = K 4^z that the law works with, about a target moved so that a hand at rest still
-feels K; both yield where pistons oscillate; the last raises the damping. Zero actions are exactly the law. Without a law the actions are the openings.
+feels K; the last raises the damping. Forces and stiffness yield where pistons oscillate. Zero actions are exactly the law.
+Without a law the actions are the openings.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from birthsim_env.plant import Plant
 from birthsim_env.signals import Mask, Measurement, Reference
 
 STIFFEST = 4000.0
-"""N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms and
-more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 none did."""
+"""N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms
+and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 none did."""
 
 STIFFENING = 4.0
 """Most that the stiffness is multiplied or divided by."""

@@ -18,8 +18,8 @@ SLICE = 0.004
 BREATH = 0.001
 """s of rest after each slice, however late it is: a slow controller must leave the interpreter to the windows' thread."""
 
-FRAME, IDLE_FRAME = 1 / 60, 0.1
-"""s between frames, in motion and at rest."""
+FRAME, IDLE_FRAME = 1 / 75, 0.1
+"""s between frames, in motion (oftener than a screen shows them, so that jitter leaves none without a new one) and at rest."""
 
 MOST_LAG = 0.05
 """s of wall time, assumed: what is lost in a hiccup is caught up with up to that; the rest is dropped and reported."""
