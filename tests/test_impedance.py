@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import agents
+from agents.guard import Guard
 from agents.residual_law import MOST_DAMPING, STIFFENING, STIFFEST, ResidualLaw, stiffened
 from agents.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.backstepping import BacksteppingController
@@ -62,18 +63,18 @@ def test_the_target_moves_so_that_a_hand_at_rest_feels_what_was_asked_for() -> N
     ratio = changed.stiffness / reference.stiffness
     bound = np.maximum(STIFFEST, reference.stiffness) / reference.stiffness
     np.testing.assert_allclose(ratio, np.where(powers == 0, 1, np.minimum(4.0**powers, bound)), rtol=1e-12)
-    assert (STIFFENING, STIFFEST) == (4.0, 6000.0)
+    assert (STIFFENING, STIFFEST) == (4.0, 4000.0)
 
 
 def test_the_law_is_made_no_stiffer_than_the_stiffest_unless_that_is_asked_for() -> None:
     rows = np.zeros((REFERENCES, 6))
-    rows[8:10] = [[2000, 4000, 4000, 8000, 8000, 6000]] * 2
+    rows[8:10] = [[1000, 3000, 3000, 8000, 8000, 4000]] * 2
     powers = np.array([[0.5, 0.5, -0.5, 0.5, -0.5, 1.0]] * 2)
     changed = stiffened(Reference(rows), np.zeros((2, 6)), powers)
-    np.testing.assert_allclose(changed.stiffness, [[4000, 6000, 2000, 8000, 4000, 6000]] * 2)
+    np.testing.assert_allclose(changed.stiffness, [[2000, 4000, 1500, 8000, 4000, 4000]] * 2)
 
 
-POWERS = np.array([[0.5, -0.5, 0.5, 0.0, 0.7], [0.5, -0.5, -0.3, 0.0, 0.0]])
+POWERS = np.array([[0.5, -0.5, 0.5, 0.0, 0.4], [0.5, -0.5, -0.3, 0.0, 0.0]])
 
 
 def pushed(damping: float, sensed: bool, push: float, seconds: float = 2.5) -> Array:
@@ -108,6 +109,29 @@ def test_a_measured_hand_at_rest_feels_the_stiffness_asked_for(damping: float) -
 def test_a_force_that_no_sensor_tells_of_meets_the_stiffness_that_the_policy_chose() -> None:
     """That is what the stiffness is for: friction, unknown weight and what else pushes unseen."""
     np.testing.assert_allclose(pushed(0.0, sensed=False, push=4.0), 0.002 / 4.0**POWERS, rtol=0.01)
+
+
+def test_the_stiffness_yields_with_the_authority(monkeypatch) -> None:
+    """Where one cylinder oscillates, on both axes: each axis moves both cylinders."""
+    worked, command = [], BacksteppingController.command
+    shares = np.array([[1.0, 0.5, 1.0], [1.0, 1.0, 0.2]])
+    monkeypatch.setattr(Guard, "share", property(lambda self: shares))
+    monkeypatch.setattr(
+        BacksteppingController,
+        "command",
+        lambda self, seen, reference, *told: (
+            worked.append(reference.stiffness.copy()), command(self, seen, reference, *told)
+        )[1],
+    )  # fmt: skip
+    law = ResidualLaw(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", "variable_kp", time_constant=1e-4))
+    wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 1000.0)
+    plant = closed_loop.resting_at(wanted, closed_loop.FRICTIONLESS)
+    law.reset(np.ones(3, dtype=np.bool_))
+    law.accept(np.repeat([[0.0], [0.0], [0.8], [-0.8]], 3, axis=1))
+    for _ in range(3):
+        law.command(closed_loop.ideal(plant, 0.0, np.zeros((2, 3))), wanted)
+    least = [1.0, 0.5, 0.2]
+    np.testing.assert_allclose(worked[-1], 1000 * 4.0 ** (np.outer([0.8, -0.8], least)), rtol=1e-3)
 
 
 @pytest.fixture
