@@ -19,10 +19,10 @@ def shapes(rig: Parameters) -> dict[str, Any]:
 
     picture = drawn.Rig(rig)
     low, high = picture.extent()
-    features = [drawn._EYE, drawn._MOUTH, [*drawn._EAR, drawn._EAR[0]]]
+    features = [drawn.EYE, drawn.MOUTH, [*drawn.EAR, drawn.EAR[0]]]
     return {
         "gamma3": rig.geometry.gamma3,
         "bounds": [*map(float, low), *map(float, high)],
         "barrels": [asdict(barrel) for barrel in picture.barrels],
-        "head": {"radius": picture.head_radius, "profile": drawn._PROFILE, "features": features},
+        "head": {"radius": picture.head_radius, "profile": drawn.PROFILE, "features": features},
     }

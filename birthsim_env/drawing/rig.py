@@ -69,7 +69,7 @@ def _smooth(corners: Sequence[Point], steps: int) -> list[Point]:
 
 
 # Profile in units of the skull's radius: first towards the crown, second towards the face.
-_PROFILE = _smooth(
+PROFILE = _smooth(
     [
         (-0.98, -0.36),
         (-0.62, -0.6),
@@ -93,9 +93,9 @@ _PROFILE = _smooth(
     ],
     4,
 )
-_EYE = [(0.02, 0.4), (-0.08, 0.48), (-0.11, 0.57), (-0.08, 0.66), (0.0, 0.73)]
-_MOUTH = [(-0.58, 0.86), (-0.57, 0.72), (-0.52, 0.6)]
-_EAR = _smooth([(-0.05, -0.3), (0.02, -0.46), (-0.14, -0.58), (-0.34, -0.5), (-0.42, -0.36), (-0.3, -0.26)], 3)
+EYE = [(0.02, 0.4), (-0.08, 0.48), (-0.11, 0.57), (-0.08, 0.66), (0.0, 0.73)]
+MOUTH = [(-0.58, 0.86), (-0.57, 0.72), (-0.52, 0.6)]
+EAR = _smooth([(-0.05, -0.3), (0.02, -0.46), (-0.14, -0.58), (-0.34, -0.5), (-0.42, -0.36), (-0.3, -0.26)], 3)
 _HEAD_REAR = 1.05
 
 
@@ -106,8 +106,8 @@ def head(pen: Pen, axis: Axis, radius: float) -> None:
         (ox, oy), ax, ay = axis.origin, radius * axis.along[0], radius * axis.along[1]
         return [(ox + s * ax + n * ay, oy + s * ay - n * ax) for s, n in shape]
 
-    pen.polygon(placed(_PROFILE), SKIN, SKIN_EDGE, 1.5)
-    for feature in (_EYE, _MOUTH, [*_EAR, _EAR[0]]):
+    pen.polygon(placed(PROFILE), SKIN, SKIN_EDGE, 1.5)
+    for feature in (EYE, MOUTH, [*EAR, EAR[0]]):
         pen.line(placed(feature), SKIN_EDGE, 1.2)
 
 
