@@ -29,8 +29,8 @@ def make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str |
     """A model of ``settings.algorithm`` whose mean action is zero everywhere.
 
     Its ``average`` is the exponential average of its policies over the last ``AVERAGED`` of the steps, as far as
-    ``average.update_parameters(policy)`` is called after every update: late in a training an update moves a policy by more than
-    is left to be learned, and what they have in common is better than each.
+    ``average.update_parameters(policy)`` is called after every update: an update may move a policy by more than is left to be
+    learned.
     """
     model = _make_model(settings, env, tensorboard)
     between = settings.lanes * (settings.rollout if settings.algorithm == "ppo" else 1)

@@ -26,7 +26,7 @@ from birthsim_env.signals import Mask, Measurement, Reference
 
 STIFFEST = 4000.0
 """N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms
-and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 none did."""
+and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 the same four stayed below 1 mm."""
 
 STIFFENING = 4.0
 """Most that the stiffness is multiplied or divided by."""

@@ -93,3 +93,18 @@ def test_settings_reach_the_algorithm(algorithm):
         assert (model.gradient_steps, model.train_freq.frequency) == (2, 1)
         # Random actions fill the memory for twenty steps of all lanes.
         assert model.learning_starts == 160
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
+def test_the_average_forgets_over_a_twentieth_of_the_training(algorithm):
+    """One parameter steps from 0 to 1: what the average has taken up after a share of the steps is an exponential's."""
+    between = 8 * (32 if algorithm == "ppo" else 1)
+    model = made(replace(TINY, algorithm=algorithm, steps=20 * 25 * between))[0]
+    first, averaged = (next(iter(policy.parameters())) for policy in (model.policy, model.average.module))
+    with torch.no_grad():
+        first.zero_()
+        model.average.update_parameters(model.policy)
+        first.fill_(1.0)
+    for _ in range(25):
+        model.average.update_parameters(model.policy)
+    np.testing.assert_allclose(averaged.detach().numpy(), 1 - (1 - 1 / 25) ** 25, rtol=1e-5)

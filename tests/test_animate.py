@@ -103,6 +103,21 @@ def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
     assert len(frames) == 16
 
 
+def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch):
+    """Not the default of the controller, which has learned another scenario."""
+    asked = []
+
+    def spied(name, rig, **options):
+        asked.append((name, options))
+        return make_controller(name, rig, **options)
+
+    monkeypatch.setattr(animate, "make_controller", spied)
+    path = tmp_path / "pull.webp"
+    options = ("--controller", "pid", "residual", "--begin", 0.0, "--end", 1.0, "--rate", 10, "--out", path)
+    assert command(monkeypatch, *options) == 0
+    assert asked == [("pid", {}), ("residual", {"policy": "forceps"})]
+
+
 def test_both_halves_have_one_scale_and_their_own_error(pair):
     times = np.array([0.0, 0.5, 1.0])
     same = pair.frame((scene(), scene()), times, 2 * (np.array([0.0, 0.005, 0.003]),))

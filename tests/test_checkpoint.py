@@ -91,6 +91,8 @@ def assert_same(one, other):
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
 def test_a_checkpoint_brings_model_optimizers_and_normalisation_back_to_the_bit(tmp_path, algorithm):
     model, env = learned(algorithm)
+    for _ in range(2):
+        model.average.update_parameters(model.policy)
     save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
     assert sorted(path.name for path in tmp_path.iterdir()) == [NAME]
     state = torch.get_rng_state()
@@ -100,6 +102,7 @@ def test_a_checkpoint_brings_model_optimizers_and_normalisation_back_to_the_bit(
     assert other.num_timesteps == model.num_timesteps >= 600
     assert other._n_updates == model._n_updates > 0
     assert_same(model.get_parameters(), other.get_parameters())
+    assert_same(model.average.state_dict(), other.average.state_dict())
     for name in ("obs_rms", "ret_rms"):
         one, two = getattr(env, name), getattr(its, name)
         np.testing.assert_array_equal(one.mean, two.mean)

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number
+from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters, load_parameters
@@ -53,7 +53,8 @@ def main() -> None:
         nargs=2,
         default=("backstepping", "admittance-backstepping"),
         metavar="NAME",
-        help=f"two of {', '.join(controller_names())}, or path/to/file.py:Class (default: the paper's law and the best one)",
+        help=f"two of {', '.join(controller_names())}, or path/to/file.py:Class; residual is the policy that "
+        "comes with the package for the environment (default: the paper's law and the best one)",
     )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the world (default: %(default)s)")
     parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
@@ -138,7 +139,10 @@ def _animate(arguments: argparse.Namespace) -> None:
     longest = env.get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
-    controllers = [make_controller(name, rig) for name in arguments.controller]
+    controllers = [
+        make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {}))
+        for name in arguments.controller
+    ]
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
         takes = [take(env, controller, arguments.seed, span, arguments.rate, bar.update) for controller in controllers]

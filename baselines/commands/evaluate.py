@@ -9,7 +9,7 @@ import gymnasium
 
 import birthsim_env
 from baselines.commands.evaluate_all import JOBS, evaluate_all
-from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
+from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number, whole, write_json
 from baselines.evaluation import Evaluation, evaluate, table
 from baselines.registry import controller_names, make_controller
 
@@ -82,7 +82,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         raise ValueError(f"--env {arguments.env!r}; allowed: {allowed}")
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
-        arguments.policy = arguments.env.removeprefix("BirthSIM/").removesuffix("-v0").lower()
+        arguments.policy = policy_of(arguments.env)
     if arguments.policy is not None:
         names = ["backstepping", "residual"] if names == ["residual"] else list(dict.fromkeys([*names, "residual"]))
     policies = _policies(arguments.policy)

@@ -41,6 +41,11 @@ def seed_number(text: str) -> int:
     return int(text)
 
 
+def policy_of(environment: str) -> str:
+    """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v0`` -> ``forceps``."""
+    return environment.removeprefix("BirthSIM/").removesuffix("-v0").lower()
+
+
 def make_folder(path: Path) -> Path:
     """The folder ``path``, made if it is missing."""
     path.mkdir(parents=True, exist_ok=True)
