@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
@@ -19,7 +20,7 @@ from birthsim_env.parameters import Parameters
 from birthsim_live import protocol
 from birthsim_live.addresses import is_loopback, listen
 from birthsim_live.commands.serving import serve
-from birthsim_live.frames import FIELDS
+from birthsim_live.frames import FIELDS, SLICES
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.player import Player
 from birthsim_live.recording import load_recording
@@ -166,10 +167,13 @@ def test_recording_download_and_replay(live: TestClient, tmp_path: Path) -> None
         assert hello["state"]["duration"] == recording.duration
         assert hello["settings"]["scenario"] == "probe"
         end = until(ws, of("state", paused=True))  # it plays to its end by itself
-        assert until(ws, lambda m: m["type"] == "frame" and m["pointer"])["drag_force"][0] > 5
         assert end["duration"] == recording.duration
+        say(ws, "pause", paused=True)
         say(ws, "seek", time=0.0)
-        assert until(ws, lambda m: m["type"] == "frame" and m["time"] < recording.duration)
+        assert until(ws, lambda m: m["type"] == "frame" and m["time"] == 0.0)["pointer"] is None
+        pulled = int(np.argmax(recording.rows[:, SLICES["drag_force"]][:, 0]))
+        say(ws, "seek", time=pulled * recording.interval)
+        assert until(ws, lambda m: m["type"] == "frame" and m["pointer"])["drag_force"][0] > 5
         for kind, fields in (("reset", {}), ("record", {"on": True}), ("set", {"settings": {}})):
             say(ws, kind, **fields)
             assert f"{kind} in a replay; allowed: pause, speed, seek" in until(ws, of("error"))["message"]

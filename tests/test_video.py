@@ -97,7 +97,7 @@ def test_an_impossible_size_is_refused_by_name(size):
 def test_without_moviepy_gymnasium_says_so_before_anything_runs(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "moviepy", None)
     env = gymnasium.make("BirthSIM/Circle-v0", render_mode="rgb_array")
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match="MoviePy"):
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"(?i)moviepy is not installed"):
         RecordVideo(env, str(tmp_path / "videos"))
 
 
