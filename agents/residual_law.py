@@ -18,6 +18,7 @@ from agents.experience import Experience
 from agents.guard import Guard
 from agents.settings import NO_LAW, ResidualSettings
 from baselines.registry import make_controller
+from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.parameters import Parameters
@@ -71,16 +72,42 @@ def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
     return (*map(str, ENTRIES), *last, *memory_names(settings))
 
 
+@kernel
+def _stiffen(force: Array, powers: Array, rows: Array) -> None:
+    for i in range(rows.shape[1]):
+        for axis in range(2):
+            if powers[axis, i] != 0.0:
+                asked = rows[8 + axis, i]
+                rows[8 + axis, i] = min(asked * STIFFENING ** powers[axis, i], max(asked, STIFFEST))
+                rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
+
+
 def stiffened(reference: Reference, force: Array, powers: Array) -> Reference:
     """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
 
     ``force`` (2, N), N, is the hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
     """
     rows = reference.rows.copy()
-    asked = reference.stiffness
-    rows[8:10] = np.where(powers == 0, asked, np.minimum(asked * STIFFENING**powers, np.maximum(asked, STIFFEST)))
-    rows[0:2] += force / asked - force / rows[8:10]
+    _stiffen(force, powers, rows)
     return Reference(rows)
+
+
+@kernel
+def _tell(
+    action: Array, share: Array, authority: float, time_constant: float, quickness: float, smooth: Array, told: Array
+) -> None:
+    """Writes forces, N, their rates, N/s, and, of actions that have them, powers of stiffness and the damping factor (7, N);
+    ``smooth`` (size, N) goes on by one period towards ``action``."""
+    size = action.shape[0]
+    for i in range(action.shape[1]):
+        for k in range(2):
+            strength = authority * share[k, i]
+            told[k, i] = strength * smooth[k, i]
+            told[2 + k, i] = strength / time_constant * (action[k, i] - smooth[k, i])
+            told[4 + k, i] = smooth[2 + k, i] * min(share[0, i], share[1, i]) if size > 2 else 0.0
+        told[6, i] = MOST_DAMPING ** max(smooth[4, i], 0.0) if size > 4 else 0.0
+        for k in range(size):
+            smooth[k, i] += quickness * (action[k, i] - smooth[k, i])
 
 
 class ResidualLaw:
@@ -117,15 +144,16 @@ class ResidualLaw:
         """Spool openings (4, N) of one control period."""
         self._experience.update(measurement)
         self._guard.update(self._experience.joints, reference)
-        smooth, settings = self._smooth, self.settings
-        authority = settings.authority * self._guard.share
-        told = [authority * smooth[:2], authority / settings.time_constant * (self._action[:2] - smooth[:2])]
+        settings, told = self.settings, np.empty((7, self._smooth.shape[1]))
+        _tell(
+            self._action, self._guard.share, settings.authority, settings.time_constant, self._quickness, self._smooth, told
+        )
+        if self._law is None:
+            return self._action
         if settings.impedance != "fixed":
-            reference = stiffened(reference, measurement.user_force, smooth[2:4] * self._guard.share.min(axis=0))
-        if settings.impedance == "variable":
-            told.append(MOST_DAMPING ** np.maximum(smooth[4], 0.0))
-        self._smooth = smooth + self._quickness * (self._action - smooth)
-        return self._action if self._law is None else np.asarray(self._law.command(measurement, reference, *told))
+            reference = stiffened(reference, np.ascontiguousarray(measurement.user_force), told[4:6])
+        damping = (told[6],) if settings.impedance == "variable" else ()
+        return np.asarray(self._law.command(measurement, reference, told[:2], told[2:4], *damping))
 
     def memory(self) -> Array:
         """What a policy sees of it, (size + 8, N): smoothed action, shares of the authority, forces met in ``FORCE_UNIT``."""

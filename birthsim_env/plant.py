@@ -102,12 +102,12 @@ class Plant:
     @property
     def pressures(self) -> Array:
         """Pressures of chambers P1, N1, P2, N2, Pa absolute, (4, num_envs)."""
-        return self.state[list(PRESSURES)]
+        return self._state.take(PRESSURES, axis=0)
 
     @property
     def temperatures(self) -> Array:
         """Temperatures of chambers P1, N1, P2, N2, K, (4, num_envs)."""
-        return self.state[list(TEMPERATURES)]
+        return self._state.take(TEMPERATURES, axis=0)
 
     def end_effector(self) -> Array:
         """Position and velocity of the end effector, (4, num_envs): x, y (m), vx, vy (m/s)."""

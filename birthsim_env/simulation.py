@@ -153,23 +153,37 @@ class Simulation:
 
     def _check_reference(self, chosen: NDArray[np.intp], duration: float) -> None:
         lanes = self.ticks.shape[0]
-        for instant in np.linspace(0.0, duration, CHECKS):
+        instants = np.linspace(0.0, duration, CHECKS)
+        points, asked = np.empty((2, CHECKS, len(chosen))), np.empty((7, CHECKS, len(chosen)))
+        for k, instant in enumerate(instants):
             time = np.full(lanes, instant)
-            motion = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")
-            setpoints = checked("stiffness.sample(time)", self.stiffness.sample(time), (7, lanes), "SI")
-            if not (setpoints[:4, chosen] > 0).all():
-                raise ValueError(
-                    f"stiffness.sample(time = {instant:g} s) = {setpoints[:4, chosen].min():g} N/m; allowed: more than 0"
-                )
-            kx, ky, kxy = setpoints[0, chosen], setpoints[1, chosen], setpoints[6, chosen]
-            if not (kxy**2 < kx * ky).all():
-                raise ValueError(
-                    f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
-                )
-            try:
-                inverse_geometry(motion[:2, chosen], self.parameters)
-            except ValueError as error:
-                raise ValueError(f"reference at {instant:.3g} s: {error}") from error
+            points[:, k] = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")[:2, chosen]
+            asked[:, k] = checked("stiffness.sample(time)", self.stiffness.sample(time), (7, lanes), "SI")[:, chosen]
+
+        def first(wrong: NDArray[np.bool_]) -> tuple[int, float]:
+            k = int(wrong.any(axis=1).argmax())
+            return k, float(instants[k])
+
+        soft = (asked[:4] <= 0).any(axis=0)
+        if soft.any():
+            k, instant = first(soft)
+            raise ValueError(f"stiffness.sample(time = {instant:g} s) = {asked[:4, k].min():g} N/m; allowed: more than 0")
+        kx, ky, kxy = asked[0], asked[1], asked[6]
+        coupled = kxy**2 >= kx * ky
+        if coupled.any():
+            k, instant = first(coupled)
+            raise ValueError(
+                f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy[k]).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
+            )
+        # Of all instants at once, and only where that fails of each, to name it.
+        try:
+            inverse_geometry(points, self.parameters)
+        except ValueError:
+            for k, instant in enumerate(instants):
+                try:
+                    inverse_geometry(points[:, k], self.parameters)
+                except ValueError as error:
+                    raise ValueError(f"reference at {instant:.3g} s: {error}") from error
 
 
 @kernel
