@@ -87,7 +87,7 @@ def network_of(policy: Any, env: VecNormalize) -> PolicyNetwork:
 
 
 def _falling(rate: float) -> Callable[[float], float]:
-    return lambda remaining: rate * (0.1 + 0.9 * remaining)
+    return lambda remaining: rate * (0.01 + 0.99 * remaining)
 
 
 def _begin_at_zero(layer: torch.nn.Linear, bias: float = 0.0) -> None:

@@ -45,11 +45,11 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
     """Draw ``learning_curves`` (PNG and SVG) with the law as a line; nothing without trainings."""
     if not trainings:
         return []
-    said = [(key, label) for key, label in SHOWN if np.isfinite(over_seeds(trainings, key)[1]).any()]
+    curves = [(key, label, *over_seeds(trainings, key)) for key, label in SHOWN]
+    said = [curve for curve in curves if np.isfinite(curve[-1]).any()]
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 3.2), layout="constrained", squeeze=False)
-        for axes, (key, label) in zip(panels[0], said, strict=True):
-            steps, (middle, low, high) = over_seeds(trainings, key)
+        for axes, (key, label, steps, (middle, low, high)) in zip(panels[0], said, strict=True):
             axes.fill_between(1e-6 * steps, low, high, color=MIDDLE, alpha=0.25, lw=0)
             for training in trainings:
                 own = [_number(point[key]) for point in training["curve"]]

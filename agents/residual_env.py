@@ -43,7 +43,7 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     | `impedance` | entries |
     |---|---|
     | `"fixed"` | a force along cylinders 1 and 2, in units of `authority` (100 N), that the law believes in |
-    | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with |
+    | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
     | `"variable"` | and a power of 2 for the damping; less than zero is zero |
 
     However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for.

@@ -2,9 +2,10 @@
 
 An action in [-1, 1] passes a first-order low-pass at the control rate, z' = (a - z)/T. Its first two entries, times the
 authority in N, are added to what the law believes acts on the pistons; the law knows their rate too. Where the impedance is
-variable, the next two set the stiffness K' = K 4^z that the law works with, about a target moved so that a hand at rest still
-feels K; the last raises the damping. Forces and stiffness yield where pistons oscillate. Zero actions are exactly the law.
-Without a law the actions are the openings.
+variable, the next two raise the stiffness to K' = K 4^z that the law works with, about a target moved so that a hand at rest
+still feels K; the last raises the damping. Less than zero says nothing: a policy that had learned to soften an axis kept to
+it, though its errors were larger. Forces and stiffness yield where pistons oscillate. Zero actions are exactly the law. Without
+a law the actions are the openings.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ STIFFEST = 4000.0
 and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 the same four stayed below 1 mm."""
 
 STIFFENING = 4.0
-"""Most that the stiffness is multiplied or divided by."""
+"""Most that the stiffness is multiplied by."""
 
 MOST_DAMPING = 2.0
 """Most that the damping is multiplied by."""
@@ -104,7 +105,7 @@ def _tell(
             strength = authority * share[k, i]
             told[k, i] = strength * smooth[k, i]
             told[2 + k, i] = strength / time_constant * (action[k, i] - smooth[k, i])
-            told[4 + k, i] = smooth[2 + k, i] * min(share[0, i], share[1, i]) if size > 2 else 0.0
+            told[4 + k, i] = max(smooth[2 + k, i], 0.0) * min(share[0, i], share[1, i]) if size > 2 else 0.0
         told[6, i] = MOST_DAMPING ** max(smooth[4, i], 0.0) if size > 4 else 0.0
         for k in range(size):
             smooth[k, i] += quickness * (action[k, i] - smooth[k, i])

@@ -80,6 +80,7 @@ class Bookkeeper:
         return np.abs(self.ledger / mass_and_energy(self.rig, self.plant.state) - 1).max(axis=(1, 2))
 
 
+@pytest.mark.slow
 def test_mass_and_energy_balance_over_ten_seconds() -> None:
     """Lane by lane other valve motions and pushes, a hand's spring keeping clear of the stops; every chamber's books close."""
     lanes, rng, rig = 6, np.random.default_rng(0), Parameters()

@@ -43,6 +43,18 @@ def test_zero_actions_are_bit_for_bit_the_law(law: str, impedance: str, sensors:
     assert np.abs(info["user_force"]).min(axis=0).max() > 5, "all of them were pushed"
 
 
+def test_the_law_is_never_made_softer_or_less_damped() -> None:
+    """A policy that had begun to soften an axis stayed there, and fell far off where the rig was at its limit."""
+    states = []
+    for said in (0.0, -1.0):
+        env = gymnasium.make_vec(CIRCLE, num_envs=3, impedance="variable", randomize=True)
+        env.reset(seed=3)
+        for _ in range(60):
+            env.step(np.tile(np.array([0.1, -0.1, said, said, said], np.float32), (3, 1)))
+        states.append(env.simulation.plant.state.copy())
+    np.testing.assert_array_equal(*states)
+
+
 def test_the_target_moves_so_that_a_hand_at_rest_feels_what_was_asked_for() -> None:
     """The springs K about t and K' about t' have the same force where the hand is in balance with K; nothing else changes."""
     lanes, rng = 500, np.random.default_rng(0)
@@ -108,7 +120,7 @@ def test_a_measured_hand_at_rest_feels_the_stiffness_asked_for(damping: float) -
 
 def test_a_force_that_no_sensor_tells_of_meets_the_stiffness_that_the_policy_chose() -> None:
     """That is what the stiffness is for: friction, unknown weight and what else pushes unseen."""
-    np.testing.assert_allclose(pushed(0.0, sensed=False, push=4.0), 0.002 / 4.0**POWERS, rtol=0.01)
+    np.testing.assert_allclose(pushed(0.0, sensed=False, push=4.0), 0.002 / 4.0 ** np.maximum(POWERS, 0.0), rtol=0.01)
 
 
 def test_the_stiffness_yields_with_the_authority(monkeypatch) -> None:
@@ -127,11 +139,11 @@ def test_the_stiffness_yields_with_the_authority(monkeypatch) -> None:
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 1000.0)
     plant = closed_loop.resting_at(wanted, closed_loop.FRICTIONLESS)
     law.reset(np.ones(3, dtype=np.bool_))
-    law.accept(np.repeat([[0.0], [0.0], [0.8], [-0.8]], 3, axis=1))
+    law.accept(np.repeat([[0.0], [0.0], [0.8], [0.4]], 3, axis=1))
     for _ in range(3):
         law.command(closed_loop.ideal(plant, 0.0, np.zeros((2, 3))), wanted)
     least = [1.0, 0.5, 0.2]
-    np.testing.assert_allclose(worked[-1], 1000 * 4.0 ** (np.outer([0.8, -0.8], least)), rtol=1e-3)
+    np.testing.assert_allclose(worked[-1], 1000 * 4.0 ** (np.outer([0.8, 0.4], least)), rtol=1e-3)
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pytest
 
 from birthsim_env import dynamics
 from birthsim_env.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
@@ -65,6 +66,7 @@ def volume_shares(plant: Plant, dead_volume: Array) -> Array:
     return (dead_volume + areas * columns) / (dead_volume + areas * [[0.2], [0.2], [0.4], [0.4]])
 
 
+@pytest.mark.slow
 def test_a_million_policy_steps_stay_finite_and_explained() -> None:
     lanes, steps, rng = 2000, 500, np.random.default_rng(0)
     rigs = corner_rigs(lanes, rng)

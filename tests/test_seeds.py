@@ -98,6 +98,7 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction():
         assert 0.7 < np.polyfit(unknown, half, 1)[0] < 1.3
 
 
+@pytest.mark.slow
 def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed_is_kept(tmp_path, monkeypatch, capsys):
     asked = []
 

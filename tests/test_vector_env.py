@@ -69,7 +69,11 @@ def test_make_vec_gives_the_native_class_with_batched_spaces():
         (CIRCLE, {}),
         (CIRCLE, {"randomize": True, "sensors": "lab"}),
         (FORCEPS, {"randomize": True, "sensors": "lab", "action_mode": "flow", "valves": "one_valve"}),
-        ("BirthSIM/Descent-v0", {"randomize": True, "action_mode": "flow", "policy_period": 0.02}),
+        pytest.param(
+            "BirthSIM/Descent-v0",
+            {"randomize": True, "action_mode": "flow", "policy_period": 0.02},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_lane_of_a_thousand_is_the_single_environment(name, arguments):

@@ -1,0 +1,212 @@
+"""birthsim-evaluate: tables, strict JSON and figures, a controller from a file, --all by pieces, and Ctrl-C."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import pytest
+
+from baselines import studies
+from baselines.metrics import UNITS
+from tests.console import OWN, assert_picture, call, interrupted, run, strict
+
+
+def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
+    out = tmp_path / "new" / "folder"
+    arguments = (
+        "--env",
+        "BirthSIM/Probe-v0",
+        "--episodes",
+        "3",
+        "--seed",
+        "7",
+        "--controller",
+        "backstepping",
+        "backstepping-weight",
+    )
+    done = run("evaluate", *arguments, "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in out.iterdir()) == [
+        *("error_over_time.png", "error_over_time.svg", "evaluation.json", "evaluation.md")
+    ]
+    table = (out / "evaluation.md").read_text()
+    assert table.strip() in done.stdout
+    assert table.startswith("BirthSIM/Probe-v0, 3 episodes from seed 7, ideal sensors, randomised: all")
+    assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
+    assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
+    content = strict(out / "evaluation.json")
+    law, weight = content["results"]
+    assert (law["controller"], weight["controller"]) == ("backstepping", "backstepping-weight")
+    assert law["seeds"] == weight["seeds"] == [7, 8, 9]
+    assert content["arguments"]["env"] == "BirthSIM/Probe-v0"
+    assert content["rig"]["mechanics"]["mass"] == 3.0
+    for name in UNITS:
+        assert len(law["episodes"][name]) == 3
+        median = law["summary"][name]["median"]
+        rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
+        assert [row.split("|")[3].strip() for row in rows] == ([] if median is None else [f"{median:.3g}"]), name
+    assert weight["summary"]["settled_rms"]["median"] < law["summary"]["settled_rms"]["median"]
+    # The figures are there for the stiffness test, whose reference stands still.
+    assert math.isfinite(law["summary"]["stiffness_error"]["median"])
+    assert_picture(out, "error_over_time")
+
+
+def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp_path, monkeypatch, capsys):
+    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
+    arguments = ("--episodes", 1, "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
+    status, printed, _ = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path)
+    assert status == 0
+    assert "BirthSIM/Circle-v0, 1 episodes from seed 0, lab sensors, randomised: none" in printed
+    content = strict(tmp_path / "evaluation.json")
+    (result,) = content["results"]
+    # On the circle the reference never rests.
+    assert result["summary"]["stiffness_error"]["median"] is None
+    assert result["episodes"]["stiffness_error"] == [None]
+    assert "stiffness_error" not in printed, "a row in which nothing is said is left out"
+    assert content["rig"]["mechanics"]["mass"] == 3.5
+
+
+def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_every_episode(tmp_path):
+    (tmp_path / "slam.py").write_text(OWN)
+    name = f"{tmp_path}/slam.py:Slam"
+    done = run("evaluate", "--env", "BirthSIM/Probe-v0", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "Warning" not in done.stderr
+    assert "| lost episodes |  | 2 of 2 |" in done.stdout
+    (result,) = strict(tmp_path / "out" / "evaluation.json")["results"]
+    assert result["lost"] == [True, True]
+    assert result["episodes"]["stiffness_error"] == result["episodes"]["cross_motion"] == [None, None]
+    assert_picture(tmp_path / "out", "error_over_time")
+
+
+FAILING = """
+
+class Fails(Slam):
+    def command(self, measurement, reference):
+        raise RuntimeError("no law at all")
+"""
+NARROW = ("--all", "--env", "BirthSIM/Probe-v0", "--sensors", "ideal", "--episodes", 2)
+
+
+@pytest.fixture
+def small_studies(monkeypatch):
+    """Studies of one pose, which take a second each instead of ten."""
+    pose = ((0.5, 0.0),)
+    for name, options in (
+        ("stiffness", {"setpoints": (2000.0,), "poses": pose, "forces": (20.0,)}),
+        ("polar", {"directions": 4, "poses": pose}),
+        ("ellipses", {"poses": pose}),
+    ):
+        monkeypatch.setitem(studies.STUDIES, name, partial(studies.STUDIES[name], **options))
+    monkeypatch.setattr(studies, "disturbance_study", partial(studies.disturbance_study, amplitudes=(2.0, 20.0), poses=pose))
+
+
+def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
+    (tmp_path / "slam.py").write_text(OWN)
+    slam = f"{tmp_path}/slam.py:Slam"
+    arguments = (*NARROW, "--controllers", "backstepping", slam, "--jobs", 1, "--out")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    assert status == 0, complained
+    assert "Warning" not in complained
+    for title, pieces in (("comparison", 4), ("studies", 8)):
+        assert f"{title}: 100%" in complained
+        assert f"{pieces}/{pieces} " in complained
+    content = strict(tmp_path / "out" / "comparison.json")
+    cells = {(cell["controller"], cell["plant"]): cell for cell in content["cells"]}
+    assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
+    law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
+    assert (law["episodes"], law["lost"], lost["lost"]) == (2, 0, 2)
+    assert 0 < law["metrics"]["stiffness_error"]["median"] < 200
+    assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == "lost"
+    assert set(content["studies"]) == {"stiffness", "polar", "ellipses", "disturbance"}
+    assert set(content["studies"]["polar"]) == {"backstepping", slam}
+    assert content["studies"]["polar"][slam]["stiffness"] == [[None]] * 4
+    assert len(content["studies"]["polar"]["backstepping"]["stiffness"]) == 4
+    assert content["arguments"]["controller"] == ["backstepping", slam]
+    text = (tmp_path / "out" / "comparison.md").read_text()
+    table = text[text.index("| controller |") : text.index("## ")].strip()
+    assert table in printed
+    assert f"| {slam} | lost; lost |" in table
+    for name in (
+        *("settled_error", "air_against_error", "rendered_stiffness", "hunting", "disturbances"),
+        *("stiffness_by_direction", "stiffness_ellipses"),
+    ):
+        assert_picture(tmp_path / "out", name)
+        assert f"{name}.png" in printed
+    # Once more: nothing is computed, and all is the same.
+    written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.json") if path.parent != tmp_path / "out"}
+    assert len(written) == 12
+    status, again, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    assert status == 0
+    assert f"comparison: 4 of 4 are there with these settings, rig and code, and are kept: backstepping 2, {slam} 2" in again
+    assert "studies: 8 of 8 are there" in again
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+    assert (tmp_path / "out" / "comparison.md").read_text() == text
+    assert strict(tmp_path / "out" / "comparison.json") == content
+    # The studies alone, from what is there of them.
+    (tmp_path / "out" / "comparison.md").unlink()
+    status, alone, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out", "--studies-only")
+    assert status == 0
+    assert "settled_error.png" not in alone
+    assert "rendered_stiffness.png" in alone
+    assert not (tmp_path / "out" / "comparison.md").exists()
+    assert strict(tmp_path / "out" / "comparison.json")["studies"] == content["studies"]
+
+
+def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
+    arguments = (*NARROW, "--controllers", "backstepping", "--no-studies", "--out")
+    line = [
+        *arguments,
+        tmp_path / "out",
+        "--episodes",
+        1,
+        "--jobs",
+        2,
+        "--randomize",
+        "all",
+        "--controllers",
+        "backstepping",
+        "backstepping-weight",
+    ]
+    status, printed = interrupted("evaluate", line, lambda said: "1/2 " in said)
+    assert (status, printed) == (130, "")
+    done = list((tmp_path / "out").rglob("*.json"))
+    assert len(done) == 1
+    status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
+    assert status == 0
+    assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
+    assert "studies" not in strict(tmp_path / "out" / "comparison.json")["arguments"]["out"]
+
+
+def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
+    (tmp_path / "own.py").write_text(OWN + FAILING)
+    fails = f"{tmp_path}/own.py:Fails"
+    arguments = (*NARROW, "--randomize", "scenario", "--no-studies", "--jobs", 1, "--controllers", fails, "backstepping")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
+    assert status == 2
+    assert "| backstepping |" in printed
+    assert "birthsim-evaluate: error: 1 of 2 pieces failed, the first cells/" in complained
+    assert "RuntimeError: no law at all" in complained
+    assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
+
+
+def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
+    arguments = ("--env", "BirthSIM/Probe-v0", "--episodes", 6400, "--out", tmp_path)
+    status, printed = interrupted("evaluate", arguments, lambda said: "episodes 128-255" in said)
+    assert status == 0
+    assert "of 6400 episodes are complete and kept" in printed
+    (result,) = strict(tmp_path / "evaluation.json")["results"]
+    assert len(result["seeds"]) >= 128
+    assert len(result["seeds"]) % 128 == 0
+    assert len(result["episodes"]["settled_rms"]) == len(result["seeds"])
+
+
+def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monkeypatch, capsys):
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("baselines.commands.evaluate.evaluate", interrupt)
+    status, _, complained = call("evaluate", monkeypatch, capsys, "--out", tmp_path)
+    assert status == 130
+    assert complained == "birthsim-evaluate: interrupted\n"
