@@ -23,18 +23,18 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 @dataclass(frozen=True)
 class TrainingSettings:
     """An experiment and its algorithm. ``rollout``, ``epochs`` and ``gae_lambda`` are PPO's; ``gradient_steps``, per step of
-    all lanes, are SAC's and TQC's. The learning rate falls linearly to a tenth. Raises ``ValueError`` naming what cannot be.
+    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. Raises ``ValueError`` naming what cannot be.
     """
 
     environment: str = "BirthSIM/CircleResidual-v0"
     algorithm: str = "ppo"
-    steps: int = 1_500_000
+    steps: int = 3_000_000
     seed: int = 0
     sensors: str = "ideal"
     randomize: bool | str = True
-    lanes: int = 128
+    lanes: int = 256
     rollout: int = 16
-    batch: int = 1024
+    batch: int = 2048
     epochs: int = 2
     gradient_steps: int = 4
     learning_rate: float = 1e-3

@@ -21,7 +21,7 @@ ERROR_CAP = 5.0
 SPEED_UNIT = 0.02
 """m/s. Speed relative to the compliant target that costs ``HUNTING_COST`` per 10 ms."""
 
-HUNTING_COST = 0.1
+HUNTING_COST = 0.2
 EFFORT_COST = 0.01
 ACTION_CHANGE_COST = 0.05
 FAILURE_COST = 250.0

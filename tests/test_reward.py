@@ -51,7 +51,7 @@ def test_every_term_is_its_formula_of_info(name, period, arguments):
         settled = share if info["since_jump"] >= 0.3 else 0.0
         expected = {
             "reward_tracking": -settled * min(np.abs(error).sum() / 2e-3, 5.0),
-            "reward_hunting": -settled * 0.1 * min(np.abs(relative).sum() / 0.02, 5.0),
+            "reward_hunting": -settled * 0.2 * min(np.abs(relative).sum() / 0.02, 5.0),
             "reward_effort": -share * 0.01 * (action @ action),
             "reward_action_change": -0.05 * np.abs(action - last).sum(),
             "reward_failure": 0.0,
@@ -117,7 +117,7 @@ def test_giving_way_with_a_growing_push_is_calm_and_standing_still_is_not(period
     motion = np.array([[0.51, 0.51], [0.0, 0.0], [0.05, 0.0], [0.0, 0.0]])
     terms, _ = assess(2, period, force=now, last_force=before, motion=motion)
     np.testing.assert_allclose(terms["reward_tracking"], 0, atol=1e-12)
-    np.testing.assert_allclose(terms["reward_hunting"], [0, -0.1 * 0.05 / 0.02 * period / 0.01], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(terms["reward_hunting"], [0, -0.2 * 0.05 / 0.02 * period / 0.01], rtol=1e-9, atol=1e-12)
 
 
 def test_costs_are_capped_and_scale_with_the_time_that_a_step_takes():
