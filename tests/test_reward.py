@@ -125,7 +125,7 @@ def test_costs_are_capped_and_scale_with_the_time_that_a_step_takes():
     for period in (0.01, 0.02):
         terms, _ = assess(2, period, motion=motion, action=[[0.5, 1], [0, -1]], last_action=[[0, 1], [0, 1]])
         np.testing.assert_allclose(terms["reward_tracking"], np.array([-4.5, -5]) * period / 0.01)
-        np.testing.assert_allclose(terms["reward_hunting"], np.array([-0.45, -0.5]) * period / 0.01)
+        np.testing.assert_allclose(terms["reward_hunting"], np.array([-0.9, -1.0]) * period / 0.01)
         np.testing.assert_allclose(terms["reward_effort"], np.array([-0.0025, -0.02]) * period / 0.01)
         # A change is an event: it costs the same however long the step is.
         np.testing.assert_allclose(terms["reward_action_change"], [-0.025, -0.1])
@@ -135,7 +135,7 @@ def test_after_a_jump_only_tracking_and_hunting_are_free():
     motion = np.repeat([[0.52], [0.0], [0.1], [0.0]], 3, axis=1)
     terms, _ = assess(3, motion=motion, since_jump=[0.0, 0.299, 0.3], action=np.ones((2, 3)))
     np.testing.assert_allclose(terms["reward_tracking"], [0, 0, -5])
-    np.testing.assert_allclose(terms["reward_hunting"], [0, 0, -0.5])
+    np.testing.assert_allclose(terms["reward_hunting"], [0, 0, -1.0])
     np.testing.assert_allclose(terms["reward_effort"], -0.02)
     np.testing.assert_allclose(terms["reward_action_change"], -0.1)
 
