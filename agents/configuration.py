@@ -23,7 +23,8 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 @dataclass(frozen=True)
 class TrainingSettings:
     """An experiment and its algorithm. ``rollout``, ``epochs`` and ``gae_lambda`` are PPO's; ``gradient_steps``, per step of
-    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. Raises ``ValueError`` naming what cannot be.
+    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. Raises ``ValueError`` naming what cannot
+    be.
     """
 
     environment: str = "BirthSIM/CircleResidual-v0"

@@ -42,6 +42,9 @@ PLACES, MASSES = 128, (2.0, 5.0)
 LEVELS = (6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 25.0)
 """N, Coulomb friction of both cylinders along a circle."""
 
+ROUND = 4.0
+"""s, that a circle takes."""
+
 SLIDING = 0.01
 """m/s: a faster piston tells friction clearly."""
 
@@ -85,21 +88,24 @@ def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
     return taken["correction"][-100:, :, 1].mean(axis=0), mass * rig.mechanics.gravity * np.cos(angle)
 
 
-def friction_along_circle(policy: Policy) -> tuple[Array, Array, Array]:
-    """Round the circle of Fig. 4: the Coulomb friction that the law believes in less that of the rig, N, (L,), and half the
-    difference between the corrections while a piston moves out and in, N, of cylinders 1 and 2, (L,) each.
+def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
+    """Round the circle of Fig. 4: the Coulomb friction that the law believes in less that of the rig, N, and half the
+    difference between the corrections while a piston moves out and in, N; (2, L) each, of cylinders 1 and 2.
 
-    The halves tell friction, which turns round with the speed, from weight, which does not.
+    The halves tell friction, which turns round with the speed, from weight; and the mean of both ways round, since one way
+    round the weight along cylinder 2 goes with its speed, and the other way against it.
     """
     rig, levels = Parameters(), np.array(LEVELS)
-    halves = np.empty((2, len(levels)))
+    believed = np.array([[rig.cylinder1.coulomb_friction], [rig.cylinder2.coulomb_friction]])
+    halves = np.zeros((2, len(levels)))
     for k, level in enumerate(LEVELS):
         ranges = {f"cylinder{i}.coulomb_friction": (level, level) for i in (1, 2)}
-        _, taken = _follow(policy, 1, 12.0, Circle(), ranges, rig)
-        for cylinder in range(2):
-            speed, correction = (taken[name][400:, 0, cylinder] for name in ("piston_velocity", "correction"))
-            halves[cylinder, k] = (correction[speed > SLIDING].mean() - correction[speed < -SLIDING].mean()) / 2
-    return rig.cylinder1.coulomb_friction - levels, halves[0], halves[1]
+        for period in (ROUND, -ROUND):
+            _, taken = _follow(policy, 1, 12.0, Circle(period=period), ranges, rig)
+            for cylinder in range(2):
+                speed, correction = (taken[name][400:, 0, cylinder] for name in ("piston_velocity", "correction"))
+                halves[cylinder, k] += (correction[speed > SLIDING].mean() - correction[speed < -SLIDING].mean()) / 4
+    return believed - levels, halves
 
 
 def frictionless_circle(policy: Policy) -> tuple[float, float]:

@@ -146,9 +146,7 @@ class ResidualLaw:
         self._experience.update(measurement)
         self._guard.update(self._experience.joints, reference)
         settings, told = self.settings, np.empty((7, self._smooth.shape[1]))
-        _tell(
-            self._action, self._guard.share, settings.authority, settings.time_constant, self._quickness, self._smooth, told
-        )
+        _tell(self._action, self._guard.share, settings.authority, settings.time_constant, self._quickness, self._smooth, told)
         if self._law is None:
             return self._action
         if settings.impedance != "fixed":

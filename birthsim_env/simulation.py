@@ -6,6 +6,8 @@ instants, and at each of them reference, user force and measurement belong to th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -160,7 +162,7 @@ class Simulation:
             points[:, k] = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")[:2, chosen]
             asked[:, k] = checked("stiffness.sample(time)", self.stiffness.sample(time), (7, lanes), "SI")[:, chosen]
 
-        def first(wrong: NDArray[np.bool_]) -> tuple[int, float]:
+        def first(wrong: Any) -> tuple[int, float]:
             k = int(wrong.any(axis=1).argmax())
             return k, float(instants[k])
 

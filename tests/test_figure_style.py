@@ -69,7 +69,7 @@ DRAWINGS = {
     "stability": (stability, {"stability_rig"}),
     "learning": (learning, {"learning_curves"}),
     "correction": (
-        lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 3 * (np.arange(5.0),), folder),
+        lambda folder: draw_corrections(2 * (np.arange(5.0),), 0.9, 2 * (np.ones((2, 5)).cumsum(axis=1),), folder),
         {"correction"},
     ),
 }

@@ -92,10 +92,11 @@ def test_shipped_policies_load_fit_and_are_small(name):
 def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction():
     policy = load_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
-    unknown, *halves = friction_along_circle(policy)
-    for half in halves:
-        # Newton for newton: the slope, whatever else the correction holds.
-        assert 0.7 < np.polyfit(unknown, half, 1)[0] < 1.3
+    for unknown, half in zip(*friction_along_circle(policy), strict=True):
+        # Newton for newton, and nothing where the law knows its friction.
+        slope, rest = np.polyfit(unknown, half, 1)
+        assert 0.7 < slope < 1.3
+        assert abs(rest) < 3
 
 
 @pytest.mark.slow
