@@ -25,8 +25,8 @@ def draw_corrections(
         panels[0].plot(truth, learned, "o", color=MIDDLE, ms=3, label=f"learned, r = {correlation:.3f}")
         panels[0].set(xlabel=r"$m g \cos\theta_1$ (N)", ylabel="correction on cylinder 2 (N)")
         panels[0].set_title("(a) Weight, held still", loc="left", fontsize=9.5)
-        for k, style in enumerate(("o-", "s-.")):
-            panels[1].plot(unknown[k], halves[k], style, color=(MIDDLE, ACCENT)[k], ms=4, lw=0.8, label=f"cylinder {k + 1}")
+        for k, style in enumerate("os"):
+            panels[1].plot(unknown[k], halves[k], style, color=(MIDDLE, ACCENT)[k], ms=3, label=f"cylinder {k + 1}")
         panels[1].set(xlabel=r"believed less true $F_c$ (N)", ylabel="correction, out less in, halved (N)")
         panels[1].set_title("(b) Friction, round a circle", loc="left", fontsize=9.5)
         for axes in panels:

@@ -39,8 +39,8 @@ FRICTIONLESS = {f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)}
 PLACES, MASSES = 128, (2.0, 5.0)
 """Places in the workspace at which the correction is looked at, and the range of the mass there, kg."""
 
-LEVELS = (6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 25.0)
-"""N, Coulomb friction of both cylinders along a circle."""
+RUBBED, FRICTIONS = 32, (6.0, 25.0)
+"""Rigs that go round a circle, and the range of their Coulomb friction, N."""
 
 ROUND = 4.0
 """s, that a circle takes."""
@@ -90,22 +90,20 @@ def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
 
 def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
     """Round the circle of Fig. 4: the Coulomb friction that the law believes in less that of the rig, N, and half the
-    difference between the corrections while a piston moves out and in, N; (2, L) each, of cylinders 1 and 2.
+    difference between the corrections while a piston moves out and in, N; (2, RUBBED) each, of cylinders 1 and 2.
 
     The halves tell friction, which turns round with the speed, from weight; and the mean of both ways round, since one way
-    round the weight along cylinder 2 goes with its speed, and the other way against it.
+    round the weight along cylinder 2 goes with its speed, and the other way against it. Frictions are drawn at random.
     """
-    rig, levels = Parameters(), np.array(LEVELS)
+    rig, halves = Parameters(), np.zeros((2, RUBBED))
+    ranges = {f"cylinder{i}.coulomb_friction": FRICTIONS for i in (1, 2)}
+    for period in (ROUND, -ROUND):
+        env, taken = _follow(policy, RUBBED, 12.0, Circle(period=period), ranges, rig)
+        speed, correction = (np.moveaxis(taken[name][400:], 2, 0) for name in ("piston_velocity", "correction"))
+        outwards, inwards = (correction.mean(axis=1, where=moves) for moves in (speed > SLIDING, speed < -SLIDING))
+        halves += (outwards - inwards) / 4
     believed = np.array([[rig.cylinder1.coulomb_friction], [rig.cylinder2.coulomb_friction]])
-    halves = np.zeros((2, len(levels)))
-    for k, level in enumerate(LEVELS):
-        ranges = {f"cylinder{i}.coulomb_friction": (level, level) for i in (1, 2)}
-        for period in (ROUND, -ROUND):
-            _, taken = _follow(policy, 1, 12.0, Circle(period=period), ranges, rig)
-            for cylinder in range(2):
-                speed, correction = (taken[name][400:, 0, cylinder] for name in ("piston_velocity", "correction"))
-                halves[cylinder, k] += (correction[speed > SLIDING].mean() - correction[speed < -SLIDING].mean()) / 4
-    return believed - levels, halves
+    return believed - env.simulation.plant.lane_parameters[[at.FC1, at.FC2]], halves
 
 
 def frictionless_circle(policy: Policy) -> tuple[float, float]:
