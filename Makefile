@@ -27,7 +27,7 @@ $(READY): pyproject.toml constraints.txt
 run: $(READY)
 	@echo "== 1 of 3: the experiment of Fig. 4"
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
-	@echo "== 2 of 3: a residual policy on top of the law, two to five minutes"
+	@echo "== 2 of 3: a residual policy on top of the law, three to five minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim-train --config circle --seed 0 --out $(OUT)/policy
 	@echo "== 3 of 3: law and residual on 64 episodes that training never saw"
