@@ -125,10 +125,12 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
         def less(values: Array, statistic: Callable[[Array], float] = statistic) -> float:
             return 100 * (1 - statistic(values[..., 1]) / statistic(values[..., 0]))
 
+        off = less(both[:, feasible])
+        if not np.isfinite(off):
+            lines.append(f"{name} settled error: most episodes are lost.  ")
+            continue
         low, high = crossed_interval(less, both[:, feasible])
-        lines.append(
-            f"{name} settled error: {less(both[:, feasible]):.1f} % less than {law.controller} ({low:.1f} to {high:.1f} %).  "
-        )
+        lines.append(f"{name} settled error: {off:.1f} % less than {law.controller} ({low:.1f} to {high:.1f} %).  ")
     each = ", ".join(number(pooled(row[feasible])) for row in matrix)
     lost = ", ".join(str(sum(one.lost)) for one in residuals)
     lines += [

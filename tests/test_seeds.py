@@ -67,6 +67,13 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     assert merged(residuals, "both").lost == [False] * 6 + [True, False]
 
 
+def test_where_most_episodes_are_lost_the_table_says_so():
+    law = evaluation("law", [1.0, 2.0, 3.0, 4.0])
+    text = seed_table(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2)
+    assert "Interquartile mean of the settled error: most episodes are lost." in text
+    assert "inf" not in text
+
+
 def test_a_learning_curve_over_seeds_ends_with_the_shortest():
     trainings = [{"curve": [{"steps": 10 * t, "x": level - t} for t in range(4 - k)]} for k, level in enumerate((8.0, 9.0))]
     steps, (middle, low, high) = over_seeds(trainings, "x")
