@@ -353,6 +353,7 @@ validations = 8
 """
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_loses_at_most_one_interval(tmp_path, monkeypatch, capsys):
     """SIGKILL, which no handler sees, at any moment after the second checkpoint; then the same command with --resume."""
     (tmp_path / "tiny.toml").write_text(CONFIGURATION)

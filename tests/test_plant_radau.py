@@ -100,7 +100,7 @@ CASES = {
 }
 
 
-MARKED = [pytest.param(*case, id=name, marks=pytest.mark.slow if "demanding" in name else ()) for name, case in CASES.items()]
+MARKED = [pytest.param(*case, id=name, marks=pytest.mark.slow if "rig, strong" in name else ()) for name, case in CASES.items()]
 
 
 @pytest.mark.parametrize(("changes", "sequence", "refinement", "allowed"), MARKED)
