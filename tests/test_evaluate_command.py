@@ -102,6 +102,7 @@ def small_studies(monkeypatch):
     monkeypatch.setattr(studies, "disturbance_study", partial(studies.disturbance_study, amplitudes=(2.0, 20.0), poses=pose))
 
 
+@pytest.mark.slow
 def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
     (tmp_path / "slam.py").write_text(OWN)
     slam = f"{tmp_path}/slam.py:Slam"

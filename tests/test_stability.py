@@ -108,6 +108,7 @@ def corners(name: str, rig: Parameters = RIG, points: int = 2) -> dict[str, Any]
     return draw_map(MAPS[name], "admittance-backstepping", rig, points=points)
 
 
+@pytest.mark.slow
 def test_the_corners_of_the_rigs_map() -> None:
     """Fixed gains oscillate on a light rig with slow valves; those that yield come to rest, there but for half a millimetre."""
     chart, ticks = corners("rig"), []

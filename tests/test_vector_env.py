@@ -68,7 +68,11 @@ def test_make_vec_gives_the_native_class_with_batched_spaces():
     [
         (CIRCLE, {}),
         (CIRCLE, {"randomize": True, "sensors": "lab"}),
-        (FORCEPS, {"randomize": True, "sensors": "lab", "action_mode": "flow", "valves": "one_valve"}),
+        pytest.param(
+            FORCEPS,
+            {"randomize": True, "sensors": "lab", "action_mode": "flow", "valves": "one_valve"},
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             "BirthSIM/Descent-v0",
             {"randomize": True, "action_mode": "flow", "policy_period": 0.02},
