@@ -1,4 +1,4 @@
-# make run    installs, reproduces Fig. 4, trains a residual policy for about two minutes and evaluates it
+# make run    installs, reproduces Fig. 4, trains a residual policy for three to five minutes and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow
 # make lint   ruff and mypy; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)

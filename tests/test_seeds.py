@@ -103,7 +103,7 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction():
         # Newton for newton, and nothing where the law knows its friction.
         slope, rest = np.polyfit(unknown, half, 1)
         assert 0.7 < slope < 1.3
-        assert abs(rest) < 3
+        assert abs(rest) < 2
 
 
 @pytest.mark.slow
