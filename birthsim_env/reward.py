@@ -26,7 +26,7 @@ EFFORT_COST = 0.01
 ACTION_CHANGE_COST = 0.05
 FAILURE_COST = 250.0
 """Cost of leaving the physical range: more than the 150 that tracking and hunting cost at most within the 25 steps that a
-discount of 0.96 looks ahead, so that ending early does not pay. With 0.98 it may: there they cost up to 300."""
+discount of 0.96 looks ahead, so that ending early does not pay. With a discount above 0.976 it would."""
 
 GRACE = 0.3
 """s after a jump during which tracking error and hunting cost nothing."""

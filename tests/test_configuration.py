@@ -8,10 +8,13 @@ from dataclasses import fields
 
 import gymnasium
 import pytest
+import torch
+import yaml
 
 import agents
 from agents.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
 from agents.settings import ResidualSettings
+from birthsim_env import reward
 from birthsim_env.scenarios import SCENARIOS
 
 assert agents  # importing it registers the ids
@@ -36,6 +39,9 @@ def test_every_configuration_of_the_package_says_what_its_file_says_and_can_be_m
     arguments = {"sensors": training.sensors, "randomize": training.randomize, **residual.to_dict()}
     env = gymnasium.make_vec(training.environment, num_envs=1, **arguments)
     assert env.single_action_space.shape == (residual.size,)
+    # Ending early does not pay: it costs more than the worst that can happen for as long as the discount looks ahead.
+    worst = reward.ERROR_CAP * (1 + reward.HUNTING_COST)
+    assert worst / (1 - training.discount) < reward.FAILURE_COST
     # PPO's minibatches are whole parts of what it collects.
     assert training.lanes * training.rollout % training.batch == 0
     assert json.loads(json.dumps(training.to_dict())) == training.to_dict()
@@ -160,3 +166,35 @@ def test_overriding_checks_names_and_values():
         override(settings, colour="red")
     with pytest.raises(ValueError, match=r"authority = 0; allowed: more than 0"):
         override(ResidualSettings(), authority=0)
+
+
+RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
+
+
+def test_rl_zoos_file_has_every_scenario():
+    assert set(RL_ZOO) == {f"BirthSIM/{name.capitalize()}Residual-v0" for name in SCENARIOS}
+
+
+@pytest.mark.parametrize("name", sorted(SCENARIOS))
+def test_rl_zoos_file_says_what_the_configuration_beside_it_says(name):
+    training, residual = load_configuration(name)
+    zoo = RL_ZOO[training.environment]
+    numbers = {
+        "n_envs": training.lanes, "n_timesteps": training.steps, "n_steps": training.rollout, "batch_size": training.batch,
+        "n_epochs": training.epochs, "gamma": training.discount, "gae_lambda": training.gae_lambda,
+        "learning_rate": f"lin_{training.learning_rate:g}",
+    }  # fmt: skip
+    assert {key: zoo[key] for key in numbers} == numbers
+    assert zoo["normalize"] is True
+    layers = list(training.hidden)
+    policy = eval(zoo["policy_kwargs"], {"nn": torch.nn, "dict": dict})  # as RL-Zoo reads it
+    assert policy == {
+        "log_std_init": training.log_std, "activation_fn": torch.nn.Tanh, "net_arch": {"pi": layers, "vf": layers},
+    }  # fmt: skip
+    arguments = {"sensors": training.sensors, "randomize": training.randomize}
+    assert zoo["env_kwargs"].items() <= {**residual.to_dict(), **arguments}.items()
+    assert arguments.items() <= zoo["env_kwargs"].items()
+    for key, value in residual.to_dict().items():
+        assert zoo["env_kwargs"].get(key, getattr(ResidualSettings(), key)) == value
+    env = gymnasium.make(training.environment, **zoo["env_kwargs"])
+    assert env.action_space.shape == (residual.size,)
