@@ -27,7 +27,7 @@ from baselines.comparison import (
 )
 from baselines.comparison_tables import full, losses, overview
 from birthsim_env import Parameters
-from tests.test_evaluation import OWN
+from tests.test_named_controllers import OWN
 
 RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v0", "ideal", "randomised")
