@@ -64,10 +64,10 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Reward
     Per step of 10 ms, the sum of five terms that are also in `info`:
-    `reward_tracking` = -min((|ex| + |ey|) / 2 mm, 5) and `reward_hunting` = -0.2 min((|wx| + |wy|) / 20 mm/s, 5), w the speed
-    relative to the compliant target, both zero for 0.3 s after the start and after a jump of the force or of a stiffness
-    setpoint; `reward_effort` = -0.01 sum a^2; `reward_action_change` = -0.05 sum |a - last a|; `reward_failure` = -250 when
-    the episode terminates.
+    `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm) and `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s), e and w
+    position and speed relative to the compliant target, except that what a jump of the force or of a stiffness setpoint moves
+    it by is asked for little by little (time constant 60 ms); `reward_effort` = -0.01 sum a^2; `reward_action_change` =
+    -0.05 sum |a - last a|; `reward_failure` = -250 when the episode terminates.
 
     ## Start and end of an episode
     It starts on the target, moving with it, chambers in balance with weight and friction at the pneumatic stiffness asked

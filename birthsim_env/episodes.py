@@ -34,6 +34,7 @@ class Episodes:
         self._numbers: NDArray[np.int64] = np.full(lanes, -1, dtype=np.int64)
         self._seeds: list[int] = []
         self._action: Array = np.zeros((self.action_size, lanes))
+        self._moved: Array = np.zeros((4, lanes))
         self._renderer: Renderer | None = None
         self._path: Array | None = None
 
@@ -55,6 +56,9 @@ class Episodes:
         self.elapsed[lanes] = 0
         self._action[:, lanes] = 0.0
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
+        # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
+        given = self.simulation.reference.compliant_target(self.simulation.force) - self.simulation.reference.position
+        self._moved[:, lanes] = np.concatenate([given, given])[:, lanes]
         self._path = None
 
     def step(self, actions: Array) -> tuple[Array, dict[str, Array], NDArray[np.bool_]]:
@@ -62,13 +66,13 @@ class Episodes:
         if not self._seeds:
             raise RuntimeError("step() before reset(): call reset(seed=...) first")
         simulation = self.simulation
-        last_force = simulation.force.copy()
         simulation.step(actions)
         self.elapsed += 1
+        # Half a control period less: the clock of a jump counts in sums of them.
+        jumped = simulation.since_jump < self._setup.policy_period - 0.5 * simulation.period
         terms, failed = reward.assess(
-            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, last_force,
-            simulation.since_jump, actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed,
-            self._setup.policy_period,
+            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, jumped, self._moved,
+            actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
         )  # fmt: skip
         self._action = actions
         return terms.sum(axis=0), dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed

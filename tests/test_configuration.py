@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import fields
 
 import gymnasium
+import numpy as np
 import pytest
 import torch
 import yaml
@@ -40,7 +41,8 @@ def test_every_configuration_of_the_package_says_what_its_file_says_and_can_be_m
     env = gymnasium.make_vec(training.environment, num_envs=1, **arguments)
     assert env.single_action_space.shape == (residual.size,)
     # Ending early does not pay: it costs more than the worst that can happen for as long as the discount looks ahead.
-    worst = reward.ERROR_CAP * (1 + reward.HUNTING_COST)
+    hunting = reward.HUNTING_COST * np.log1p(reward.FASTEST / reward.SPEED_UNIT)
+    worst = np.log1p(reward.FARTHEST / reward.ERROR_UNIT) + hunting
     assert worst / (1 - training.discount) < reward.FAILURE_COST
     # PPO's minibatches are whole parts of what it collects.
     assert training.lanes * training.rollout % training.batch == 0
