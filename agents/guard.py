@@ -2,14 +2,15 @@
 
 A policy has learned from many rigs; on one that is lighter, or has slower valves, than it takes it for, its correction may
 excite what it should calm. As in ``admittance-backstepping``, sustained half waves of the speed error lower the share of the
-authority that is left, for the rest of the episode. One that follows a jump of the hand is large after none, and costs nothing.
+authority that is left, for the rest of the episode; here large ones do more than small ones. One that follows a jump of the
+hand is large after none, and costs nothing.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from baselines.admittance_law import watch
+from baselines.admittance_law import sustained
 from baselines.cartesian_law import across, along
 from birthsim_env import geometry
 from birthsim_env import lanes as at
@@ -21,13 +22,13 @@ LEVEL = 0.1
 """m/s of the speed error; smaller half waves do not count. As in ``admittance-backstepping``."""
 
 YIELDING = 0.9
-"""What each sustained half wave leaves of the authority; assumed."""
+"""What a sustained half wave of the size ``LEVEL`` leaves of the authority; one k times as large, its power k; assumed."""
 
 LEAST = 0.2
 """Share of the authority that is always left; assumed: the law alone oscillates less."""
 
 _ROWS = 4
-"""Rows of ``watch`` per cylinder."""
+"""Rows of memory per cylinder: the share, and what ``sustained`` remembers."""
 
 
 @kernel
@@ -38,8 +39,10 @@ def _update(joints: Array, target: Array, p: Array, period: float, memory: Array
         )
         error1 = -kappa * joints[2, i] - across(target[2, i], target[3, i], sine, cosine)
         error2 = joints[3, i] - along(target[2, i], target[3, i], sine, cosine)
-        watch(memory, 0, i, error1, period, LEVEL, LEVEL, YIELDING, LEAST)
-        watch(memory, _ROWS, i, error2, period, LEVEL, LEVEL, YIELDING, LEAST)
+        for row, error in ((0, error1), (_ROWS, error2)):
+            peak = sustained(memory, row + 1, i, error, period, LEVEL, LEVEL)
+            if peak > 0.0:
+                memory[row, i] = max(LEAST, YIELDING ** (peak / LEVEL) * memory[row, i])
 
 
 class Guard:

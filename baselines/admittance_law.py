@@ -53,24 +53,30 @@ SUSTAINED = 0.75
 
 
 @helper
-def watch(
-    memory: Array, row: int, i: int, error: float, period: float, level: float, before: float, fall: float, least: float
-) -> float:
-    """The gain share, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``.
+def sustained(memory: Array, row: int, i: int, error: float, period: float, level: float, before: float) -> float:
+    """Size of a sustained half wave of a speed error beyond ``level`` that has just ended, else zero.
 
-    One is sustained where the half wave before it went beyond ``before``.
+    One is sustained where the half wave before it went beyond ``before``. Carries three rows of ``memory`` on: the largest
+    error of this half wave, the time since it began, the size of the last one.
     """
-    share: float = memory[row, i]
-    extreme = memory[row + 1, i]
-    memory[row + 2, i] += period
+    extreme = memory[row, i]
+    memory[row + 1, i] += period
     if error * extreme < 0.0:
-        peak = abs(extreme) if memory[row + 2, i] < HALF_WAVE else 0.0
-        last = memory[row + 3, i]
-        if peak > level and last > before and peak > SUSTAINED * last:
-            share = max(least, fall * share)
-        memory[row, i], memory[row + 1, i], memory[row + 2, i], memory[row + 3, i] = share, error, 0.0, peak
-    elif abs(error) > abs(extreme):
-        memory[row + 1, i] = error
+        peak = abs(extreme) if memory[row + 1, i] < HALF_WAVE else 0.0
+        last = memory[row + 2, i]
+        memory[row, i], memory[row + 1, i], memory[row + 2, i] = error, 0.0, peak
+        return peak if peak > level and last > before and peak > SUSTAINED * last else 0.0
+    if abs(error) > abs(extreme):
+        memory[row, i] = error
+    return 0.0
+
+
+@helper
+def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> float:
+    """The gain share, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``."""
+    share: float = memory[row, i]
+    if sustained(memory, row + 1, i, error, period, level, 0.0) > 0.0:
+        memory[row, i] = share = max(least, fall * share)
     return share
 
 
@@ -130,8 +136,8 @@ def command(
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(motion[4, i], motion[5, i], sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(motion[4, i], motion[5, i], sine, cosine)
 
-        share_t = watch(memory, WATCH_T, i, dt, period, level, 0.0, fall, least)
-        share_n = watch(memory, WATCH_N, i, dn, period, level, 0.0, fall, least)
+        share_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
+        share_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
         memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * math.exp(-period / MOTION_TIME))
         c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)

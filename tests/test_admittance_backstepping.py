@@ -210,7 +210,7 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35) -> Array:
     """The gain share after each of the speed errors (T,), one per period."""
     memory, row = remembered(1), admittance_law.WATCH_N
-    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, 0.0, fall, least) for error in errors])
+    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)

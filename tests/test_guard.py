@@ -51,12 +51,13 @@ def wave(size: float, frequency: float = 10.0, kept: float = 1.0) -> Array:
 
 
 @pytest.mark.parametrize("cylinder", [0, 1])
-def test_a_sustained_oscillation_lowers_the_share_of_its_own_cylinder_down_to_the_least(cylinder: int) -> None:
-    share = watched(new(1), shaken([wave(2 * LEVEL)], cylinder))[:, :, 0]
+@pytest.mark.parametrize("size", [1.01, 2.0, 3.5])
+def test_a_sustained_oscillation_lowers_the_share_of_its_own_cylinder_down_to_the_least(cylinder: int, size: float) -> None:
+    share = watched(new(1), shaken([wave(size * LEVEL)], cylinder))[:, :, 0]
     np.testing.assert_array_equal(share[:, 1 - cylinder], 1.0)
-    # Every half wave after the first two costs a tenth: known once the third has begun.
+    # Every half wave after the first two costs a tenth, a larger one more: known once the third has begun.
     half_waves = np.floor(20 * TIMES - 1e-9)
-    expected = np.maximum(YIELDING ** np.maximum(half_waves - 1, 0), LEAST)
+    expected = np.maximum(YIELDING ** (size * np.maximum(half_waves - 1, 0)), LEAST)
     assert np.mean(np.abs(share[:, cylinder] - expected) < 1e-12) > 0.97, "but for the instants at which the sign changes"
     assert share[-1, cylinder] == LEAST
     assert np.all(np.diff(share[:, cylinder]) <= 0)
