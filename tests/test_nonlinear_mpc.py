@@ -1,4 +1,4 @@
-"""Nonlinear MPC: its quadratic programme against SciPy, its valves, what it knows, and what it achieves on the whole plant."""
+"""Nonlinear MPC: its quadratic programme against SciPy, what it knows, and what it achieves on the whole plant."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
 from baselines.rivals.predictive import Planner
-from baselines.valve_inverse import flow_ranges, openings_for_flows
 from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import PRESSURES, SPOOLS, Array, parameter_column
+from birthsim_env.lanes import PRESSURES, Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.signals import Measurement, Reference
 from tests import closed_loop, derived_law, rigid_body
 from tests.test_through_friction import lane_of, recorded
+from tests.test_valve_inverse import into_chambers
 
 RIG = Parameters()
 PERIOD = RIG.electronics.control_period
@@ -121,55 +121,6 @@ def test_a_prediction_that_runs_away_gives_a_plan_within_bounds_too() -> None:
         plan = planner.improve(np.zeros(FLOWS * len(steps)), np.concatenate([state, np.zeros(FLOWS + 2), nodes]), low, high)
         flows = plan.reshape(-1, FLOWS)
         assert np.all((flows > low - 1e-5) & (flows < high + 1e-5))
-
-
-# Valves
-
-
-VALVES = {"default": RIG, "hot, leaking": RIG.replace({"air.temperature": 320.0, "valves.leakage_ratio": 0.08})}
-every_valve = pytest.mark.parametrize("rig", VALVES.values(), ids=VALVES)
-
-
-def into_chambers(rig: Parameters, pressures: Array, spools: Array) -> Array:
-    """Net mass flow of the plant's chambers, kg/s, (4, N), all air as warm as the surroundings."""
-    plant = Plant(rig, pressures.shape[1])
-    plant.state[list(PRESSURES)], plant.state[list(SPOOLS)] = pressures, spools
-    flows = plant.mass_flows()
-    return np.asarray(flows[:4] - flows[4:])
-
-
-@every_valve
-def test_flow_ranges_are_those_of_the_plants_valves(rig: Parameters) -> None:
-    """Least and most over all openings, and the flow at given spools; pressures also beyond supply and atmosphere."""
-    rng, lanes = np.random.default_rng(0), 60
-    pressures, spools = rng.uniform(0.6e5, 8.5e5, (4, lanes)), rng.uniform(-1, 1, (4, lanes))
-    least, most, present = flow_ranges(pressures, spools, parameter_column(rig))
-    every = np.array([into_chambers(rig, pressures, np.full((4, lanes), s)) for s in np.linspace(-1, 1, 41)])
-    np.testing.assert_allclose(least, every.min(axis=0), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(most, every.max(axis=0), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(present, into_chambers(rig, pressures, spools), rtol=1e-12, atol=1e-15)
-
-
-@every_valve
-def test_openings_for_flows_are_the_inverse(rig: Parameters) -> None:
-    """Flow to opening to flow through the plant's valves, and opening to flow to opening; beyond the range fully open."""
-    rng, lanes, p = np.random.default_rng(1), 200, parameter_column(rig)
-    pressures, spools = rng.uniform(1.1e5, 6.9e5, (4, lanes)), rng.uniform(-1, 1, (4, lanes))
-    least, most, present = flow_ranges(pressures, spools, p)
-    wanted = rng.uniform(least, most)
-    got = openings_for_flows(wanted, pressures, p)
-    assert np.abs(got).max() <= 1
-    np.testing.assert_allclose(into_chambers(rig, pressures, got), wanted, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(openings_for_flows(present, pressures, p), spools, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(openings_for_flows(least - 1e-6, pressures, p), -1.0)
-    np.testing.assert_array_equal(openings_for_flows(most + 1e-6, pressures, p), 1.0)
-
-
-def test_a_valve_without_driving_pressure_stays_shut() -> None:
-    """Above the supply nothing can fill, below the atmosphere nothing can drain: opening would do the contrary."""
-    p = parameter_column(RIG)
-    pressures = np.full((4, 2), [8e5, 0.9e5])
-    assert not openings_for_flows(np.full((4, 2), [1e-3, -1e-3]), pressures, p).any()
 
 
 # What the planner is told, and what becomes of its plan
