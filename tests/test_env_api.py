@@ -117,7 +117,7 @@ def test_running_into_an_end_stop_terminates_and_costs_250(push):
     assert abs(info["piston_position"][cylinder]) > 0.98 * (0.1, 0.2)[cylinder]
     assert info["reward_failure"] == -250.0
     assert reward == pytest.approx(sum(info[term] for term in TERMS))
-    assert -256.0 < reward <= -250.0
+    assert -260.0 < reward <= -250.0, "tracking and hunting cost at most 8.3"
 
 
 def test_termination_and_the_end_of_time_never_coincide():
