@@ -33,6 +33,9 @@ and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 the s
 STIFFENING = 4.0
 """Most that the stiffness is multiplied by."""
 
+SOFTEST = 500.0
+"""N/m: swings make the law no softer than that, unless less is asked for; the default rig has gains from 110 on."""
+
 MOST_DAMPING = 2.0
 """Most that the damping is multiplied by."""
 
@@ -79,7 +82,8 @@ def _stiffen(force: Array, powers: Array, rows: Array) -> None:
         for axis in range(2):
             if powers[axis, i] != 0.0:
                 asked = rows[8 + axis, i]
-                rows[8 + axis, i] = min(asked * STIFFENING ** powers[axis, i], max(asked, STIFFEST))
+                wanted = asked * STIFFENING ** powers[axis, i]
+                rows[8 + axis, i] = max(min(wanted, max(asked, STIFFEST)), min(asked, SOFTEST))
                 rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
 
 
@@ -150,6 +154,7 @@ class ResidualLaw:
         if self._law is None:
             return self._action
         if settings.impedance != "fixed":
+            told[4:6] -= self._guard.softness
             reference = stiffened(reference, np.ascontiguousarray(measurement.user_force), told[4:6])
         damping = (told[6],) if settings.impedance == "variable" else ()
         return np.asarray(self._law.command(measurement, reference, told[:2], told[2:4], *damping))

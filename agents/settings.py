@@ -7,7 +7,10 @@ from typing import Any
 
 NO_LAW = "none"
 
-LAWS = ("backstepping", "backstepping-weight", "backstepping-frozen", "admittance-backstepping", NO_LAW)
+LAWS = (
+    *("backstepping", "backstepping-weight", "backstepping-frozen", "backstepping-force-first", "admittance-backstepping"),
+    NO_LAW,
+)
 """Laws that can be told of a force, the paper's first; and none, where a policy drives the valves by itself."""
 
 VALVES = 4

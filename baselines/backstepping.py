@@ -62,6 +62,9 @@ class BacksteppingController:
         valves: ``two_valves`` per cylinder, or ``one_valve``, a 5/3 valve that gives chamber N minus the opening of chamber P
             and leaves the pneumatic stiffness to itself (section VI). An environment with one valve per cylinder takes rows
             0 and 2 of the openings as its action.
+        force_first: where a valve of two saturates, the pneumatic stiffness gives way to the force. In the paper's law both
+            fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
+            valves drain, no force is left to come back, and the episode is lost.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds.
     Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
@@ -76,6 +79,7 @@ class BacksteppingController:
         damping_ratio: float | None = None,
         frozen_friction: bool = False,
         valves: str = "two_valves",
+        force_first: bool = False,
     ) -> None:
         ratio = 1.0 if damping_ratio is None else damping_ratio
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
@@ -83,8 +87,11 @@ class BacksteppingController:
                 raise ValueError(f"{name} = {value!r}; allowed: a positive number")
         if valves not in VALVE_LAYOUTS:
             raise ValueError(f"valves = {valves!r}; allowed: {', '.join(VALVE_LAYOUTS)}")
+        if force_first and valves == "one_valve":
+            raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         self.parameters = load_parameters(parameters)
         self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
+        self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
         self._p = parameter_column(self.parameters)
         self._options: Array = np.empty(backstepping_law.OPTIONS)
@@ -94,6 +101,7 @@ class BacksteppingController:
         self._options[backstepping_law.COULOMB_RATE] = not frozen_friction
         self._options[backstepping_law.DAMPING_RATIO] = damping_ratio or 0.0
         self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
+        self._options[backstepping_law.FORCE_FIRST] = self.force_first
         self._observer = PistonObserver(self.parameters, self._p)
 
     def reset(self, lanes: Mask | None = None) -> None:

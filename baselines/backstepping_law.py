@@ -18,7 +18,7 @@ import numpy as np
 
 from baselines.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
-from baselines.valve_inverse import one_valve_openings, two_valve_openings
+from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
 from birthsim_env import control_model, geometry, mechanics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import BLOCK, helper, kernel
@@ -27,10 +27,11 @@ from birthsim_env.inverse_kinematics import piston_reference
 from birthsim_env.lanes import Array
 from birthsim_env.signals import REFERENCES
 
-OPTIONS = 6
-PNEUMATIC_GAIN, SIGN_WIDTH, WEIGHT, COULOMB_RATE, DAMPING_RATIO, ONE_VALVE = range(OPTIONS)
+OPTIONS = 7
+PNEUMATIC_GAIN, SIGN_WIDTH, WEIGHT, COULOMB_RATE, DAMPING_RATIO, ONE_VALVE, FORCE_FIRST = range(OPTIONS)
 """Entries of a law's options: c4 (1/s); width of the smoothed sign (m/s); 1 with (14), else 0; 1 with the Coulomb friction's
-part of dF*/dt, else 0; damping ratio, or 0 for equal gains; 1 with one valve per cylinder, else 0."""
+part of dF*/dt, else 0; damping ratio, or 0 for equal gains; 1 with one valve per cylinder, else 0; 1 where the pneumatic
+stiffness gives way to the force when a valve saturates, else 0."""
 
 GAINS, INTENTS = 6, 6
 """Rows of gains: c1, c2, c3 of cylinder 1, then of cylinder 2. Rows of what the law wants: dF/dt of cylinders 1 and 2 (N/s),
@@ -243,16 +244,20 @@ def law(
 
 
 @helper
-def openings_for(joints: Array, pressures: Array, intent: Array, p: Array, one_valve: float, u: Array, n: int) -> None:
+def openings_for(joints: Array, pressures: Array, intent: Array, p: Array, options: Array, u: Array, n: int) -> None:
     """Writes the openings ``u`` (4, n) for what the law wants, ``intent`` (6, n)."""
+    one_valve, force_first = options[ONE_VALVE] > 0.0, options[FORCE_FIRST] > 0.0
     for i in range(n):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
         lp1, ln1 = chamber_lengths(y1, p[at.HALF_L1])
         lp2, ln2 = chamber_lengths(y2, p[at.HALF_L2])
-        if one_valve > 0.0:
+        if one_valve:
             one_valve_openings(u, i, 0, intent[0, i], pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
             one_valve_openings(u, i, 2, intent[1, i], pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
+        elif force_first:
+            force_first_openings(u, i, 0, intent[0, i], intent[2, i], pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
+            force_first_openings(u, i, 2, intent[1, i], intent[3, i], pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
         else:
             two_valve_openings(u, i, 0, intent[0, i], intent[2, i], pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
             two_valve_openings(u, i, 2, intent[1, i], intent[3, i], pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
@@ -279,7 +284,7 @@ def command(
         piston_reference(r, p, wanted, n)
         misses += choose_gains(x, r, p, options[DAMPING_RATIO], told[4], asked, gains, n)
         law(x, air, wanted, r, told, gains, p, options, intent, n)
-        openings_for(x, air, intent, p, options[ONE_VALVE], u, n)
+        openings_for(x, air, intent, p, options, u, n)
         store(u, first, n, openings)
     return misses
 

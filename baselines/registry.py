@@ -39,6 +39,7 @@ CONTROLLERS: dict[str, Factory] = {
     "backstepping-weight": _backstepping_weight,
     "backstepping-frozen": partial(BacksteppingController, weight_compensation=True, frozen_friction=True),
     "backstepping-one-valve": partial(BacksteppingController, weight_compensation=True, valves="one_valve"),
+    "backstepping-force-first": partial(BacksteppingController, force_first=True),
     "backstepping-cartesian": CartesianBackstepping,
     "admittance-backstepping": AdmittanceBackstepping,
     "pid": PositionPID,
