@@ -38,7 +38,7 @@ SWING = 0.25
 SOFTENING = 0.5
 """Power of ``residual_law.STIFFENING`` that such a half wave takes: half the stiffness; assumed."""
 
-SOFTEST = 2.0
+MOST_SOFTENING = 2.0
 """Most that half waves take together; assumed."""
 
 RECOVERY = 1.0
@@ -64,7 +64,7 @@ def _update(joints: Array, target: Array, p: Array, period: float, memory: Array
         for row, error in ((0, error1), (_ROWS, error2)):
             peak = sustained(memory, row + 1, i, error, period, LEVEL, LEVEL)
             if peak > SWING:
-                memory[_SOFTNESS, i] = min(memory[_SOFTNESS, i] + SOFTENING, SOFTEST)
+                memory[_SOFTNESS, i] = min(memory[_SOFTNESS, i] + SOFTENING, MOST_SOFTENING)
             if peak > 0.0:
                 memory[row, i] = max(LEAST, YIELDING ** (peak / LEVEL) * memory[row, i])
 
@@ -86,8 +86,9 @@ class Guard:
 
     @property
     def softness(self) -> Array:
-        """Power of ``residual_law.STIFFENING`` that swings have taken of the stiffness: 0 to ``SOFTEST``; (N,)."""
-        return self._memory[_SOFTNESS]
+        """Power of ``residual_law.STIFFENING`` that swings have taken of the stiffness: 0 to ``MOST_SOFTENING``; (N,)."""
+        row: Array = self._memory[_SOFTNESS]
+        return row
 
     def reset(self, lanes: Mask) -> None:
         """Forget the past of the lanes where ``lanes`` (N,) is True."""

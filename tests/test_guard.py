@@ -1,11 +1,11 @@
-"""The guard: what oscillates loses authority in its direction, down to a least share; what decays or is slow does not."""
+"""The guard: what oscillates loses authority in its direction, what swings takes stiffness; what decays or is slow does not."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from agents.guard import LEAST, LEVEL, YIELDING, Guard
+from agents.guard import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING, Guard
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.signals import REFERENCES, Reference
@@ -104,3 +104,33 @@ def test_lanes_do_not_know_of_each_other() -> None:
     together = watched(new(4), shaken(waves, 0))
     for lane, one in enumerate(waves):
         np.testing.assert_array_equal(watched(new(1), shaken([one], 0))[:, :, 0], together[:, :, lane])
+
+
+def softness_of(waves: list[Array], cylinder: int) -> Array:
+    """The softness (T, N) while the pistons are shaken so."""
+    guard, softness = new(len(waves)), []
+    for speed in shaken(waves, cylinder):
+        watched(guard, speed[None])
+        softness.append(guard.softness.copy())
+    return np.array(softness)
+
+
+@pytest.mark.parametrize("cylinder", [0, 1])
+def test_swings_take_stiffness_that_comes_back_in_time(cylinder: int) -> None:
+    """Five half waves of 50 ms; the first two are not known to be sustained. Then it decays by its time constant."""
+    swing = np.where(TIMES < 0.26, wave(1.5 * SWING), 0.0)
+    small = wave(0.95 * SWING)
+    softness = softness_of([swing, small], cylinder)
+    np.testing.assert_array_equal(softness[:, 1], 0.0)
+    ends = np.array([0.1, 0.15, 0.2, 0.25])
+    expected = [SOFTENING * np.exp(-(t - ends[ends < t]) / RECOVERY).sum() for t in TIMES[::10]]
+    np.testing.assert_allclose(np.minimum(expected, MOST_SOFTENING), softness[::10, 0], atol=0.02)
+    assert 1.5 * SOFTENING < softness.max() < MOST_SOFTENING
+
+
+def test_stiffness_is_taken_up_to_a_bound_and_given_back_by_a_reset() -> None:
+    guard = new(2)
+    watched(guard, shaken([wave(3 * SWING), wave(3 * SWING)], 0))
+    assert np.all((guard.softness > 0.9 * MOST_SOFTENING) & (guard.softness <= MOST_SOFTENING))
+    guard.reset(np.array([True, False]))
+    assert guard.softness[0] == 0 < guard.softness[1]

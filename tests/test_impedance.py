@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import gymnasium
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import agents
 from agents.guard import Guard
-from agents.residual_law import MOST_DAMPING, STIFFENING, STIFFEST, ResidualLaw, stiffened
+from agents.residual_law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, ResidualLaw, stiffened
 from agents.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.backstepping import BacksteppingController
 from baselines.registry import make_controller
@@ -23,7 +24,7 @@ from tests import closed_loop
 
 assert agents  # importing it registers the ids
 PROBE, CIRCLE = "BirthSIM/ProbeResidual-v0", "BirthSIM/CircleResidual-v0"
-VARIED = [(law, impedance) for law in LAWS[:3] for impedance in ("variable_kp", "variable")]
+VARIED = [(law, impedance) for law in LAWS[:4] for impedance in ("variable_kp", "variable")]
 """Fixed impedance, and the laws that have none to vary, are tested with the environment."""
 
 
@@ -73,17 +74,41 @@ def test_the_target_moves_so_that_a_hand_at_rest_feels_what_was_asked_for() -> N
     place = reference.position + force / reference.stiffness
     np.testing.assert_allclose(changed.stiffness * (place - changed.position), force, rtol=1e-9, atol=1e-9)
     ratio = changed.stiffness / reference.stiffness
-    bound = np.maximum(STIFFEST, reference.stiffness) / reference.stiffness
-    np.testing.assert_allclose(ratio, np.where(powers == 0, 1, np.minimum(4.0**powers, bound)), rtol=1e-12)
-    assert (STIFFENING, STIFFEST) == (4.0, 4000.0)
+    most = np.maximum(STIFFEST, reference.stiffness) / reference.stiffness
+    least = np.minimum(SOFTEST, reference.stiffness) / reference.stiffness
+    np.testing.assert_allclose(ratio, np.where(powers == 0, 1, np.clip(4.0**powers, least, most)), rtol=1e-12)
+    assert (STIFFENING, STIFFEST, SOFTEST) == (4.0, 4000.0, 500.0)
 
 
-def test_the_law_is_made_no_stiffer_than_the_stiffest_unless_that_is_asked_for() -> None:
-    rows = np.zeros((REFERENCES, 6))
-    rows[8:10] = [[1000, 3000, 3000, 8000, 8000, 4000]] * 2
-    powers = np.array([[0.5, 0.5, -0.5, 0.5, -0.5, 1.0]] * 2)
-    changed = stiffened(Reference(rows), np.zeros((2, 6)), powers)
-    np.testing.assert_allclose(changed.stiffness, [[2000, 4000, 1500, 8000, 4000, 4000]] * 2)
+def test_the_law_is_made_no_stiffer_and_no_softer_than_its_bounds_unless_that_is_asked_for() -> None:
+    rows = np.zeros((REFERENCES, 8))
+    rows[8:10] = [[1000, 3000, 3000, 8000, 8000, 4000, 1500, 300]] * 2
+    powers = np.array([[0.5, 0.5, -0.5, 0.5, -0.5, 1.0, -2.0, -2.0]] * 2)
+    changed = stiffened(Reference(rows), np.zeros((2, 8)), powers)
+    np.testing.assert_allclose(changed.stiffness, [[2000, 4000, 1500, 8000, 4000, 4000, 500, 300]] * 2)
+
+
+def shocked(command: Callable[[Measurement, Reference], Array], push: float) -> Array:
+    """Largest speed of piston 1, m/s, in each half second after a push of 0.1 s, on a stiff light rig with slow valves."""
+    rig = Parameters().replace({"mechanics.mass": 2.0, "valves.time_constant": 0.007})
+    wanted, speeds = closed_loop.holding(np.array([[0.5], [0.0]]), 4700.0), []
+    plant = closed_loop.resting_at(wanted, rig)
+    for _ in closed_loop.run(plant, command, lambda t: wanted, lambda t: np.array([[0.0], [push * (t < 0.1)]]), 2.0):
+        speeds.append(abs(float(plant.piston_speed[0, 0])))
+    return np.max(np.reshape(speeds, (4, 500)), axis=1)
+
+
+def test_a_swing_that_the_law_keeps_up_dies_sooner_with_less_stiffness_which_then_comes_back() -> None:
+    name = "backstepping-force-first"
+    residual = ResidualLaw(Parameters(), ResidualSettings(name, "variable_kp"))
+    residual.reset(np.ones(1, dtype=np.bool_))
+    law, guarded = shocked(make_controller(name, Parameters()).command, 80.0), shocked(residual.command, 80.0)
+    assert law[0] == guarded[0] > 0.6, "the first half wave costs nothing yet"
+    assert guarded[1] < 0.2 < 0.3 < law[1]
+    assert guarded[2] < 0.03
+    # Without a swing nothing is taken.
+    residual.reset(np.ones(1, dtype=np.bool_))
+    np.testing.assert_array_equal(shocked(make_controller(name, Parameters()).command, 20.0), shocked(residual.command, 20.0))
 
 
 POWERS = np.array([[0.5, -0.5, 0.5, 0.0, 0.4], [0.5, -0.5, -0.3, 0.0, 0.0]])

@@ -120,8 +120,8 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed
     arguments = ("--env", "BirthSIM/Probe-v0", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     command.main()
-    assert asked == ["backstepping", *(f"residual seed_{k}" for k in range(4))]
+    assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(4))]
     assert "; 3 training seeds" in capsys.readouterr().out
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert content["arguments"]["policy"] == "probe"
-    assert [len(result["seeds"]) for result in content["results"]] == [4, 4, 4, 4, 1]
+    assert [len(result["seeds"]) for result in content["results"]] == [4, 4, 4, 4, 4, 1]

@@ -20,8 +20,9 @@ def main() -> None:
         prog="birthsim-evaluate",
         description="Evaluate controllers: the same seeds, so the same worlds, for each of them. With --all on every "
         "environment, with every sensor model, on the rig as given and on rigs drawn at random, and how the stiffness feels.",
-        epilog="Without --policy every named controller runs; with it the trained residual runs beside the law. With --all "
-        "what the output folder holds of the same settings, rig and code is kept, so that an interrupted run goes on.",
+        epilog="Without --policy every named controller runs; with it the trained residual runs beside those named, or else "
+        "beside the paper's law and the one that it sits on. With --all what the output folder holds of the same settings, rig "
+        "and code is kept, so that an interrupted run goes on.",
     )
     parser.add_argument(
         "--all", action="store_true", help="compare under all conditions; --env, --sensors, --randomize narrow them"
@@ -32,8 +33,8 @@ def main() -> None:
         "--controllers",
         nargs="+",
         metavar="NAME",
-        help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping, with --all "
-        "every one of the registry that is not slow)",
+        help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping, with --policy "
+        "residual, with --all every one of the registry that is not slow)",
     )
     parser.add_argument(
         "--policy",
@@ -72,7 +73,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     if arguments.jobs is not None or arguments.no_studies or arguments.studies_only:
         raise ValueError("--jobs, --no-studies and --studies-only; allowed: with --all")
     arguments.env = arguments.env or "BirthSIM/Circle-v0"
-    arguments.controller = arguments.controller or ["backstepping"]
+    arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
@@ -83,9 +84,10 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
         arguments.policy = policy_of(arguments.env)
-    if arguments.policy is not None:
-        names = ["backstepping", "residual"] if names == ["residual"] else list(dict.fromkeys([*names, "residual"]))
-    policies = _policies(arguments.policy)
+    policies, laws = _policies(arguments.policy)
+    if policies:
+        names = ["backstepping", *laws] if names == ["residual"] else names
+        names = list(dict.fromkeys([*names, "residual"]))
     controllers = [(name, make_controller(name, rig)) for name in names if name != "residual"]
     known = len(controllers)
     for place in policies:
@@ -129,15 +131,19 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     print(f"{caption}\n\n{text}\n\nwritten to {folder}/: evaluation.json, evaluation.md, {pictures} (.png, .svg)")
 
 
-def _policies(path: str | None) -> list[Path]:
-    """The policy folders at ``path``."""
+def _policies(path: str | None) -> tuple[list[Path], list[str]]:
+    """The policy folders at ``path``, and the laws that those policies sit on."""
     if path is None:
-        return []
+        return [], []
     try:
+        from agents.policy_files import load_policy
         from agents.seeds import policy_folders
+        from agents.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-    return policy_folders(path)
+    folders = policy_folders(path)
+    laws = dict.fromkeys(load_policy(folder).settings.law for folder in folders)
+    return folders, [law for law in laws if law != NO_LAW]
 
 
 if __name__ == "__main__":
