@@ -57,7 +57,7 @@ def survived(controller: Controller, world: int) -> float:
 
 
 def test_a_push_that_empties_both_chambers_under_the_papers_law_is_held() -> None:
-    """4.8 kg where 3 are believed, 35 N on a soft setpoint: found among random circles."""
+    """4 kg where 3 are believed, a hand pulls with 35 N at 1102 N/m: found among random circles."""
     assert 9.0 < survived(make_controller("backstepping", RIG), 120061) < 10.5
     assert survived(make_controller("backstepping-force-first", RIG), 120061) == np.inf
 
