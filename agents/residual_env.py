@@ -46,7 +46,8 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
     | `"variable"` | and a power of 2 for the damping; less than zero is zero |
 
-    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for.
+    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. But for
+    `"fixed"` it also works less stiffly for a while where pistons swing beyond 0.25 m/s, whatever the action (`agents.guard`).
     With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
 
     ## Observation space

@@ -52,7 +52,8 @@ def _explain(arguments: argparse.Namespace) -> None:
     folder = make_folder(arguments.out)
     draw_corrections(weights[0], correlations[0], inspection.friction_along_circle(policies[0]), folder)
     law = policies[0].settings.law
-    controllers: list[tuple[str, Any]] = [(law, make_controller(law, Parameters()))]
+    laws = dict.fromkeys(("backstepping", law))  # the paper's, and the one underneath
+    controllers: list[tuple[str, Any]] = [(name, make_controller(name, Parameters())) for name in laws]
     controllers += [(name, ResidualController(policy=place)) for name, place in zip(names, places, strict=True)]
     rows = [] if arguments.no_pushes else inspection.rendered(controllers)
     lines = [
