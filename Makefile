@@ -1,4 +1,4 @@
-# make run    installs, reproduces Fig. 4, trains a residual policy for four to six minutes and evaluates it
+# make run    installs, reproduces Fig. 4, trains a residual policy for four to seven minutes and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow
 # make lint   ruff and mypy; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
@@ -27,7 +27,7 @@ $(READY): pyproject.toml constraints.txt
 run: $(READY)
 	@echo "== 1 of 3: the experiment of Fig. 4"
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
-	@echo "== 2 of 3: a residual policy on top of the law, four to six minutes"
+	@echo "== 2 of 3: a residual policy on top of the law, four to seven minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim-train --config circle --seed 0 --out $(OUT)/policy
 	@echo "== 3 of 3: law and residual on 64 episodes that training never saw"
