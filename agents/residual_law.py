@@ -90,6 +90,8 @@ def _stiffen(force: Array, powers: Array, rows: Array) -> None:
 def stiffened(reference: Reference, force: Array, powers: Array) -> Reference:
     """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
 
+    K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does.
+
     ``force`` (2, N), N, is the hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
     """
     rows = reference.rows.copy()

@@ -98,17 +98,23 @@ def shocked(command: Callable[[Measurement, Reference], Array], push: float) -> 
     return np.max(np.reshape(speeds, (4, 500)), axis=1)
 
 
-def test_a_swing_that_the_law_keeps_up_dies_sooner_with_less_stiffness_which_then_comes_back() -> None:
+def test_a_swing_that_the_law_keeps_up_dies_sooner_with_less_stiffness_but_for_fixed_impedance() -> None:
     name = "backstepping-force-first"
-    residual = ResidualLaw(Parameters(), ResidualSettings(name, "variable_kp"))
-    residual.reset(np.ones(1, dtype=np.bool_))
-    law, guarded = shocked(make_controller(name, Parameters()).command, 80.0), shocked(residual.command, 80.0)
+
+    def answers(push: float) -> list[Array]:
+        """Of the law alone, and with a residual that says nothing, of fixed and of variable impedance."""
+        residuals = [ResidualLaw(Parameters(), ResidualSettings(name, impedance)) for impedance in ("fixed", "variable_kp")]
+        for residual in residuals:
+            residual.reset(np.ones(1, dtype=np.bool_))
+        return [shocked(law.command, push) for law in (make_controller(name, Parameters()), *residuals)]
+
+    law, fixed, guarded = answers(80.0)
+    np.testing.assert_array_equal(fixed, law)
     assert law[0] == guarded[0] > 0.6, "the first half wave costs nothing yet"
     assert guarded[1] < 0.2 < 0.3 < law[1]
     assert guarded[2] < 0.03
-    # Without a swing nothing is taken.
-    residual.reset(np.ones(1, dtype=np.bool_))
-    np.testing.assert_array_equal(shocked(make_controller(name, Parameters()).command, 20.0), shocked(residual.command, 20.0))
+    law, _, guarded = answers(20.0)
+    np.testing.assert_array_equal(guarded, law, "without a swing nothing is taken")
 
 
 POWERS = np.array([[0.5, -0.5, 0.5, 0.0, 0.4], [0.5, -0.5, -0.3, 0.0, 0.0]])
