@@ -82,6 +82,7 @@ learned: $(READY)
 
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make
+	$(BIN)/python -m tests.golden.fingerprints
 
 clean:
 	rm -rf $(VENV) $(OUT)

@@ -6,13 +6,11 @@ turns. What was met when the piston last moved out and in tells weight and frict
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from baselines.disturbance_observer import DisturbanceObserver
 from baselines.observers import PistonObserver
-from birthsim_env import geometry
+from birthsim_env import exact, geometry
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array, parameter_column
@@ -35,7 +33,7 @@ ROWS = 6
 @kernel
 def _remember(joints: Array, disturbance: Array, p: Array, period: float, seen: Array, met: Array) -> None:
     """``seen`` (4, N) is 1 where cylinder 1, 2 has moved out, in; ``met`` (ROWS, N)."""
-    share = 1.0 - math.exp(-period / AVERAGE)
+    share = 1.0 - exact.exp(-period / AVERAGE)
     for i in range(joints.shape[1]):
         kappa = geometry.pose(
             joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]

@@ -11,13 +11,11 @@ residual. It then works with less stiffness, until the swing has died.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from baselines.admittance_law import sustained
 from baselines.cartesian_law import across, along
-from birthsim_env import geometry
+from birthsim_env import exact, geometry
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
@@ -28,6 +26,8 @@ LEVEL = 0.1
 
 YIELDING = 0.9
 """What a sustained half wave of the size ``LEVEL`` leaves of the authority; one k times as large, its power k; assumed."""
+
+_LOG2_YIELDING = exact.log2(YIELDING)
 
 LEAST = 0.2
 """Share of the authority that is always left; assumed: the law alone oscillates less."""
@@ -53,7 +53,7 @@ _SOFTNESS = 2 * _ROWS
 
 @kernel
 def _update(joints: Array, target: Array, p: Array, period: float, memory: Array) -> None:
-    kept = math.exp(-period / RECOVERY)
+    kept = exact.exp(-period / RECOVERY)
     for i in range(joints.shape[1]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
             joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
@@ -66,7 +66,7 @@ def _update(joints: Array, target: Array, p: Array, period: float, memory: Array
             if peak > SWING:
                 memory[_SOFTNESS, i] = min(memory[_SOFTNESS, i] + SOFTENING, MOST_SOFTENING)
             if peak > 0.0:
-                memory[row, i] = max(LEAST, YIELDING ** (peak / LEVEL) * memory[row, i])
+                memory[row, i] = max(LEAST, exact.exp2(_LOG2_YIELDING * peak / LEVEL) * memory[row, i])
 
 
 class Guard:

@@ -31,8 +31,9 @@ INPUT, OUTPUT = "observation", "action"
 OPSET = 17
 """Old enough for the runtimes of embedded computers."""
 
-TOLERANCE = 1e-6
-"""Largest difference of an action, in [-1, 1], that an exported policy may have; single precision resolves 6e-8."""
+TOLERANCE = 2.0**-23
+"""Largest difference of an action, in [-1, 1], that an exported policy may have: one unit in the last place of a single at 1.
+Everything inside is in double precision, where the order of a sum shows only in the rounding of the last step."""
 
 CHECKS = 1000
 """Random observations of each kind that an exported policy is checked on."""
@@ -49,12 +50,12 @@ class PolicyModule(torch.nn.Module):
 
     def __init__(self, network: PolicyNetwork) -> None:
         super().__init__()
-        # Doubles, as in PolicyNetwork: rounding the mean of an input that hardly varies would show.
+        # Doubles throughout, as in PolicyNetwork.
         self.register_buffer("mean", torch.as_tensor(network.mean, dtype=torch.float64))
         self.register_buffer("deviation", torch.as_tensor(np.sqrt(network.variance + EPSILON), dtype=torch.float64))
         parts: list[torch.nn.Module] = []
         for weight, bias in network.layers:
-            linear = torch.nn.Linear(weight.shape[1], weight.shape[0])
+            linear = torch.nn.Linear(weight.shape[1], weight.shape[0], dtype=torch.float64)
             linear.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
             parts += [linear, torch.nn.Tanh()]
         if not network.squashed:
@@ -62,9 +63,9 @@ class PolicyModule(torch.nn.Module):
         self.layers = torch.nn.Sequential(*parts)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        normalized = ((observations.double() - self.mean) / self.deviation).clamp(-CLIP, CLIP).float()
+        normalized = ((observations.double() - self.mean) / self.deviation).clamp(-CLIP, CLIP)
         actions: torch.Tensor = self.layers(normalized)
-        return actions
+        return actions.float()
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,22 @@
-"""A trained policy as plain arrays: normalisation and a small tanh network, evaluated by NumPy, so that running one needs
-neither PyTorch nor Stable-Baselines3."""
+"""A trained policy as plain arrays: normalisation and a small tanh network, so that running one needs neither PyTorch nor
+Stable-Baselines3.
+
+The network is evaluated by a kernel of ours, in double precision and with a fixed order of summation: the same bits for
+one lane and for many, on every processor. A library's matrix product sums in an order that depends on both.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from birthsim_env import exact
+from birthsim_env.compilation import kernel
+from birthsim_env.lanes import Array
 
 Weights = NDArray[np.float32]
 Statistics = NDArray[np.float64]
@@ -57,11 +66,34 @@ class PolicyNetwork:
         """Length of an action."""
         return int(self.layers[-1][1].shape[0])
 
+    @cached_property
+    def _transposed(self) -> tuple[tuple[Weights, Weights], ...]:
+        """The layers with weights (in, out), each row contiguous."""
+        return tuple((np.ascontiguousarray(weight.T), bias) for weight, bias in self.layers)
+
     def actions(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Actions (N, outputs) in [-1, 1] for observations (N, inputs)."""
-        x = np.clip((observations - self.mean) / np.sqrt(self.variance + EPSILON), -CLIP, CLIP).astype(np.float32)
-        for weight, bias in self.layers[:-1]:
-            x = np.tanh(x @ weight.T + bias)
-        weight, bias = self.layers[-1]
-        last = x @ weight.T + bias
-        return np.asarray(np.tanh(last) if self.squashed else np.clip(last, -1.0, 1.0), dtype=np.float32)
+        """Actions (N, outputs) in [-1, 1] for observations (N, inputs); equal bits whatever N and the processor."""
+        x = (observations - self.mean) / np.sqrt(self.variance + EPSILON)
+        x = np.minimum(np.maximum(x, -CLIP), CLIP)
+        for k, (weight, bias) in enumerate(self._transposed):
+            y = np.empty((len(x), len(bias)))
+            _layer(x, weight, bias, k + 1 < len(self.layers) or self.squashed, y)
+            x = y
+        return np.clip(x, -1.0, 1.0).astype(np.float32)
+
+
+@kernel
+def _layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) -> None:
+    """Writes x W + b, or its tanh where ``squashed``, for inputs (N, m), W (m, n) and b (n,), into ``y`` (N, n).
+
+    The vector registers hold neighbouring outputs, so that every sum runs over its inputs in their order.
+    """
+    for i in range(x.shape[0]):
+        for j in range(weight.shape[1]):
+            y[i, j] = bias[j]
+        for k in range(weight.shape[0]):
+            for j in range(weight.shape[1]):
+                y[i, j] += weight[k, j] * x[i, k]
+        if squashed:
+            for j in range(weight.shape[1]):
+                y[i, j] = exact.tanh(y[i, j])

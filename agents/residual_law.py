@@ -10,7 +10,6 @@ a law the actions are the openings.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from agents.experience import Experience
 from agents.guard import Guard
 from agents.settings import NO_LAW, ResidualSettings
 from baselines.registry import make_controller
+from birthsim_env import exact
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.observation import ENTRIES, LIMIT
@@ -33,11 +33,15 @@ and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 the s
 STIFFENING = 4.0
 """Most that the stiffness is multiplied by."""
 
+_STIFFENING_DOUBLINGS = exact.log2(STIFFENING)
+
 SOFTEST = 500.0
 """N/m: swings make the law no softer than that, unless less is asked for; the default rig has gains from 110 on."""
 
 MOST_DAMPING = 2.0
 """Most that the damping is multiplied by."""
+
+_DAMPING_DOUBLINGS = exact.log2(MOST_DAMPING)
 
 FORCE_UNIT = 100.0
 """N that map to 1 in an observation."""
@@ -82,7 +86,7 @@ def _stiffen(force: Array, powers: Array, rows: Array) -> None:
         for axis in range(2):
             if powers[axis, i] != 0.0:
                 asked = rows[8 + axis, i]
-                wanted = asked * STIFFENING ** powers[axis, i]
+                wanted = asked * exact.exp2(_STIFFENING_DOUBLINGS * powers[axis, i])
                 rows[8 + axis, i] = max(min(wanted, max(asked, STIFFEST)), min(asked, SOFTEST))
                 rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
 
@@ -112,7 +116,7 @@ def _tell(
             told[k, i] = strength * smooth[k, i]
             told[2 + k, i] = strength / time_constant * (action[k, i] - smooth[k, i])
             told[4 + k, i] = max(smooth[2 + k, i], 0.0) * min(share[0, i], share[1, i]) if size > 2 else 0.0
-        told[6, i] = MOST_DAMPING ** max(smooth[4, i], 0.0) if size > 4 else 0.0
+        told[6, i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth[4, i], 0.0)) if size > 4 else 0.0
         for k in range(size):
             smooth[k, i] += quickness * (action[k, i] - smooth[k, i])
 
@@ -127,7 +131,7 @@ class ResidualLaw:
         self._experience = Experience(parameters)
         period = parameters.electronics.control_period
         self._guard = Guard(period, parameter_column(parameters))
-        self._quickness = 1.0 - math.exp(-period / settings.time_constant)
+        self._quickness = 1.0 - exact.exp(-period / settings.time_constant)
         self._action: Array = np.zeros((settings.size, 0))
         self._smooth: Array = np.zeros((settings.size, 0))
 

@@ -8,7 +8,6 @@ halved as well.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,6 +17,7 @@ from baselines import admittance_law
 from baselines.awareness import Awareness
 from baselines.backstepping import PNEUMATIC_GAIN
 from baselines.controller import check_gains, lanes_of, told_of
+from birthsim_env import exact
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters, load_parameters
 from birthsim_env.signals import Mask, Measurement, Reference, one_lane
@@ -140,7 +140,7 @@ class AdmittanceBackstepping:
         g, awareness = self._gains[kind], self._awareness[kind]
         now = awareness.update(measurement, reference, damping_factor)
         openings = np.empty((4, lanes))
-        quickness = 1.0 - math.exp(-self._period / g["lead_time"])
+        quickness = 1.0 - exact.exp(-self._period / g["lead_time"])
         admittance_law.command(
             now.joints, now.pressures, now.motion, reference.rows, now.force, now.unseen, now.rest, now.moving,
             now.spools, self._p, self._period, g["gain"], g["rest_gain"], g["rest_push"], g["dead_zone"],

@@ -16,12 +16,10 @@ with the unseen forces of ``awareness``: believed friction and what an observer 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from baselines.cartesian_law import across, along, load_rates, pressure_openings
-from birthsim_env import geometry, mechanics
+from birthsim_env import exact, geometry, mechanics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
@@ -113,7 +111,7 @@ def command(
     ``awareness.Situation``; ``target`` (15, N) is the reference; ``told`` what
     ``controller.told_of`` gives.
     """
-    u, kept = np.empty((4, 1)), math.exp(-period / p[at.TAU])
+    u, kept = np.empty((4, 1)), exact.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
@@ -138,7 +136,7 @@ def command(
 
         share_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
         share_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
-        memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * math.exp(-period / MOTION_TIME))
+        memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * exact.exp(-period / MOTION_TIME))
         c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
         en = (1.0 + (rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)

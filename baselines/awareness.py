@@ -67,6 +67,12 @@ class Situation:
     rest: Array
 
 
+def is_moving(motion: Array) -> Array:
+    """1 where a motion's velocity, rows 2 and 3 of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0; (N,)."""
+    square = motion[2] * motion[2] + motion[3] * motion[3]
+    return np.asarray(square > MOVING_SPEED * MOVING_SPEED, dtype=np.float64)
+
+
 class Awareness:
     """The ``Situation`` of N lanes, one control period at a time, for one kind of sensors.
 
@@ -104,7 +110,7 @@ class Awareness:
         measurement = replace(measurement, pressures=pressures)
         force = np.ascontiguousarray(measurement.user_force)
         believed = -self._friction_share * self._friction.update(motion)
-        moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
+        moving = is_moving(motion)
         pistons = self._pistons
         if isinstance(pistons, PistonObserver):
             self._joints, rest = np.ascontiguousarray(pistons.update(measurement, force, believed, moving)), pistons.rest

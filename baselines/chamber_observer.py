@@ -8,11 +8,9 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from birthsim_env import control_model, valves
+from birthsim_env import control_model, exact, valves
 from birthsim_env import lanes as at
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
@@ -45,7 +43,7 @@ def _update(
     fresh: Array,
 ) -> None:  # fmt: skip
     """Carries ``spools`` (4, N) and ``pressures`` (4, N) on by one period, in which ``openings`` (4, N) were commanded."""
-    kept = math.exp(-period / p[at.TAU])
+    kept = exact.exp(-period / p[at.TAU])
     # Of the way that is left to the command, the mean over the period.
     mean = (1.0 - kept) * p[at.TAU] / period
     for chamber in range(4):
@@ -73,7 +71,7 @@ class ChamberObserver:
     """
 
     def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
-        self._p, self._period, self._share = lane_parameters, period, 1.0 - math.exp(-bandwidth * period)
+        self._p, self._period, self._share = lane_parameters, period, 1.0 - exact.exp(-bandwidth * period)
         self.spools: Array = np.empty((4, 0))
         self.openings: Array = np.empty((4, 0))
 

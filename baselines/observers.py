@@ -15,11 +15,9 @@ innovation leaves what noise explains, or when its user says that the reference 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from birthsim_env import geometry, mechanics
+from birthsim_env import exact, geometry, mechanics
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.inverse_kinematics import piston_motion
@@ -68,7 +66,7 @@ def _update(
     may rest; ``rest`` (2, N) how far each rests, 0 to 1; ``innovations`` (2, N) low-passed, m; ``reluctance``
     (2, N) factor of ``REST_TIME``; ``fresh`` (N,) 1 at a new start.
     """
-    depth, held = history.shape[0], math.exp(-REST_BANDWIDTH * period)
+    depth, held = history.shape[0], exact.exp(-REST_BANDWIDTH * period)
     motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
     for i in range(estimate.shape[1]):
         motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
@@ -130,8 +128,8 @@ def _update(
                 if abs(innovations[cylinder, i]) > explained:
                     reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
                     rest[cylinder, i], resting = 0.0, 0.0
-                kept = math.exp(-bandwidth * sampled[i])
-                to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - math.exp(-SLOW_BANDWIDTH * sampled[i]))
+                kept = exact.exp(-bandwidth * sampled[i])
+                to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled[i]))
                 to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled[i]
                 to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled[i] ** 2
                 # What the sample says of its own instant is carried on to the present: late samples do not destabilise.

@@ -1,15 +1,22 @@
-"""How kernels are compiled: two Numba decorators, a cache that notices changed helpers, and a word while a user waits.
+"""How kernels are compiled: two Numba decorators, machine code kept on disk, and a word while a user waits.
 
 Kernels run over lanes (environments). They are written so that LLVM vectorises the innermost loop: quantities are rows of
 scratch arrays whose shape is a compile-time constant, helpers are always inlined, conditions are max, min or a ternary, and
 only + - * / sqrt occur inside. Without ``fastmath`` every operation is IEEE-exact, so a lane computes the same bits
 whether it runs in a vector register or alone.
+
+Numba's own cache looks at the file of the outermost function only. Ours names a file by everything that the machine code
+depends on: all source files that the kernel's module imports, directly or not, the signature, the processor and the versions.
+A file that is missing, damaged or cannot be written costs a compilation, never the command.
 """
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import hashlib
 import os
+import pickle
 import sys
 import tempfile
 from collections.abc import Callable
@@ -17,9 +24,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite
 import numba
-from numba.core import event
-from numba.core.caching import CacheImpl, _CacheLocator
+from numba.core import event, serialize
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,56 +37,102 @@ BLOCK = 32
 
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("birthsim_env", "baselines", "agents")
+_DIGEST = hashlib.sha256().digest_size
+
+
+def _file_of(module: str) -> Path | None:
+    """The source file of one of this project's modules, or None."""
+    place = _ROOT.joinpath(*module.split("."))
+    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
+    return next(found, None) if module.split(".")[0] in _PACKAGES else None
 
 
 @cache
-def _source_stamp() -> str:
-    """One hash of all kernels and the row numbers they share: Numba itself looks at the outermost function's file only."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for package in _PACKAGES:
-        for path in sorted((_ROOT / package).rglob("*.py")):
-            text = path.read_bytes()
-            if b"\n@kernel\n" in text or b"\n@helper\n" in text or path.name in ("compilation.py", "lanes.py"):
-                digest.update(str(path.relative_to(_ROOT)).encode() + text)
+def _imports(path: Path) -> frozenset[Path]:
+    """The project's own files that a source file imports anywhere in it."""
+    files: set[Path | None] = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            files.update(_file_of(alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            # What is no module of its own stands in the one that it is imported from.
+            files.update(_file_of(f"{node.module}.{alias.name}") or _file_of(node.module) for alias in node.names)
+    return frozenset(file for file in files if file)
+
+
+@cache
+def source_stamp(path: Path) -> str:
+    """SHA-256 of a source file and of every file of this project that it imports, directly or not."""
+    seen, waiting = {path}, [path]
+    while waiting:
+        found = _imports(waiting.pop()) - seen
+        seen |= found
+        waiting += found
+    digest = hashlib.sha256()
+    for file in sorted(seen):
+        digest.update(str(file.relative_to(_ROOT)).encode() + file.read_bytes())
     return digest.hexdigest()
 
 
 @cache
-def _cache_folder() -> str | None:
+def _cache_folder() -> Path | None:
     """The first writable folder: $NUMBA_CACHE_DIR, beside the sources, the user's cache; None when there is none."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    for folder in ([Path(chosen)] if chosen else []) + [_ROOT / "birthsim_env" / "__pycache__", home / "birthsim"]:
+    chosen, home = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
+    folders = [Path(chosen)] if chosen else []
+    folders.append(_ROOT / "birthsim_env" / "__pycache__")
+    with contextlib.suppress(RuntimeError):  # of a user without a home directory
+        folders.append(Path(home or Path.home() / ".cache") / "birthsim")
+    for folder in folders:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                return str(folder)
+                return folder
         except OSError:
             continue
     return None
 
 
-class _PackageCacheLocator(_CacheLocator):
-    """Keeps machine code of this project's kernels under a stamp of all of them."""
+class _DiskCache(NullCache):
+    """Machine code of one function: a file per signature and processor, which begins with the SHA-256 of the rest."""
 
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        # Files of the same name in two packages may have a function of the same name in the same line.
-        place = Path(py_file).resolve().relative_to(_ROOT).with_suffix("").parts
-        self._place = f"{'-'.join(place)}-{py_func.__code__.co_firstlineno}"
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._folder = folder
+        path = Path(function.__code__.co_filename).resolve()
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._stamp = source_stamp(path)[:16]
 
-    def get_cache_path(self) -> str:
-        return str(_cache_folder())
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
+        kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions)).encode()).hexdigest()
+        return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
 
-    def get_source_stamp(self) -> str:
-        return _source_stamp()
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        try:
+            content = self._path(sig, target_context.codegen()).read_bytes()
+            if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
+                return CompileResult._rebuild(target_context, *pickle.loads(content[_DIGEST:]))  # type: ignore[no-untyped-call]
+        except OSError:
+            pass
+        return None
 
-    def get_disambiguator(self) -> str:
-        return self._place
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> _PackageCacheLocator | None:
-        ours = any(Path(py_file).resolve().is_relative_to(_ROOT / package) for package in _PACKAGES)
-        return cls(py_func, py_file) if ours and _cache_folder() else None
+    def save_overload(self, sig: Any, data: Any) -> None:
+        path = self._path(sig, data.codegen)
+        content = serialize.dumps(data._reduce())  # type: ignore[no-untyped-call]
+        try:
+            with tempfile.NamedTemporaryFile(dir=self._folder, delete=False) as partial:
+                partial_path = Path(partial.name)
+                try:
+                    partial.write(hashlib.sha256(content).digest() + content)
+                except OSError:
+                    partial_path.unlink()
+                    raise
+            partial_path.replace(path)
+            for other in self._folder.glob(f"{path.stem.rpartition('-')[0]}-*.nbc"):
+                if other != path:
+                    other.unlink()  # of older sources
+        except OSError:
+            pass
 
 
 class _Announcer(event.Listener):
@@ -97,14 +152,15 @@ class _Announcer(event.Listener):
         pass
 
 
-if _PackageCacheLocator not in CacheImpl._locator_classes:
-    CacheImpl._locator_classes.insert(0, _PackageCacheLocator)
-    event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 
 
 def kernel(function: F) -> F:
     """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
-    compiled: Any = numba.njit(error_model="numpy", cache=_cache_folder() is not None, nogil=True)(function)
+    compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    folder = _cache_folder()
+    if folder is not None and hasattr(compiled, "_cache"):
+        compiled._cache = _DiskCache(function, folder)
     return compiled  # type: ignore[no-any-return]
 
 

@@ -11,6 +11,9 @@ from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
 
+REST_SPEED = 1e-9
+"""m/s: a slower piston starts at rest, without friction. Rounding leaves 1e-17, and its sign must not choose the friction's."""
+
 
 @kernel
 def _balance(state: Array, stiffness: Array, p: Array) -> None:
@@ -34,7 +37,7 @@ def _balance(state: Array, stiffness: Array, p: Array) -> None:
             ap, an = (p[at.AREA_P1, i], p[at.AREA_N1, i]) if cylinder == 0 else (p[at.AREA_P2, i], p[at.AREA_N2, i])
             half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
             y = state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]
-            speed = state[v, i]
+            speed = state[v, i] if abs(state[v, i]) > REST_SPEED else 0.0
             level = friction.stribeck_level(speed, p[fc, i], p[fs, i], p[at.STRIBECK, i])
             has_bristle = p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
             bristle = friction.steady_deflection(speed, level, p[at.BRISTLE_S0, i]) if has_bristle else 0.0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from birthsim_env import geometry
-from birthsim_env.compilation import helper
+from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import COS_GAMMA3, D_PRODUCT, D_SQUARES, K1, K2, SIN_GAMMA3, Array
 
 
@@ -28,6 +28,12 @@ def piston_motion(motion: Array, p: Array, joints: Array, n: int) -> None:
         joints[1, i] = r2 - p[K2]
         joints[2, i] = -0.5 * p[D_PRODUCT] * cos_alpha * (x * vy - y * vx) / (r2 * r2) / r4
         joints[3, i] = (x * vx + y * vy) / r2
+
+
+@kernel
+def pistons_at(motion: Array, p: Array, joints: Array) -> None:
+    """``piston_motion`` of N lanes: ``motion`` and ``joints`` (4, N), one rig's parameters (PARAMETERS,)."""
+    piston_motion(motion, p, joints, motion.shape[1])
 
 
 @helper

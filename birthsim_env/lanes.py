@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env import exact
 from birthsim_env.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -101,7 +102,8 @@ def parameter_column(parameters: Parameters) -> Array:
     fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction
     conductance = v.sonic_conductance
     values = (
-        *(g.d3**2 + g.d6**2, 2 * g.d3 * g.d6, np.sin(g.gamma3), np.cos(g.gamma3), g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
+        *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.sine(g.gamma3), exact.cosine(g.gamma3)),
+        *(g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
         *(m.mass, m.gravity, m.stop_stiffness, m.stop_damping),
         *(float(f.law == "lugre"), fc1, fc2, f.static_ratio * fc1, f.static_ratio * fc2),
         *(c1.viscous_friction, c2.viscous_friction, f.stribeck_speed, f.bristle_stiffness, f.bristle_damping, f.sign_speed),

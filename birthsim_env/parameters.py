@@ -51,12 +51,12 @@ class Cylinder(Part):
     @property
     def area_p(self) -> float:
         """Piston area of chamber P, the full bore, m2."""
-        return math.pi / 4 * self.piston_diameter**2
+        return math.pi / 4 * self.piston_diameter * self.piston_diameter
 
     @property
     def area_n(self) -> float:
         """Piston area of chamber N, the bore less the rod, m2."""
-        return math.pi / 4 * (self.piston_diameter**2 - self.rod_diameter**2)
+        return math.pi / 4 * (self.piston_diameter * self.piston_diameter - self.rod_diameter * self.rod_diameter)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from birthsim_env import exact
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 from birthsim_env.seeding import Range, draw
@@ -41,7 +42,7 @@ def _circle(time: Array, own: Array, rows: Array) -> None:
     """``own`` (4, N): centre x, y (m), radius (m), angular speed (rad/s)."""
     for i in range(time.shape[0]):
         w = own[3, i]
-        cosine, sine = own[2, i] * math.cos(w * time[i]), own[2, i] * math.sin(w * time[i])
+        cosine, sine = own[2, i] * exact.cosine(w * time[i]), own[2, i] * exact.sine(w * time[i])
         rows[0, i], rows[1, i] = own[0, i] + cosine, own[1, i] + sine
         rows[2, i], rows[3, i] = -w * sine, w * cosine
         rows[4, i], rows[5, i] = -w * w * cosine, -w * w * sine
@@ -96,12 +97,12 @@ def _path(time: Array, own: Array, rows: Array) -> None:
         turned = curvature * on_arc
         along, across = min(s, straight), 0.0
         if on_arc > 0.0:
-            along += math.sin(turned) / curvature
-            across = (1.0 - math.cos(turned)) / curvature
-        cosine, sine = math.cos(heading), math.sin(heading)
+            along += exact.sine(turned) / curvature
+            across = (1.0 - exact.cosine(turned)) / curvature
+        cosine, sine = exact.cosine(heading), exact.sine(heading)
         rows[0, i] = own[0, i] + cosine * along - sine * across
         rows[1, i] = own[1, i] + sine * along + cosine * across
-        tx, ty = math.cos(heading + turned), math.sin(heading + turned)
+        tx, ty = exact.cosine(heading + turned), exact.sine(heading + turned)
         normal = curvature * ds * ds
         jerk_t, jerk_n = ddds - curvature * curvature * ds * ds * ds, 3.0 * curvature * ds * dds
         rows[2, i], rows[3, i] = tx * ds, ty * ds

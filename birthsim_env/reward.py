@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env import exact
 from birthsim_env import lanes as at
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
@@ -50,7 +51,7 @@ def _assess(
     state: Array, motion: Array, reference: Array, force: Array, jumped: NDArray[np.bool_], moved: Array, action: Array,
     last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    steps, kept = period / 0.01, math.exp(-period / GIVING_WAY)
+    steps, kept = period / 0.01, exact.exp(-period / GIVING_WAY)
     for i in range(state.shape[1]):
         given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         error, speed = 0.0, 0.0
@@ -62,8 +63,8 @@ def _assess(
             error += abs(motion[axis, i] - reference[axis, i] - asked)
             speed += abs(motion[2 + axis, i] - reference[2 + axis, i] - rate)
             moved[axis, i], moved[2 + axis, i] = given[axis], owed
-        cost = math.log1p(min(FARTHEST, error) / ERROR_UNIT)
-        hunting = math.log1p(min(FASTEST, speed) / SPEED_UNIT)
+        cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
+        hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)
         turned, effort = 0.0, 0.0
         for k in range(action.shape[0]):
             turned += abs(action[k, i] - last_action[k, i])

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env import exact
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Electronics
@@ -51,8 +52,8 @@ def _uniform(key: np.uint64, counter: np.uint64) -> float:
 def _normal(key: np.uint64, tick: int, channel: int) -> float:
     """A standard normal number for one channel at one tick (Box and Muller)."""
     counter = np.uint64(tick * 32 + 2 * channel)
-    radius = math.sqrt(-2.0 * math.log(_uniform(key, counter)))
-    return radius * math.cos(2.0 * math.pi * _uniform(key, counter + np.uint64(1)))
+    radius = math.sqrt(-2.0 * exact.log(_uniform(key, counter)))
+    return radius * exact.cosine(2.0 * math.pi * _uniform(key, counter + np.uint64(1)))
 
 
 @kernel

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from birthsim_env.actuation import Actuation
 from birthsim_env.compilation import kernel
 from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import end_effector_motion, inverse_geometry, jacobian
+from birthsim_env.geometry import end_effector_motion, inverse_geometry
+from birthsim_env.inverse_kinematics import pistons_at
 from birthsim_env.lanes import Array, parameter_column
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant, checked
@@ -109,11 +110,11 @@ class Simulation:
         start, speed = rows[0:2], rows[2:4]
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
-        piston = inverse_geometry(start, self.parameters)
-        inverse = np.linalg.inv(np.moveaxis(jacobian(piston, self.parameters), 2, 0))
-        rates: Array = np.einsum("nij,jn->in", inverse, speed)
+        inverse_geometry(start, self.parameters)  # refuses what is out of reach
+        joints = np.empty((4, len(chosen)))
+        pistons_at(np.concatenate([start, speed]), self.nominal, joints)
         own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
-        self.plant.state[:, chosen] = balanced_state(own, piston, rates, rows[10:12])
+        self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
         self._look()
 
     def step(self, actions: Array) -> None:

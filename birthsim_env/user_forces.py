@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from birthsim_env import exact
 from birthsim_env.compilation import kernel
 from birthsim_env.lanes import Array
 from birthsim_env.seeding import Range, draw
@@ -141,7 +142,7 @@ class Ramp(ForceProfile):
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         size = draw(self.amplitude, rng)
         angle = rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng)
-        x, y = size * math.cos(angle), size * math.sin(angle)
+        x, y = size * exact.cosine(angle), size * exact.sine(angle)
         return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, x, y)]
 
 
@@ -172,11 +173,21 @@ class Pulls(ForceProfile):
         now = self.begins
         for sizes in self.sizes:
             size, rate, angle = draw(sizes, rng), draw(self.rate, rng), draw(self.angle, rng)
-            x, y = size * math.cos(angle), size * math.sin(angle)
+            x, y = size * exact.cosine(angle), size * exact.sine(angle)
             top = now + size / rate
             knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
             now = top + self.hold + self.release + self.pause
         return knots
+
+
+@kernel
+def _contraction(time: Array, lasts: float, size: float, share: float, bumps: int, force: Array) -> None:
+    """Writes the force (M,), N, of one contraction at ``time`` (M,), s; it carries 1 - ``share``, so that the sum with its
+    ``bumps`` pushes peaks near ``size``."""
+    for k in range(time.shape[0]):
+        middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
+        contraction, push = exact.sine(math.pi * time[k] / lasts), exact.sine(math.pi * bumps * middle)
+        force[k] = size * ((1.0 - share) * contraction * contraction + share * push * push)
 
 
 class Contractions(ForceProfile):
@@ -207,12 +218,10 @@ class Contractions(ForceProfile):
         for k in range(self.count):
             size, share = draw(self.amplitude, rng), draw(self.push, rng)
             bumps = int(rng.integers(self.pushes[0], self.pushes[1] + 1))
-            middle = np.clip((time - self.lasts / 4) / (self.lasts / 2), 0, 1)
-            # The contraction carries 1 - share, so that the sum peaks near the amplitude.
-            profile = (1 - share) * np.sin(np.pi * time / self.lasts) ** 2 + share * np.sin(np.pi * bumps * middle) ** 2
-            force = size * profile
+            force = np.empty_like(time)
+            _contraction(time, self.lasts, size, share, bumps, force)
             knots += [
-                (k * self.lasts + float(t), float(f) * math.cos(self.heading), float(f) * math.sin(self.heading))
+                (k * self.lasts + float(t), float(f) * exact.cosine(self.heading), float(f) * exact.sine(self.heading))
                 for t, f in zip(time, force, strict=True)
             ]
         return [*knots, (self.count * self.lasts, 0.0, 0.0)]

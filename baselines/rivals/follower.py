@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.admittance import Admittance
-from baselines.awareness import MOVING_SPEED
+from baselines.awareness import is_moving
 from baselines.controller import check_gains, lanes_of
 from baselines.observers import PistonObserver
 from baselines.rivals.feedforward import NEEDED, prepare
@@ -97,8 +97,7 @@ class Follower(ABC):
         force = np.ascontiguousarray(measurement.user_force)
         motion = self._admittance.update(measurement, reference, damping_factor)
         if measurement.sampled:
-            moving = (np.hypot(motion[2], motion[3]) > MOVING_SPEED).astype(np.float64)
-            seen = np.ascontiguousarray(self._observer.update(measurement, force, moving=moving))
+            seen = np.ascontiguousarray(self._observer.update(measurement, force, moving=is_moving(motion)))
         else:
             seen = np.concatenate([measurement.position, measurement.velocity])
         joints, wanted, needed = np.empty((4, lanes)), np.empty((8, lanes)), np.empty((NEEDED, lanes))
