@@ -23,8 +23,9 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 @dataclass(frozen=True)
 class TrainingSettings:
     """An experiment and its algorithm. ``rollout``, ``epochs`` and ``gae_lambda`` are PPO's; ``gradient_steps``, per step of
-    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. Raises ``ValueError`` naming what cannot
-    be.
+    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. The training ends early once its policy is
+    ``until`` percent below the paper's law in validation, pooled settled error; with 100 it never does. Raises ``ValueError``
+    naming what cannot be.
     """
 
     environment: str = "BirthSIM/CircleResidual-v0"
@@ -45,6 +46,7 @@ class TrainingSettings:
     hidden: tuple[int, ...] = (64, 64)
     validation_lanes: int = 64
     validations: int = 6
+    until: float = 100.0
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -62,6 +64,8 @@ class TrainingSettings:
             value = getattr(self, name)
             if not (_finite(value) and 0 < value <= high):
                 raise ValueError(f"{name} = {value!r}; allowed: a positive number{'' if high == math.inf else ' up to 1'}")
+        if not (_finite(self.until) and 0 < self.until <= 100):
+            raise ValueError(f"until = {self.until!r}; allowed: above 0 and up to 100 (%)")
         if not _finite(self.log_std):
             raise ValueError(f"log_std = {self.log_std!r}; allowed: a finite number")
         if not isinstance(self.hidden, tuple) or not self.hidden or not all(_whole(width, 1) for width in self.hidden):

@@ -27,12 +27,14 @@ class Monitor(BaseCallback):
     """Averages the policies and validates the average at equal intervals; then the best one and a checkpoint are on disk.
 
     ``env`` has the validation worlds, ``stepped`` is what the training steps; ``past`` is what an earlier monitor of the same
-    training had written to its checkpoint. A curve's ``environment_share`` is that of the training's time, without validation.
+    training had written to its checkpoint. ``paper`` has the same worlds under the paper's law, where the training shall end
+    once it is far enough below that law's error. A curve's ``environment_share`` is that of the training's time, without
+    validation.
     """
 
     def __init__(
         self, settings: TrainingSettings, residual: ResidualSettings, env: Any, folder: Path, past: dict[str, Any] | None,
-        stepped: SB3VecEnv, position: int = 0,
+        stepped: SB3VecEnv, position: int = 0, paper: Any = None,
     ) -> None:  # fmt: skip
         super().__init__()
         self._settings, self._residual, self._env, self._folder = settings, residual, env, folder
@@ -40,9 +42,8 @@ class Monitor(BaseCallback):
         self._stepped, self._validating = stepped, 0.0
         self._started = time.perf_counter()
         if past is None:
-            zero = np.zeros((env.num_envs, residual.size), dtype=np.float32)
-            law: dict[str, float] = validate(env, lambda _: zero).to_dict()
-            past = {"law": law, "policy": None, "curve": []}
+            past = {"law": _without_policy(env), "policy": None, "curve": []}
+            past["paper"] = _without_policy(paper) if paper is not None else None
             self._validating = time.perf_counter() - self._started
         self._past = past
         curve = past["curve"]
@@ -65,9 +66,19 @@ class Monitor(BaseCallback):
         self._bar.update(min(self.num_timesteps, self._settings.steps) - self._bar.n)
 
     def _on_step(self) -> bool:
-        return True
+        return not self.enough
+
+    @property
+    def enough(self) -> bool:
+        """Whether the best policy is as far below the paper's law as the training shall get."""
+        paper, best = self._past["paper"], self._past["policy"]
+        if paper is None or best is None:
+            return False
+        return bool(best["pooled_mm"] <= (1 - self._settings.until / 100) * paper["pooled_mm"])
 
     def _on_training_end(self) -> None:
+        if self.enough:
+            return
         self.model.average.update_parameters(self.model.policy)  # type: ignore[attr-defined]
         self._check()
 
@@ -114,6 +125,12 @@ class Monitor(BaseCallback):
     def reached(self) -> dict[str, Any]:
         """Validation figures of the law and of the kept policy, and the learning curve."""
         return {"settings": self.describe(), **self._past}
+
+
+def _without_policy(env: Any) -> dict[str, float]:
+    """Validation figures of the law alone: actions of zero."""
+    zero = np.zeros((env.num_envs, *env.single_action_space.shape), dtype=np.float32)
+    return validate(env, lambda _: zero).to_dict()
 
 
 def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:

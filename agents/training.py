@@ -15,10 +15,11 @@ from agents.checkpoint import load_checkpoint
 from agents.configuration import TrainingSettings
 from agents.monitor import Monitor, described
 from agents.sb3_adapter import SB3VecEnv
-from agents.settings import ResidualSettings
+from agents.settings import LAWS, ResidualSettings
 from agents.validation import SEED_SPACING, TRAINING_SEED
 
 __all__ = ["train"]
+
 assert agents  # importing it registers the residual environments
 
 
@@ -43,6 +44,10 @@ def train(
     }  # fmt: skip
     env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments), staggered=True)
     checks = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
+    paper = None
+    if settings.until < 100:
+        law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
+        paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
     normalized = VecNormalize(env, gamma=settings.discount)
     model = make_model(settings, normalized, str(folder / "tensorboard"))
     past = (
@@ -53,15 +58,16 @@ def train(
     done = model.num_timesteps
     # A training that goes on meets other worlds than it did: lanes use a seed each, which the steps done shift.
     normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed + done // settings.lanes % SEED_SPACING)
-    callback = Monitor(settings, residual, checks, folder, past, env, position)
+    callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
     try:
-        if done < settings.steps:
+        if done < settings.steps and not callback.enough:
             model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
     except KeyboardInterrupt:
         print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
         raise
     finally:
         callback.close()
-        env.close()
-        checks.close()
+        for worlds in (env, checks, paper):
+            if worlds is not None:
+                worlds.close()
     return callback.reached()

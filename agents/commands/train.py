@@ -36,6 +36,9 @@ def main() -> None:
     parser.add_argument("--law", choices=LAWS, help="law underneath; none: the policy drives the valves by itself")
     parser.add_argument("--impedance", choices=tuple(IMPEDANCES), help="what an action sets beside forces")
     parser.add_argument("--steps", type=whole, help="policy steps per seed")
+    parser.add_argument(
+        "--until", type=float, metavar="PERCENT", help="end once the error in validation is so far below the paper's law"
+    )
     parser.add_argument("--seed", type=seed_number, help="first seed (default: the configuration's, 0)")
     parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
     parser.add_argument("--jobs", type=whole, default=1, help="seeds trained side by side (default: 1)")
@@ -78,7 +81,7 @@ def _settings(arguments: argparse.Namespace) -> tuple[TrainingSettings, Residual
     training, residual = load_configuration(arguments.config)
     said = {
         "environment": arguments.env, "algorithm": arguments.algorithm, "steps": arguments.steps, "sensors": arguments.sensors,
-        "randomize": None if arguments.randomize is None else RANDOMIZE[arguments.randomize],
+        "until": arguments.until, "randomize": None if arguments.randomize is None else RANDOMIZE[arguments.randomize],
     }  # fmt: skip
     allowed = {"law": arguments.law, "impedance": arguments.impedance, "authority": arguments.authority}
     return (
@@ -121,19 +124,22 @@ def _begin_worker() -> None:
 def _report(
     training: TrainingSettings, residual: ResidualSettings, seeds: list[int], results: list[dict[str, Any]]
 ) -> None:  # fmt: skip
-    law = results[0]["law"]
+    law, paper = results[0]["law"], results[0]["paper"]
     print(
         f"\n{training.environment}, {training.validation_lanes} validation episodes, of which {law['infeasible']} ask for more"
     )
     print("than the rig's strength and are left out; settled RMS error:")
-    print(f"{'':12}{'pooled':>10}{'95 %':>10}{'lost':>8}")
+    print(f"{'':26}{'pooled':>10}{'95 %':>10}{'lost':>8}")
+    measure = paper or law
     for name, figures in (
-        (residual.law, law),
+        *((("the paper's law", paper),) if paper else ()),
+        *(((residual.law, law),) if not paper or residual.law != LAWS[0] else ()),
         *((f"seed {seed}", result["policy"]) for seed, result in zip(seeds, results, strict=True)),
     ):
-        better = "" if figures is law else f"  {100 * (1 - figures['pooled_mm'] / law['pooled_mm']):3.0f} % below"
-        print(f"{name:12}{figures['pooled_mm']:7.2f} mm{figures['tail_mm']:7.2f} mm{figures['lost']:8d}{better}")
+        better = "" if figures in (law, paper) else f"  {100 * (1 - figures['pooled_mm'] / measure['pooled_mm']):3.0f} % below"
+        print(f"{name:26}{figures['pooled_mm']:7.2f} mm{figures['tail_mm']:7.2f} mm{figures['lost']:8d}{better}")
     last = [result["curve"][-1] for result in results]
+    print(", ".join(f"{point['steps']:,}" for point in last), f"of {training.steps:,} steps;", end=" ")
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
     shares = ", ".join(f"{100 * point['environment_share']:.0f}" for point in last)
     print(f"{seconds} s per seed with validation; {shares} % of the rest in the environment")

@@ -7,11 +7,15 @@ from pathlib import Path
 
 import gymnasium
 
+import agents
 import birthsim_env
+from agents.settings import NO_LAW
 from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number, whole, write_json
-from baselines.evaluation import Evaluation, evaluate, table
+from baselines.evaluation import Evaluation, evaluate, overview, table
 from baselines.registry import controller_names, make_controller
+
+assert agents  # importing it registers the residual environments
 
 
 def main() -> None:
@@ -123,12 +127,14 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         text = "\n\n".join([table(evaluations), *(seed_table(one, complete) for one in classical)])
         pictures += ", learning_curves"
         draw_learning_curves(learning_curves(policies), folder)
+    lines = [caption, "", overview(evaluations)]
     (folder / "evaluation.md").write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
     shown = {key: str(value) for key, value in vars(arguments).items()}
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
     write_json(folder / "evaluation.json", {"arguments": shown, "rig": rig.to_dict(), "results": results})
     error_over_time(evaluations, caption, folder)
-    print(f"{caption}\n\n{text}\n\nwritten to {folder}/: evaluation.json, evaluation.md, {pictures} (.png, .svg)")
+    print("\n".join(lines))
+    print(f"\nwritten to {folder}/: evaluation.md (every metric), evaluation.json, {pictures} (.png, .svg)")
 
 
 def _policies(path: str | None) -> tuple[list[Path], list[str]]:
@@ -138,7 +144,6 @@ def _policies(path: str | None) -> tuple[list[Path], list[str]]:
     try:
         from agents.policy_files import load_policy
         from agents.seeds import policy_folders
-        from agents.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     folders = policy_folders(path)
