@@ -138,11 +138,12 @@ def _run_batch(
 
 def overview(evaluations: list[Evaluation]) -> str:
     """A short table for the screen: settled error over the episodes, mm, and how many were lost."""
-    lines = [f"{'settled error, mm':28}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
+    width = max(24, *(len(one.controller) for one in evaluations))
+    lines = [f"{'settled error, mm':{width}}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
     for one in evaluations:
         summary = one.summary()["settled_rms"]
         figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
-        lines.append(f"{one.controller:28}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
+        lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
     return "\n".join(lines)
 
 
