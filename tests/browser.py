@@ -2,20 +2,42 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-PLACES = ("/usr/bin", "/usr/lib/chromium", "/snap/bin", "/opt/google/chrome", "/Applications/Google Chrome.app/Contents/MacOS")
+NAMES = (
+    *("chromium", "chromium-browser", "chromium-headless-shell", "headless_shell", "chrome-headless-shell"),
+    *("google-chrome", "google-chrome-stable", "google-chrome-beta", "google-chrome-unstable", "chrome"),
+    *("microsoft-edge", "microsoft-edge-stable", "msedge", "brave-browser", "brave"),
+    *("Chromium", "Google Chrome", "Google Chrome Canary", "Microsoft Edge", "Brave Browser"),  # macOS
+)
+PLACES = (
+    *("/usr/bin", "/usr/local/bin", "/snap/bin", "/usr/lib/chromium", "/usr/lib/chromium-browser"),
+    *("/opt/google/chrome", "/opt/microsoft/msedge", "/opt/brave.com/brave", "/opt/homebrew/bin"),
+    *(f"/Applications/{name}.app/Contents/MacOS" for name in NAMES[-5:]),
+    *(
+        f"{os.environ.get(root, '')}/{name}/Application"
+        for root in ("PROGRAMFILES", "PROGRAMFILES(X86)", "LOCALAPPDATA")
+        for name in ("Google/Chrome", "Chromium", "Microsoft/Edge", "BraveSoftware/Brave-Browser")
+    ),
+)
+OF_PLAYWRIGHT = (
+    "chromium-*/chrome-linux*/chrome",
+    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
+    "chromium-*/chrome-win*/chrome.exe",
+    "chromium_headless_shell-*/chrome-*/headless_shell",
+    "chromium_headless_shell-*/chrome-*/headless_shell.exe",
+    "chromium_headless_shell-*/chrome-*/chrome-headless-shell",
+    "chromium_headless_shell-*/chrome-*/chrome-headless-shell.exe",
+)
+"""Where ``playwright install chromium`` puts programs below its folder, by system and version."""
+INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -26,19 +48,47 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
-PATIENCE = 30.0  # s; a busy machine may need it, a quick one never does
+PATIENCE = 120.0  # s; only a state that never comes takes so long
 
 
 def find_chromium():
-    """Path of an installed Chromium or Chrome, or None; BIRTHSIM_CHROMIUM names another."""
+    """Path of an installed Chromium or a relative of it, or None; BIRTHSIM_CHROMIUM names another, which must exist."""
     if chosen := os.environ.get("BIRTHSIM_CHROMIUM"):
-        return chosen
+        if found := shutil.which(chosen):
+            return found
+        raise ValueError(f"BIRTHSIM_CHROMIUM = {chosen!r} is no program; allowed: the path of a Chromium, or not set")
     search = os.pathsep.join([os.environ.get("PATH", ""), *PLACES])
-    return next((path for name in NAMES if (path := shutil.which(name, path=search))), None)
+    installed = (path for name in NAMES if (path := shutil.which(name, path=search)))
+    return next(installed, None) or _of_playwright()
+
+
+def _of_playwright():
+    """The newest Chromium that Playwright has downloaded, or None."""
+    found = [path for folder in _playwright_folders() for pattern in OF_PLAYWRIGHT for path in folder.glob(pattern)]
+    programs = [path for path in found if shutil.which(path)]
+    return str(max(programs, key=_revision)) if programs else None
+
+
+def _playwright_folders():
+    """Where Playwright keeps browsers: the folder that its own variable names, or the caches of Linux, macOS and Windows."""
+    if chosen := os.environ.get("PLAYWRIGHT_BROWSERS_PATH"):
+        return [Path(chosen)]
+    home = Path.home()
+    caches = (
+        os.environ.get("XDG_CACHE_HOME") or home / ".cache",
+        home / "Library" / "Caches",
+        os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local",
+    )
+    return [Path(cache) / "ms-playwright" for cache in caches]
+
+
+def _revision(path):
+    """1228 of ``.../chromium-1228/chrome-linux64/chrome``."""
+    return max(int(number) for number in re.findall(r"chromium(?:_headless_shell)?-(\d+)", str(path)))
 
 
 def missing():
-    """What these tests lack, in words, or an empty string."""
+    """What these tests lack and how to install it, in words, or an empty string."""
     lacks = []
     try:
         import playwright  # noqa: F401
@@ -46,42 +96,37 @@ def missing():
     except ImportError as error:
         lacks.append(f"{error.name} (pip install 'birthsim[live,dev]')")
     if find_chromium() is None:
-        lacks.append("Chromium (apt-get install chromium, or BIRTHSIM_CHROMIUM=path)")
+        lacks.append(f"Chromium ({INSTALLATION})")
     return f"the page's tests need {' and '.join(lacks)}" if lacks else ""
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Server:
     """``birthsim-live`` or ``birthsim-replay`` as a process of its own; ``arguments`` are those of the command."""
 
-    def __init__(self, command, *arguments, port=None):
-        self.port = port or free_port()
-        self.url = f"http://127.0.0.1:{self.port}/"
-        line = [sys.executable, "-m", f"birthsim_live.commands.{command}", *map(str, arguments), "--port", str(self.port)]
-        self.process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    def __init__(self, command, *arguments, port=0):
+        line = [sys.executable, "-m", f"birthsim_live.commands.{command}", *map(str, arguments), "--port", str(port)]
+        self._process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        said = []
+        # It names its address once it listens; a process that fails closes the pipe.
+        for text in self._process.stdout:
+            said.append(text)
+            if found := re.search(r"http://[^/\s]+:(\d+)", text):
+                self.url, self.port = f"{found[0]}/", int(found[1])
+                return
+        self.__exit__()
+        raise AssertionError(f"{command} serves no page: {''.join(said)}")
 
     def __enter__(self):
-        end = time.monotonic() + 2 * PATIENCE
-        while time.monotonic() < end and self.process.poll() is None:
-            with contextlib.suppress(OSError), urllib.request.urlopen(self.url, timeout=2):
-                return self
-            time.sleep(0.1)
-        self.process.kill()
-        raise AssertionError(f"no page at {self.url}: {self.process.communicate()[1]}")
+        return self
 
     def __exit__(self, *_):
-        """Ctrl-C, as a person would; whoever does not listen is killed."""
-        self.process.terminate()
-        try:
-            self.process.communicate(timeout=10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.communicate()
+        """Ends by the signal that service managers send; whoever does not listen is killed."""
+        with self._process as process:
+            process.terminate()
+            try:
+                process.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 def launch(playwright):
@@ -94,6 +139,7 @@ class Window:
 
     def __init__(self, browser, url, size=WIDE, touch=False):
         self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
+        self.context.set_default_timeout(1000 * PATIENCE)
         self.page = self.context.new_page()
         self.complaints, self.foreign = [], []
         self.page.on("console", lambda message: message.type in ("error", "warning") and self.complaints.append(message.text))
@@ -131,6 +177,10 @@ class Window:
     def end_effector(self):
         """Where the end effector is in the window, px."""
         return self.value("birthsim.pixel(birthsim.frame.position)")
+
+    def live(self, seconds):
+        """Wait until the rig has lived through so many seconds of its own time."""
+        self.wait(f"birthsim.frame.time > {self.frame()['time'] + seconds}")
 
     def hold(self, across=0.0, up=0.0):
         """Press the mouse on the end effector and pull it by (across, up) px."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import pytest
 
+from baselines import probes
 from birthsim_env.equilibrium import balanced_state
 from birthsim_env.geometry import inverse_geometry, jacobian
 from birthsim_env.lanes import Array
@@ -18,6 +20,14 @@ FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinde
 
 PNEUMATIC_STIFFNESS = np.array([[4400.0], [2200.0]])
 """N/m, of both cylinders: inside the range of (9) at all poses that the tests use."""
+
+
+def shorten_probes(
+    patch: pytest.MonkeyPatch, rest: float = 1.0, rise: float = 0.5, hold: float = 2.0, window: float = 0.5
+) -> None:
+    """Probes with other times than those of the comparison, s, for as long as ``patch`` lasts."""
+    for name, seconds in (("REST", rest), ("RISE", rise), ("HOLD", hold), ("WINDOW", window)):
+        patch.setattr(probes, name, seconds)
 
 
 def ideal(plant: Plant, time: float, force: Array) -> Measurement:
@@ -33,7 +43,7 @@ def holding(position: Array, stiffness: Array | float) -> Reference:
     return Reference(rows)
 
 
-def circling(time: float, radius: float, period: float, stiffness: float, lanes: int = 1) -> Reference:
+def circling(time: float, radius: float, period: float, stiffness: Array | float, lanes: int = 1) -> Reference:
     """A target on a circle about (0.5, 0), the same in all lanes."""
     rate = 2 * np.pi / period
     position = radius * np.array([[np.cos(rate * time)], [np.sin(rate * time)]])

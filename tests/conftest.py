@@ -1,5 +1,6 @@
-"""What several tests share: property tests that repeat themselves and may take their time, and one short training."""
+"""What several tests share: property tests that repeat themselves and may take their time, a short training, a last word."""
 
+import gymnasium
 import pytest
 from hypothesis import settings
 
@@ -19,6 +20,8 @@ learning_rate = 2e-3
 hidden = [32, 32]
 validation_lanes = 4
 validations = 2
+[residual]
+policy_period = 0.04
 """
 
 
@@ -34,4 +37,21 @@ def small(tmp_path_factory):
 def trained(tmp_path_factory, small):
     """A folder of birthsim-train, and the process that made it."""
     folder = tmp_path_factory.mktemp("policies") / "deeper" / "policy"
-    return folder, run("train", "--config", small, "--steps", 30_000, "--seed", 3, "--authority", 60, "--out", folder)
+    return folder, run("train", "--config", small, "--steps", 4096, "--seed", 3, "--authority", 60, "--out", folder)
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Evaluated episodes of 5 s, which have their first push."""
+    make_vec = gymnasium.make_vec
+    monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=5.0, **options))
+
+
+def pytest_unconfigure(config):
+    """After everything else pytest says whether the page was tested: a skip among thousands of dots is not seen."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    skipped = reporter.stats.get("skipped", []) if reporter else []
+    reasons = [report.longrepr[2] for report in skipped if report.nodeid.startswith("tests/test_page.py")]
+    if reasons:
+        said = reasons[0].removeprefix("Skipped: ")
+        reporter.write_line(f"THE PAGE WAS NOT TESTED, {len(reasons)} tests were skipped: {said}", red=True, bold=True)

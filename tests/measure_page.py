@@ -68,7 +68,7 @@ def picture(window, path):
     window.page.locator("body").press("r")
     window.wait("birthsim.settings.scenario === 'circle' && birthsim.frame.time > 6.5")
     window.hold(across=45, up=30)
-    window.page.wait_for_timeout(1800)
+    window.live(1.8)
     window.page.screenshot(path=path)
     window.page.mouse.up()
 

@@ -1,7 +1,6 @@
 """birthsim-animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
 
 import re
-import sys
 
 import gymnasium
 import numpy as np
@@ -10,20 +9,12 @@ from PIL import Image
 
 import birthsim_env
 from baselines.commands import animate
-from baselines.commands.animate import SAMPLE, main, take
+from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from birthsim_env.rendering import PairRenderer, Scene
+from tests.console import call
 
 RIG = birthsim_env.Parameters()
-
-
-def command(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["birthsim-animate", *map(str, arguments)])
-    try:
-        main()
-    except SystemExit as end:
-        return end.code
-    return 0
 
 
 def scene(**values):
@@ -50,7 +41,8 @@ def pair():
 def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, capsys):
     path = tmp_path / "deeper" / f"pull.{suffix}"
     options = ("--seed", 1, "--begin", 0.5, "--end", 1.5, "--rate", 10, "--out", path)
-    assert command(monkeypatch, *options) == 0
+    status, printed, _ = call("animate", monkeypatch, capsys, *options)
+    assert status == 0
     with Image.open(path) as image:
         assert (image.n_frames, image.size) == (11, (960, 634))
         durations, frames = [], []
@@ -63,7 +55,6 @@ def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, ca
     # Before the pull begins at 1 s the law alone moves; afterwards both do.
     assert np.abs(frames[10] - frames[0])[:, :480].max() > 100
     assert np.abs(frames[10] - frames[0])[:, 480:].max() > 100
-    printed = capsys.readouterr().out
     assert f"written to {path}: 11 frames" in printed
     rms = [float(value) for value in re.findall(r"([\d.]+) mm RMS", printed)]
     assert rms[0] > 2 * rms[1] > 0
@@ -103,7 +94,7 @@ def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
     assert len(frames) == 16
 
 
-def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch):
+def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch, capsys):
     """Not the default of the controller, which has learned another scenario."""
     asked = []
 
@@ -114,7 +105,7 @@ def test_the_residual_is_the_policy_of_the_environment(tmp_path, monkeypatch):
     monkeypatch.setattr(animate, "make_controller", spied)
     path = tmp_path / "pull.webp"
     options = ("--controller", "pid", "residual", "--begin", 0.0, "--end", 1.0, "--rate", 10, "--out", path)
-    assert command(monkeypatch, *options) == 0
+    assert call("animate", monkeypatch, capsys, *options)[0] == 0
     assert asked == [("pid", {}), ("residual", {"policy": "forceps"})]
 
 
@@ -160,8 +151,9 @@ def test_what_is_not_finite_is_left_out(values, pair):
 )
 def test_bad_input_is_one_plain_line(arguments, complaint, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
-    assert command(monkeypatch, *arguments) == 2
-    assert complaint in capsys.readouterr().err
+    status, _, complained = call("animate", monkeypatch, capsys, *arguments)
+    assert status == 2
+    assert complaint in complained
     assert list(tmp_path.iterdir()) == []
 
 
@@ -170,6 +162,7 @@ def test_an_interrupt_ends_without_a_file(monkeypatch, capsys, tmp_path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(animate, "take", interrupted)
-    assert command(monkeypatch, "--out", tmp_path / "a.webp") == 130
-    assert "interrupted" in capsys.readouterr().err
+    status, _, complained = call("animate", monkeypatch, capsys, "--out", tmp_path / "a.webp")
+    assert status == 130
+    assert "interrupted" in complained
     assert list(tmp_path.iterdir()) == []

@@ -27,7 +27,7 @@ def formula(helper: Callable[..., float]) -> Callable[..., sp.Expr]:
 
 def vanishes(expression: sp.Expr) -> bool:
     """Whether an expression is zero for all values; floating constants of the package are made exact first."""
-    return bool(sp.simplify(sp.nsimplify(expression, rational=True)) == 0)
+    return bool(sp.cancel(sp.together(sp.nsimplify(expression, rational=True))) == 0)
 
 
 @cache

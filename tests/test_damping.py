@@ -38,7 +38,7 @@ def random_gains(count: int, seed: int) -> list[tuple[Array, float, float]]:
 def test_gains_render_stiffness_and_damping_anywhere_in_the_range() -> None:
     """Every triple lies in the range of its stiffness and sum; positive gains render the range, ends included."""
     checked = 0
-    for gains, mass, viscous in random_gains(600, 6):
+    for gains, mass, viscous in random_gains(200, 6):
         stiffness, damping = closed_loop_stiffness(*gains, mass, viscous), closed_loop_damping(*gains, mass, viscous)
         span = damping_range(stiffness, mass, viscous, gains.sum())
         assert span is not None
@@ -52,7 +52,7 @@ def test_gains_render_stiffness_and_damping_anywhere_in_the_range() -> None:
                 assert closed_loop_stiffness(*c, mass, viscous) == pytest.approx(stiffness, rel=1e-7)
                 assert closed_loop_damping(*c, mass, viscous) == pytest.approx(wanted, rel=1e-7)
                 checked += 1
-    assert checked > 1500
+    assert checked > 500
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_equal_gains_are_the_least_damped() -> None:
         c = equal_gain(stiffness, mass, viscous)
         damping = closed_loop_damping(c, c, c, mass, viscous)
         assert least_damping(stiffness, mass, viscous) == pytest.approx(damping, rel=1e-4)
-        spans = [damping_range(stiffness, mass, viscous, 3 * c * (1 + more)) for more in np.geomspace(1e-6, 30, 200)]
+        spans = [damping_range(stiffness, mass, viscous, 3 * c * (1 + more)) for more in np.geomspace(1e-6, 30, 60)]
         assert min(span[0] for span in spans if span) > 0.999 * damping
         with pytest.raises(
             ValueError, match=rf"no positive gains .* allowed: at least {least_damping(stiffness, mass, viscous):.6g}"
@@ -134,7 +134,7 @@ def test_arguments_that_cannot_be_are_refused(arguments: tuple[float, ...], mess
         gains_for(*arguments)
 
 
-def ramped(law: BacksteppingController, setpoints: Array, axes: Array, poses: Array, speed: float) -> Array:
+def ramped(law: BacksteppingController, setpoints: Array, axes: Array, poses: Array, speed: Array) -> Array:
     """Displacement over time (T, N) along ``axes``: half a second of it, after 1.5 s of a force that grows by K ``speed``."""
     reference, lanes = closed_loop.holding(poses, setpoints), np.arange(setpoints.size)
     plant = closed_loop.resting_at(reference, law.parameters)
@@ -153,11 +153,12 @@ def test_stiffness_and_damping_asked_for_are_rendered(ratio: float, tolerance: f
     Poses, axes and 1000 to 4000 N/m; the mean of both directions, in which the turning of the linkage cancels. What is
     missing is the air's: by dead volume and heat dF/dt is not quite (10), and B lacks that error per speed over a2 - phi.
     """
-    cases = [(pose, setpoint, axis) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1)]
-    setpoints, axes = np.array([case[1] for case in cases]), np.array([case[2] for case in cases])
-    poses = np.ascontiguousarray(np.array([case[0] for case in cases]).T)
+    cases = 2 * [(pose, setpoint, axis) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1)]
+    poses, setpoints, axes = (np.array(column) for column in zip(*cases, strict=True))
     speed, law = 0.003, BacksteppingController(FRICTIONLESS, weight_compensation=True, damping_ratio=ratio)
-    forth, back = (ramped(law, setpoints, axes, poses, sign * speed) for sign in (1, -1))
+    ways = speed * np.repeat([1, -1], len(cases) // 2)
+    forth, back = np.hsplit(ramped(law, setpoints, axes, np.ascontiguousarray(poses.T), ways), 2)
+    setpoints = setpoints[: len(cases) // 2]
     # A force held over each period is on average half a period old.
     times = 1.5 + 0.001 * np.arange(forth.shape[0]) - 0.0005
     slope, start = np.polyfit(times, (forth - back) / 2, 1)

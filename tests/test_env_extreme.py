@@ -1,17 +1,17 @@
-"""A million random policy steps through the environments at the corners of the documented parameter ranges."""
+"""Random policies through the environments at the corners of the documented parameter ranges: a million steps, or 100,000."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
 
 import gymnasium
 import numpy as np
 import pytest
 
 import birthsim_env
+from birthsim_env.lanes import Array
 from birthsim_env.randomization import documented_ranges
 
-LANES, STEPS = 256, 500
 SETUPS = [
     ("BirthSIM/Circle-v0", "two_valves", "lugre"),
     ("BirthSIM/Circle-v0", "one_valve", "coulomb"),
@@ -30,22 +30,23 @@ def corner(corner_seed: int, friction: str) -> birthsim_env.Parameters:
     return birthsim_env.Parameters().replace({**changes, "friction.law": friction})
 
 
-def random_actions(rng: np.random.Generator, size: int) -> Any:
+def random_actions(rng: np.random.Generator, steps: int, lanes: int, size: int) -> Iterator[Array]:
     """Per lane and 0.3 s one of: white noise, held openings, bang-bang noise, full openings held."""
-    for step in range(STEPS):
+    for step in range(steps):
         if step % 30 == 0:
-            held, kind = rng.uniform(-1, 1, (LANES, size)), rng.integers(4, size=(LANES, 1))
-        white = rng.uniform(-1, 1, (LANES, size))
+            held, kind = rng.uniform(-1, 1, (lanes, size)), rng.integers(4, size=(lanes, 1))
+        white = rng.uniform(-1, 1, (lanes, size))
         yield np.choose(kind, [white, held, np.sign(white), np.sign(held)])
 
 
-@pytest.mark.parametrize(("setup", "seed"), list(zip(SETUPS, range(len(SETUPS)), strict=True)))
-def test_random_policies_leave_only_finite_states(setup: tuple[str, str, str], seed: int) -> None:
-    name, valves, friction = setup
-    env = gymnasium.make_vec(name, num_envs=LANES, parameters=corner(seed, friction), valves=valves, randomize="scenario")
+@pytest.mark.parametrize(("lanes", "steps"), [(64, 200), pytest.param(256, 500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", range(len(SETUPS)), ids=["-".join(setup) for setup in SETUPS])
+def test_random_policies_leave_only_finite_states(seed: int, lanes: int, steps: int) -> None:
+    name, valves, friction = SETUPS[seed]
+    env = gymnasium.make_vec(name, num_envs=lanes, parameters=corner(seed, friction), valves=valves, randomize="scenario")
     env.reset(seed=seed)
     ended = beyond = 0
-    for actions in random_actions(np.random.default_rng(seed), env.single_action_space.shape[0]):
+    for actions in random_actions(np.random.default_rng(seed), steps, lanes, env.single_action_space.shape[0]):
         observation, rewards, terminated, _, info = env.step(actions)
         assert np.isfinite(observation).all()
         assert np.isfinite(rewards).all()
@@ -58,6 +59,6 @@ def test_random_policies_leave_only_finite_states(setup: tuple[str, str, str], s
             # A chamber that a flung mass squeezes in its last 10 ms may pass 20 bar; the episode ends there.
             assert last.min() > 0.1e5
             assert last.max() < 60e5
-    assert ended > 100, "random openings must drive pistons into the end stops"
-    assert beyond <= 1e-3 * LANES * STEPS
+    assert ended > lanes / 2, "random openings must drive pistons into the end stops"
+    assert beyond <= 1e-3 * lanes * steps
     print(f"{name}, {valves}, {friction}: {ended} episodes ended, {beyond} of them with a chamber outside 0.2 to 20 bar")

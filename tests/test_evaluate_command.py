@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import partial
 
 import pytest
 
 from baselines import studies
 from baselines.metrics import UNITS
-from tests.console import OWN, assert_picture, call, interrupted, run, strict
+from tests.console import OWN, assert_picture, call, interrupted, strict
 
 
-def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
+@pytest.mark.usefixtures("brief")
+def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys):
     out = tmp_path / "new" / "folder"
     arguments = (
         "--env",
@@ -25,13 +27,13 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
         "backstepping",
         "backstepping-weight",
     )
-    done = run("evaluate", *arguments, "--out", out)
-    assert done.returncode == 0, done.stderr
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", out)
+    assert status == 0, complained
     assert sorted(path.name for path in out.iterdir()) == [
         *("error_over_time.png", "error_over_time.svg", "evaluation.json", "evaluation.md")
     ]
     table = (out / "evaluation.md").read_text()
-    assert table.strip() in done.stdout
+    assert table.splitlines()[0] in printed
     assert table.startswith("BirthSIM/Probe-v0, 3 episodes from seed 7, ideal sensors, randomised: all")
     assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
     assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
@@ -44,6 +46,9 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
     for name in UNITS:
         assert len(law["episodes"][name]) == 3
         median = law["summary"][name]["median"]
+        if name == "settled_rms":
+            largest = law["summary"][name]["max"]
+            assert re.search(rf"\nbackstepping +{median:.3g} .* {largest:.3g} +0 of 3\n", printed), "the short table"
         rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
         assert [row.split("|")[3].strip() for row in rows] == ([] if median is None else [f"{median:.3g}"]), name
     assert weight["summary"]["settled_rms"]["median"] < law["summary"]["settled_rms"]["median"]
@@ -52,6 +57,7 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path):
     assert_picture(out, "error_over_time")
 
 
+@pytest.mark.usefixtures("brief")
 def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp_path, monkeypatch, capsys):
     (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 3.5\n")
     arguments = ("--episodes", 1, "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
@@ -63,17 +69,19 @@ def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp
     # On the circle the reference never rests.
     assert result["summary"]["stiffness_error"]["median"] is None
     assert result["episodes"]["stiffness_error"] == [None]
-    assert "stiffness_error" not in printed, "a row in which nothing is said is left out"
+    assert "stiffness_error" not in (tmp_path / "evaluation.md").read_text(), "a row in which nothing is said is left out"
     assert content["rig"]["mechanics"]["mass"] == 3.5
 
 
-def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_every_episode(tmp_path):
+def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_every_episode(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     name = f"{tmp_path}/slam.py:Slam"
-    done = run("evaluate", "--env", "BirthSIM/Probe-v0", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
-    assert "Warning" not in done.stderr
-    assert "| lost episodes |  | 2 of 2 |" in done.stdout
+    arguments = ("--env", "BirthSIM/Probe-v0", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
+    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments)
+    assert status == 0, complained
+    assert "Warning" not in complained
+    assert "| lost episodes |  | 2 of 2 |" in (tmp_path / "out" / "evaluation.md").read_text()
+    assert re.search(r"Slam .* 2 of 2\n", printed)
     (result,) = strict(tmp_path / "out" / "evaluation.json")["results"]
     assert result["lost"] == [True, True]
     assert result["episodes"]["stiffness_error"] == result["episodes"]["cross_motion"] == [None, None]
@@ -155,31 +163,36 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     assert strict(tmp_path / "out" / "comparison.json")["studies"] == content["studies"]
 
 
+WAITING = """
+import os, pathlib, time
+
+class Waits(Slam):
+    '''Until there is a file "go" beside this one, or nobody to wait for.'''
+    def command(self, measurement, reference):
+        began_by = os.getppid()
+        while not pathlib.Path(__file__).with_name("go").exists() and os.getppid() == began_by:
+            time.sleep(0.01)
+        return super().command(measurement, reference)
+"""
+
+
 def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
-    arguments = (*NARROW, "--controllers", "backstepping", "--no-studies", "--out")
-    line = [
-        *arguments,
-        tmp_path / "out",
-        "--episodes",
-        1,
-        "--jobs",
-        2,
-        "--randomize",
-        "all",
-        "--controllers",
-        "backstepping",
-        "backstepping-weight",
-    ]
-    status, printed = interrupted("evaluate", line, lambda said: "1/2 " in said)
+    """Two pieces side by side: one is complete at Ctrl-C, the other one waits for what comes only afterwards."""
+    own, out = tmp_path / "own.py", tmp_path / "out"
+    own.write_text(OWN + WAITING)
+    names = ("--controllers", f"{own}:Slam", f"{own}:Waits")
+    line = (*NARROW, "--episodes", 1, "--jobs", 2, "--randomize", "all", "--no-studies", *names, "--out", out)
+    status, printed = interrupted("evaluate", line, lambda: list(out.rglob("*.json")))
     assert (status, printed) == (130, "")
-    done = list((tmp_path / "out").rglob("*.json"))
-    assert len(done) == 1
+    assert len(list(out.rglob("*.json"))) == 1
+    (tmp_path / "go").touch()
     status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
     assert status == 0
     assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
-    assert "studies" not in strict(tmp_path / "out" / "comparison.json")["arguments"]["out"]
+    assert "studies" not in strict(out / "comparison.json")["arguments"]["out"]
 
 
+@pytest.mark.usefixtures("brief")
 def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
@@ -192,12 +205,28 @@ def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path
     assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
 
 
+TELLING = """
+import pathlib
+
+class Tells(Slam):
+    '''By a file beside this one that the second batch of episodes has begun.'''
+    batches = 0
+
+    def reset(self, lanes=None):
+        self.batches += lanes is None
+        if self.batches == 2:
+            pathlib.Path(__file__).with_name("begun").touch()
+"""
+
+
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
-    arguments = ("--env", "BirthSIM/Probe-v0", "--episodes", 6400, "--out", tmp_path)
-    status, printed = interrupted("evaluate", arguments, lambda said: "episodes 128-255" in said)
+    own, out = tmp_path / "own.py", tmp_path / "out"
+    own.write_text(OWN + TELLING)
+    arguments = ("--env", "BirthSIM/Probe-v0", "--controller", f"{own}:Tells", "--episodes", 10**5, "--out", out)
+    status, printed = interrupted("evaluate", arguments, (tmp_path / "begun").exists)
     assert status == 0
-    assert "of 6400 episodes are complete and kept" in printed
-    (result,) = strict(tmp_path / "evaluation.json")["results"]
+    assert "of 100000 episodes are complete and kept" in printed
+    (result,) = strict(out / "evaluation.json")["results"]
     assert len(result["seeds"]) >= 128
     assert len(result["seeds"]) % 128 == 0
     assert len(result["episodes"]["settled_rms"]) == len(result["seeds"])
@@ -207,7 +236,7 @@ def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monke
     def interrupt(*args, **kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("baselines.commands.evaluate.evaluate", interrupt)
+    monkeypatch.setattr("agents.commands.evaluate.evaluate", interrupt)
     status, _, complained = call("evaluate", monkeypatch, capsys, "--out", tmp_path)
     assert status == 130
     assert complained == "birthsim-evaluate: interrupted\n"

@@ -96,11 +96,11 @@ def same_figures(one: Evaluation, other: Evaluation):
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors):
-    law = BacksteppingController()
-    first, again = run(law, sensors=sensors), run(law, sensors=sensors)
+    law, arguments = BacksteppingController(), {"sensors": sensors, "duration": 0.3}
+    first, again = run(law, **arguments), run(law, **arguments)
     same_figures(first, again)
-    same_figures(first, run(BacksteppingController(), sensors=sensors))
-    other = run(law, sensors=sensors, seed=50)
+    same_figures(first, run(BacksteppingController(), **arguments))
+    other = run(law, seed=50, **arguments)
     assert first.seeds == [5, 6, 7]
     assert other.seeds == [50, 51, 52]
     assert not set(first.metrics["error_rms_x"]) & set(other.metrics["error_rms_x"])
@@ -108,7 +108,7 @@ def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors
 
 def test_two_controllers_meet_the_same_worlds(worlds):
     law, weight = Spy(), Spy(BacksteppingController(weight_compensation=True))
-    run(law, duration=2.5), run(weight, duration=2.5)
+    run(law, duration=1.4), run(weight, duration=1.4)
     np.testing.assert_array_equal(worlds[0], worlds[1])
     np.testing.assert_array_equal(law.references, weight.references)
     np.testing.assert_array_equal(law.forces, weight.forces)
@@ -120,9 +120,9 @@ def test_two_controllers_meet_the_same_worlds(worlds):
 
 
 def test_a_seed_means_the_same_world_however_many_episodes_run_beside_it(monkeypatch):
-    together = run(BacksteppingController(), episodes=5)
+    together = run(BacksteppingController(), episodes=5, duration=0.3)
     monkeypatch.setattr(evaluation, "LANES", 2)
-    batches = run(BacksteppingController(), episodes=5)
+    batches = run(BacksteppingController(), episodes=5, duration=0.3)
     assert [trace.shape[1] for trace in batches.traces] == [2, 2, 1]
     assert together.seeds == batches.seeds == [5, 6, 7, 8, 9]
     for name in UNITS:
@@ -231,10 +231,10 @@ def test_nothing_runs_on_once_every_lane_is_lost():
     assert result.traces[0].shape == (500, 2, 2)
 
 
-@pytest.mark.parametrize(("at", "complete"), [(1500, 2), (800, 2), (2399, 4)])
+@pytest.mark.parametrize(("at", "complete"), [(375, 2), (200, 2), (599, 4)])
 def test_an_interrupt_keeps_the_episodes_that_are_complete(monkeypatch, capsys, at, complete):
     monkeypatch.setattr(evaluation, "LANES", 2)
-    whole, cut = run(Spy(), episodes=6), run(Spy(interrupt_at=at), episodes=6)
+    whole, cut = run(Spy(), episodes=6, duration=0.2), run(Spy(interrupt_at=at), episodes=6, duration=0.2)
     assert cut.seeds == whole.seeds[:complete]
     assert cut.lost == whole.lost[:complete]
     for name in UNITS:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import sys
+
+import gymnasium
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 from PIL import Image
 
 from baselines import figures
+from baselines.commands import figure4 as figure4_command
 from baselines.commands.figure4 import FIELDS, figures_of, record_run
 from baselines.evaluation import Evaluation
 from baselines.figures import error_over_time, figure4
 from birthsim_env import Parameters
+from tests.console import strict
 from tests.test_evaluation import Slam, run
 
 RIG = Parameters()
@@ -20,10 +27,26 @@ LIMITS = {2000: 2.5, 4000: 1.2}
 
 
 @pytest.fixture(scope="module")
-def records():
+def command(tmp_path_factory):
+    """What birthsim-figure4 leaves: its folder, its record of the paper's law with ideal sensors, what it printed."""
+    records, printed, out = [], io.StringIO(), tmp_path_factory.mktemp("figure4") / "out"
+
+    def kept(*arguments):
+        records.append(record_run(*arguments))
+        return records[-1]
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(figure4_command, "record_run", kept)
+        patch.setattr(sys, "argv", ["birthsim-figure4", "--out", str(out)])
+        figure4_command.main()
+    return out, records[0], printed.getvalue()
+
+
+@pytest.fixture(scope="module")
+def records(command):
     """The four runs: controller and sensors -> record."""
-    names, kinds = ("backstepping", "backstepping-weight"), ("ideal", "lab")
-    return {(name, sensors): record_run(name, sensors) for name in names for sensors in kinds}
+    others = (("backstepping", "lab"), ("backstepping-weight", "ideal"), ("backstepping-weight", "lab"))
+    return {("backstepping", "ideal"): command[1], **{setting: record_run(*setting) for setting in others}}
 
 
 def settled_rms(record, setpoint):
@@ -94,10 +117,13 @@ def test_lab_sensors_cost_accuracy_but_not_stability(records):
         assert (settled_rms(lab, setpoint) < settled_rms(ideal, setpoint) + 0.3).all()
 
 
-def test_the_same_run_twice_is_the_same(records):
+def test_the_same_run_twice_is_the_same(records, monkeypatch):
+    """Its first three seconds: two pushes, noise of the sensors."""
+    make = gymnasium.make
+    monkeypatch.setattr(figure4_command.gymnasium, "make", lambda *args, **options: make(*args, duration=3.0, **options))
     again = record_run("backstepping", "lab")
     for name, values in records["backstepping", "lab"].items():
-        np.testing.assert_array_equal(again[name], values, err_msg=name)
+        np.testing.assert_array_equal(again[name], values[:3001], err_msg=name)
 
 
 def test_the_figures_beside_the_plot_are_those_of_the_record(records):
@@ -131,16 +157,28 @@ def assert_pictures(folder, name, least_width):
     return text
 
 
-def test_figure_4_is_drawn_as_png_and_svg_and_always_the_same(records, tmp_path):
-    record = records["backstepping", "ideal"]
+def test_the_command_writes_its_figures_the_picture_and_the_numbers(command):
+    out, record, printed = command
+    names = sorted(path.name for path in out.iterdir())
+    assert names == ["figure4.json", "figure4.png", "figure4.svg", "rig.png"]
+    assert (out / "rig.png").stat().st_size > 10_000
+    numbers = strict(out / "figure4.json")
+    assert numbers == figures_of(record, RIG)
+    for setpoint, limit in LIMITS.items():
+        assert max(numbers[f"settled_rms_mm_at_{setpoint}"]) < limit
+    assert min(numbers["least_clearance_mm"]) > 0
+    assert max(numbers["pneumatic_rms_percent"]) < 3
+    assert f"{numbers['settled_rms_mm_at_2000'][0]:10.3f}{numbers['settled_rms_mm_at_2000'][1]:10.3f}" in printed
+
+
+def test_figure_4_is_drawn_as_png_and_svg_and_always_the_same(command, tmp_path):
+    out, record, _ = command
+    text = assert_pictures(out, "figure4", 1200)
     paths = figure4(record, tmp_path)
     assert sorted(path.name for path in paths) == ["figure4.png", "figure4.svg"]
-    text = assert_pictures(tmp_path, "figure4", 1200)
-    (tmp_path / "again").mkdir()
-    figure4(record, tmp_path / "again")
     # Neither dates nor random identifiers: a figure in a repository changes only with its data.
-    assert (tmp_path / "again" / "figure4.svg").read_text() == text
-    assert (tmp_path / "again" / "figure4.png").read_bytes() == (tmp_path / "figure4.png").read_bytes()
+    assert (tmp_path / "figure4.svg").read_text() == text
+    assert (tmp_path / "figure4.png").read_bytes() == (out / "figure4.png").read_bytes()
 
 
 def test_the_error_over_time_is_drawn_even_if_every_lane_is_lost(tmp_path):

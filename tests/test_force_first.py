@@ -106,10 +106,10 @@ def test_without_saturation_both_rates_are_had() -> None:
 @pytest.mark.parametrize("rates", [2e3, 8e3])
 def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
     """Lexicographic optimum: no valves give a nearer dF/dt, and with that none a nearer pressurisation."""
-    cases = drawn(150, rates, seed=1)
+    cases = drawn(90, rates, seed=1)
     first, neither = openings(cases)
     saturated, kept = np.abs(neither).max(axis=0) >= 1, 0
-    assert saturated.sum() > 70
+    assert saturated.sum() > 40
     for case, opening, plain in zip(cases.T[saturated], first.T[saturated], neither.T[saturated], strict=True):
         (force_rate, _), (nearest_rate, nearest_qt) = got(case, opening), best(case)
         assert force_rate == pytest.approx(nearest_rate, rel=1e-7, abs=1e-3)
@@ -117,14 +117,14 @@ def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
         lost = abs(got(case, plain)[0] - case[0])
         if abs(force_rate - case[0]) < 1e-3:
             kept += lost > 10
-    assert kept > 10, "there must be cases in which precedence matters"
+    assert kept > 5, "there must be cases in which precedence matters"
 
 
 @pytest.mark.parametrize("pressures", [(6.9e5, 9e5), (0.6e5, 1.1e5)], ids=["above the supply", "below the atmosphere"])
 def test_pressures_beyond_supply_and_atmosphere(pressures: tuple[float, float]) -> None:
     """A piston that is pushed compresses a chamber beyond the supply: a valve that cannot fill it still does what it can."""
-    cases = drawn(100, 3e3, seed=2, pressures=pressures)
-    cases[3] = drawn(100, 3e3, seed=3)[3]
+    cases = drawn(60, 3e3, seed=2, pressures=pressures)
+    cases[3] = drawn(60, 3e3, seed=3)[3]
     first, _ = openings(cases)
     for case, opening in zip(cases.T, first.T, strict=True):
         nearest_rate, nearest_qt = best(case)

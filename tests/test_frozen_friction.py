@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from baselines import BacksteppingController
 from baselines.probes import POSES, Probes, run_probes
 from baselines.registry import make_controller
 from birthsim_env.parameters import Parameters
+from tests import closed_loop
 
 CASES = [(pose, setpoint, axis) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1)]
 
 
-def test_it_renders_the_setpoint_where_the_papers_law_is_too_stiff() -> None:
+def test_it_renders_the_setpoint_where_the_papers_law_is_too_stiff(monkeypatch: pytest.MonkeyPatch) -> None:
     """20 N, 12 and 15 N of Coulomb friction, exact sensors, 30 probes: errors and hunting of both laws."""
+    closed_loop.shorten_probes(monkeypatch)
     poses, setpoints, axes = (np.array(column) for column in zip(*CASES, strict=True))
     force = 20.0 * (axes == np.array([[0], [1]]))
     probes = Probes(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), Parameters())

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from birthsim_live.clock import MOST_LAG, Clock, Pace
+from tests.console import PATIENCE
 
 
 def test_what_is_due_follows_the_wall_and_the_speed() -> None:
@@ -86,21 +87,21 @@ def test_the_thread_moves_pauses_and_answers(caplog: pytest.LogCaptureFixture) -
     clock = Clock(source, on_frame)
     clock.start()
     try:
-        assert moved.wait(30)
-        clock.ask(lambda: clock.pause(True)).result(30)
+        assert moved.wait(PATIENCE)
+        clock.ask(lambda: clock.pause(True)).result(PATIENCE)
         stood = source.count
-        assert clock.ask(lambda: source.count).result(30) == stood
+        assert clock.ask(lambda: source.count).result(PATIENCE) == stood
         with pytest.raises(ZeroDivisionError):
-            clock.ask(lambda: 1 // 0).result(30)
+            clock.ask(lambda: 1 // 0).result(PATIENCE)
         assert [frame["n"] for frame in frames] == list(range(1, len(frames) + 1))
         source.broken = True
-        clock.ask(lambda: clock.pause(False)).result(30)
+        clock.ask(lambda: clock.pause(False)).result(PATIENCE)
         while not clock.paused:  # ends, or the test run's own limit does
-            clock.ask(lambda: None).result(30)
+            clock.ask(lambda: None).result(PATIENCE)
         assert "the rig stopped" in caplog.text
     finally:
         clock.stop()
     assert not clock.is_alive()
     late = clock.ask(lambda: 5)
     clock.stop()  # nobody waits for ever
-    assert late.result(30) == 5
+    assert late.result(PATIENCE) == 5

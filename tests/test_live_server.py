@@ -27,11 +27,12 @@ from birthsim_live.recording import load_recording
 from birthsim_live.replay_desk import ReplayDesk
 from birthsim_live.server import create_app
 from birthsim_live.session import Session
+from tests.console import PATIENCE, call, run
 
 HERE = "http://127.0.0.1:8000"
 SOCKET = "ws://127.0.0.1:8000/ws"
-PATIENCE = 3000
-"""Messages that are waited through: frames come on all the while."""
+MESSAGES = 100_000
+"""That are waited through, for half an hour and more: frames come on all the while."""
 
 
 def client(desk: Any, folder: Path | None = None, **options: Any) -> TestClient:
@@ -46,7 +47,7 @@ def live(tmp_path: Path) -> Iterator[TestClient]:
 
 def until(ws: WebSocketTestSession, wanted: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
     """The first message that is ``wanted``."""
-    for _ in range(PATIENCE):
+    for _ in range(MESSAGES):
         message: dict[str, Any] = json.loads(ws.receive_text())
         if wanted(message):
             return message
@@ -267,7 +268,7 @@ def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path:
             assert process.stdout is not None
             line = next(line for line in process.stdout if "http://" in line)
             address = line.split()[1]
-            with connect(address.replace("http", "ws") + "/ws") as ws:
+            with connect(address.replace("http", "ws") + "/ws", open_timeout=PATIENCE) as ws:
                 assert json.loads(ws.recv())["type"] == "hello"
                 ws.send('{"type":"record","on":true}')
                 while not (message := json.loads(ws.recv())).get("recording"):
@@ -277,7 +278,7 @@ def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path:
                     pass
                 process.send_signal(signal.SIGINT)
                 rest = process.stdout.read()
-            assert process.wait(60) == 0
+            assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
     assert f"recording finished: {tmp_path / message['recording']['file']}" in rest
@@ -291,18 +292,22 @@ def test_without_the_extra_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch
         serve(None, any_socket, "127.0.0.1", "")  # type: ignore[arg-type]
 
 
-def test_commands_refuse_in_one_line(tmp_path: Path) -> None:
+def test_commands_refuse_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        for module, arguments, words in (
-            ("live", ["--port", port], f"port = {port} of 127.0.0.1 cannot be served"),
-            ("live", ["--host", "0.0.0.0", "--port", "0"], "host = '0.0.0.0' means every address"),
-            ("replay", [str(tmp_path / "none.npz")], "none.npz' cannot be read"),
+        for arguments, words in (
+            (["--port", port], f"port = {port} of 127.0.0.1 cannot be served"),
+            (["--host", "0.0.0.0", "--port", "0"], "host = '0.0.0.0' means every address"),
         ):
-            command = [sys.executable, "-m", f"birthsim_live.commands.{module}", *arguments]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            assert done.returncode == 2
-            assert done.stderr.strip().splitlines()[-1].startswith(f"birthsim-{module}: error: ")
-            assert words in done.stderr
+            status, _, complained = call("live", monkeypatch, capsys, *arguments)
+            assert status == 2
+            assert complained.strip().splitlines()[-1].startswith("birthsim-live: error: ")
+            assert words in complained
+    done = run("replay", tmp_path / "none.npz")
+    assert done.returncode == 2
+    assert done.stderr.strip().splitlines()[-1].startswith("birthsim-replay: error: ")
+    assert "none.npz' cannot be read" in done.stderr

@@ -42,8 +42,9 @@ def test_openings_are_opposite_and_give_the_force_rate() -> None:
 
 
 @pytest.mark.parametrize("name", ["backstepping-one-valve", "backstepping-weight"])
-def test_rendered_stiffness_is_the_setpoint(name: str) -> None:
+def test_rendered_stiffness_is_the_setpoint(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """5 mm either way at 5 poses, 1000 to 4000 N/m, both axes, without dry friction: within 1 %, as with two valves."""
+    closed_loop.shorten_probes(monkeypatch)
     poses, setpoints, axes, ways = (np.array(column) for column in zip(*CASES, strict=True))
     force = setpoints * 0.005 * ways * (axes == np.array([[0], [1]]))
     probes = Probes(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), FRICTIONLESS)
@@ -99,9 +100,9 @@ def test_pressures_settle_where_leakage_balances() -> None:
 
 
 def test_on_the_circle_the_error_is_that_of_two_valves() -> None:
-    """A quarter of the Circle, with friction: the same error, and more air, since a valve that fills also drains."""
+    """A part of the Circle, with friction: the same error, and more air, since a valve that fills also drains."""
     two, one = (
-        evaluate("BirthSIM/Circle-v0", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=4.0).summary()
+        evaluate("BirthSIM/Circle-v0", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=2.5).summary()
         for name in ("backstepping-weight", "backstepping-one-valve")
     )
     for axis in "xy":

@@ -214,9 +214,9 @@ print(*kernel.inspect_asm().values())
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instruction names")
 def test_kernel_is_vectorised() -> None:
-    """Each division and root of the right-hand side stands there twice, packed and for leftover lanes; scalar code would have no packed ones.
+    """Each division and root stands there twice, packed and for leftover lanes; scalar code would have no packed ones.
 
-    The kernel is compiled for AVX2, and not run, whatever this processor can do."""
+    The right-hand side is compiled for AVX2, and not run, whatever this processor can do."""
     target = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+sse,+sse2,+sse4.1,+sse4.2,+avx,+avx2"}
     line = [sys.executable, "-c", DISASSEMBLE]
     done = subprocess.run(line, cwd=ROOT, env={**os.environ, **target}, capture_output=True, text=True, check=True)

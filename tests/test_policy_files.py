@@ -375,6 +375,7 @@ def test_a_network_is_normalization_tanh_layers_and_a_clip():
         ),
     )
     assert (hand.inputs, hand.outputs) == (2, 2)
+    # Actions are singles, rounded by 6e-8 of their size; EPSILON of the variance counts 1.3e-9 to 2e-8.
     one, other = np.tanh((2 - 1) / 2), np.tanh(2 * -0.5 / 0.5 + 0.5)
     seen = np.array([[2.0, -0.5], [1e9, 1e9]], np.float32)
     actions = hand.actions(seen)

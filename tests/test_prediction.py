@@ -113,7 +113,7 @@ def test_a_step_is_a_classical_runge_kutta_step_with_exact_lag(rig: Parameters) 
     The flows are exact; half the step leaves about a sixteenth of the error: below 0.1 nm and 0.01 Pa with steps of 0.5 ms.
     """
     model, rng, span = ControlModel(rig), np.random.default_rng(2), 0.008
-    for state in states(rig, 3, 5).T:
+    for state in states(rig, 2, 5).T:
         flows, commanded, pushes = rng.normal(0, 1, 4), rng.normal(0, 2, 4), rng.normal(0, 25, 4)
 
         def slope(time: float, both: Array, commanded: Array = commanded, pushes: Array = pushes) -> Array:

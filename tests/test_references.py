@@ -121,7 +121,7 @@ def boundary_margin(x, y):
 
 @pytest.mark.parametrize("kind", ["nominal", "varied"])
 def test_descent_is_ten_centimetres_of_line_and_the_arc_of_the_design(kind):
-    lanes = 600 if kind == "varied" else 1
+    lanes = 300 if kind == "varied" else 1
     path = prepared(getattr(SCENARIOS["descent"], kind)()[0], lanes)
     own = path._own
     length, radius, angle = own[3], own[4], np.degrees(own[5])
@@ -133,7 +133,7 @@ def test_descent_is_ten_centimetres_of_line_and_the_arc_of_the_design(kind):
         if kind == "varied":
             assert np.ptp(values) > 0.97 * (high - low), name
     # Measured on the path itself: its length, and the turn of its heading at the end.
-    times = np.linspace(0.0, 24.0, 4001)
+    times = np.linspace(0.0, 24.0, 1501)
     points = np.stack([path.sample(np.full(lanes, t))[:2] for t in times])
     walked = np.linalg.norm(np.diff(points, axis=0), axis=1).sum(axis=0)
     np.testing.assert_allclose(walked, 0.10 + radius * np.radians(angle), rtol=1e-4)

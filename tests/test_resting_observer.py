@@ -32,11 +32,12 @@ def stuck(rig: Parameters, lanes: int, seconds: float, speed: float = 0.0, slip:
         sensors.begin(lane, np.random.default_rng([7, lane]))
     pressures = balanced_state(parameter_array(rig, lanes), np.repeat(STUCK, lanes, axis=1))[list(PRESSURES)]
     pressures[[0, 2]] += LOAD / areas
-    for tick in range(round(seconds / period)):
-        time = tick * period
-        piston = np.repeat(STUCK + np.array([[0.0], [speed * min(max(time - 1.0, 0.0), slip)]]), lanes, axis=1)
-        motion = np.concatenate([end_effector(piston, rig), np.zeros((2, lanes))])
-        yield sensors.measure(np.full(lanes, tick), np.full(lanes, time), motion, pressures, np.zeros((2, lanes)))
+    times = period * np.arange(round(seconds / period))
+    moved = speed * np.clip(times - 1.0, 0.0, slip)
+    places, nothing = end_effector(STUCK + np.array([0 * moved, moved]), rig), np.zeros((2, lanes))
+    for tick, (time, place) in enumerate(zip(times, places.T, strict=True)):
+        motion = np.concatenate([np.repeat(place[:, None], lanes, axis=1), nothing])
+        yield sensors.measure(np.full(lanes, tick), np.full(lanes, time), motion, pressures, nothing)
 
 
 def apparent(rig: Parameters) -> Array:

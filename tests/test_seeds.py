@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from agents import inspection
+from agents.commands import evaluate as command
 from agents.inspection import friction_along_circle, weight_over_workspace
 from agents.learning_curves import over_seeds
 from agents.policy_files import load_policy
 from agents.residual_controller import observation_size
 from agents.seeds import best_policy, merged, policy_folders, pooled, seed_table, shipped_names
-from baselines.commands import evaluate as command
 from baselines.evaluation import Evaluation
 from baselines.metrics import UNITS
 from baselines.statistics import crossed_interval, interquartile_mean
@@ -96,7 +97,10 @@ def test_shipped_policies_load_fit_and_are_small(name):
     assert best_policy(name) == places[int(np.argmin(reached))]
 
 
-def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction():
+def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkeypatch):
+    """Once round the circle each way instead of twice."""
+    follow = inspection._follow
+    monkeypatch.setattr(inspection, "_follow", lambda policy, lanes, time, *what: follow(policy, lanes, min(time, 8.0), *what))
     policy = load_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
     for unknown, half in zip(*friction_along_circle(policy), strict=True):
@@ -121,7 +125,8 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     command.main()
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(4))]
-    assert "; 3 training seeds" in capsys.readouterr().out
+    assert "residual, 3 seeds " in capsys.readouterr().out
+    assert "; 3 training seeds" in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert content["arguments"]["policy"] == "probe"
     assert [len(result["seeds"]) for result in content["results"]] == [4, 4, 4, 4, 4, 1]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,6 @@ from matplotlib import pyplot as plt
 from scipy.integrate import solve_ivp
 
 from baselines import stability
-from baselines.commands.stability import main
 from baselines.probes import Window
 from baselines.stability import (
     MAPS,
@@ -37,6 +34,7 @@ from birthsim_env.lanes import STATES, Array
 from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.signals import Mask, Measurement, Reference
+from tests.console import call, strict
 
 RIG = Parameters()
 
@@ -209,27 +207,18 @@ def test_how_far_all_is_stable() -> None:
     assert stable_up_to(chart, "a") == [3.0, 1.0, None]
 
 
-def command(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
-    """Exit status."""
-    monkeypatch.setattr(sys, "argv", ["birthsim-stability", *arguments])
-    try:
-        main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    return 0
-
-
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Files, strict JSON, and a table with the numbers of the maps."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
     out = tmp_path / "deeper" / "maps"
-    assert command(monkeypatch, "--map", "hand", "--map", "rig", "--points", "2", "--sensors", "lab", "--out", str(out)) == 0
-    content = json.loads((out / "stability.json").read_text(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    options = ("--map", "hand", "--map", "rig", "--points", 2, "--sensors", "lab", "--out", out)
+    status, printed, _ = call("stability", monkeypatch, capsys, *options)
+    assert status == 0
+    content = strict(out / "stability.json")
     assert list(content["maps"]) == ["hand", "rig"]
     assert content["sensors"] == "lab"
     assert content["believed"]["mechanics"]["mass"] == 3.0
-    printed = capsys.readouterr().out
     for name, chart in content["maps"].items():
         assert (out / f"stability_{name}.png").stat().st_size > 20_000
         assert "<svg" in (out / f"stability_{name}.svg").read_text()[:1000]
@@ -253,6 +242,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_bad_input_is_one_plain_line(
     arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command(monkeypatch, *arguments, "--out", str(tmp_path / "none")) == 2
-    assert complaint in capsys.readouterr().err
+    status, _, complained = call("stability", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
+    assert status == 2
+    assert complaint in complained
     assert not (tmp_path / "none").exists()

@@ -49,19 +49,21 @@ def errors(probes: Probes, answers: Answers) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("law", ["lugre", "elasto_plastic"])
-def test_exact_sensors_and_friction_off_by_a_quarter(law: str) -> None:
-    """5 and 40 N on both axes at five poses, 1000-4000 N/m; 3 % and 0.1 mm are asked for, measured are 0.002 % and 0.0003 mm.
+def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """5 and 40 N on both axes at five poses, 1000-4000 N/m; 3 % and 0.1 mm are asked for, measured are 0.013 % and 0.0006 mm.
 
     Neither leans on LuGre's drift: elasto-plastic bristles have none.
     """
+    closed_loop.shorten_probes(monkeypatch)
     probes = pushes((5.0, -40.0), (slippery(0.75, law), slippery(1.25, law)))
     error, hunting = errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED)))
     assert error.max() < 0.002
     assert hunting.max() < 0.01
 
 
-def test_coupled_setpoints_through_friction() -> None:
+def test_coupled_setpoints_through_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     """[[3000, 800], [800, 1500]] N/m: displacements along and across the push."""
+    closed_loop.shorten_probes(monkeypatch)
     probes = pushes((15.0, -30.0), (slippery(0.75), slippery(1.25)), (3000.0,))
     probes.stiffness[1:] = [[1500.0], [800.0]]
     answers = run_probes(probes, AdmittanceBackstepping(BELIEVED))
@@ -77,7 +79,7 @@ def test_a_trackers_samples(law: str) -> None:
     Neither leans on LuGre's drift. With LuGre over eight sets of noise and both directions, 1920 pushes: median 0.12 %,
     95 % 0.61 %, worst 2.3 %; hunting 0.42 mm.
     """
-    probes = pushes((5.0, -10.0, 20.0, -40.0), (slippery(1.0, law),))
+    probes = pushes((5.0, -40.0), (slippery(1.0, law),))
     error, hunting = errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11))
     assert np.quantile(error, 0.95) < 0.01
     assert error.max() < 0.05

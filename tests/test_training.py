@@ -170,7 +170,9 @@ def test_every_validation_is_in_the_events_at_its_own_step(trained, events):
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
-    settings = replace(BRIEF, algorithm=algorithm, gradient_steps=1, batch=64)
+    settings = replace(
+        BRIEF, algorithm=algorithm, steps=512, lanes=8, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8), validation_lanes=2
+    )
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
         reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
         results.append((reached["curve"], *((tmp_path / name / file).read_bytes() for file in (WEIGHTS, CONFIGURATION))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from baselines.commands import tune
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.randomization import documented_ranges
+from tests.console import call
 
 OWN = """
 import numpy as np
@@ -63,17 +63,6 @@ def trial_costs(monkeypatch):
     return tried, limit
 
 
-def call(monkeypatch, capsys, *arguments):
-    """Exit status, what was printed and what was complained about."""
-    monkeypatch.setattr(sys, "argv", ["birthsim-tune", *map(str, arguments)])
-    status = 0
-    try:
-        tune.main()
-    except SystemExit as end:
-        status = end.code
-    return status, *capsys.readouterr()
-
-
 def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
@@ -91,7 +80,7 @@ def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_cos
     start = tmp_path / "bad.json"
     start.write_text('{"gains": {"stiff": 1.5, "share": 1.9, "other": 3}}')
     out = tmp_path / "out"
-    status, printed, _ = call(monkeypatch, capsys, "--controller", own, "--trials", 80, "--start", start, "--out", out)
+    status, printed, _ = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 80, "--start", start, "--out", out)
     assert status == 0
     assert trial_costs[0][0] == (1.5, 1.9)
     trials, best = read(out / "trials.json")["trials"], read(out / "gains.json")
@@ -115,27 +104,27 @@ def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_cos
 def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_costs, monkeypatch, capsys):
     tried, limit = trial_costs
     options = ("--controller", own, "--trials", 40, "--seed", 5)
-    assert call(monkeypatch, capsys, *options, "--out", tmp_path / "whole")[0] == 0
+    assert call("tune", monkeypatch, capsys, *options, "--out", tmp_path / "whole")[0] == 0
     whole = list(tried)
     tried.clear()
     limit[0] = 27
-    status, printed, _ = call(monkeypatch, capsys, *options, "--out", tmp_path / "parts")
+    status, printed, _ = call("tune", monkeypatch, capsys, *options, "--out", tmp_path / "parts")
     assert status == 0
     assert "interrupted: 27 of 40 trials are kept; the same command carries on" in printed
     assert read(tmp_path / "parts" / "gains.json")["trials"] == 27
-    assert call(monkeypatch, capsys, *options, "--out", tmp_path / "parts")[0] == 0
+    assert call("tune", monkeypatch, capsys, *options, "--out", tmp_path / "parts")[0] == 0
     assert tried == whole
     for name in ("trials.json", "gains.json"):
         assert read(tmp_path / "parts" / name) == read(tmp_path / "whole" / name)
     more = ("--controller", own, "--trials", 50, "--seed", 5, "--out", tmp_path / "parts")
-    assert call(monkeypatch, capsys, *more)[0] == 0
+    assert call("tune", monkeypatch, capsys, *more)[0] == 0
     assert len(tried) == 50
     assert tried[:40] == whole
 
 
 def test_an_interrupt_before_the_first_trial_ends_with_status_130(own, tmp_path, trial_costs, monkeypatch, capsys):
     trial_costs[1][0] = 0
-    status, printed, complained = call(monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
+    status, printed, complained = call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
     assert (status, printed) == (130, "")
     assert complained.endswith("birthsim-tune: interrupted\n")
     assert not (tmp_path / "out" / "gains.json").exists()
@@ -145,7 +134,7 @@ def test_the_seed_is_all_that_a_search_depends_on(own, tmp_path, trial_costs, mo
     found = []
     for folder, seed in (("a", 0), ("b", 0), ("c", 1)):
         trial_costs[0].clear()
-        call(monkeypatch, capsys, "--controller", own, "--trials", 30, "--seed", seed, "--out", tmp_path / folder)
+        call("tune", monkeypatch, capsys, "--controller", own, "--trials", 30, "--seed", seed, "--out", tmp_path / folder)
         found.append(list(trial_costs[0]))
     assert found[0] == found[1]
     assert found[0][0] == found[2][0] == (100.0, 1.0), "the middle of the ranges"
@@ -210,7 +199,7 @@ BAD = [
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own, tmp_path, monkeypatch, capsys):
     (tmp_path / "other.json").write_text('{"gains": {"damping": 1.0}}')
     given = [argument.format(tmp=tmp_path, own=own.removesuffix(":Own")) for argument in arguments]
-    status, printed, complained = call(monkeypatch, capsys, *given, "--out", tmp_path / "out")
+    status, printed, complained = call("tune", monkeypatch, capsys, *given, "--out", tmp_path / "out")
     assert (status, printed) == (2, "")
     assert message in complained.strip().splitlines()[-1]
     assert not (tmp_path / "out").exists()
@@ -218,17 +207,17 @@ def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own
 
 def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, monkeypatch, capsys):
     out = tmp_path / "out"
-    assert call(monkeypatch, capsys, "--controller", own, "--trials", 3, "--out", out)[0] == 0
+    assert call("tune", monkeypatch, capsys, "--controller", own, "--trials", 3, "--out", out)[0] == 0
     before = (out / "trials.json").read_text()
     for changed, said in (
         (("--seed", 9), "seed = 0; allowed: 9"),
         (("--sensors", "lab"), "sensors = ['ideal', 'lab']; allowed: ['lab']"),
     ):
-        status, _, complained = call(monkeypatch, capsys, "--controller", own, "--trials", 5, *changed, "--out", out)
+        status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, *changed, "--out", out)
         assert status == 2
         assert f"{out}/trials.json has {said}, or another --out" in complained
     assert (out / "trials.json").read_text() == before
     (out / "trials.json").write_text("{}")
-    status, _, complained = call(monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
+    status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
     assert status == 2
     assert "trials.json is no list of trials" in complained

@@ -100,10 +100,7 @@ CASES = {
 }
 
 
-MARKED = [pytest.param(*case, id=name, marks=pytest.mark.slow if "rig, strong" in name else ()) for name, case in CASES.items()]
-
-
-@pytest.mark.parametrize(("changes", "sequence", "refinement", "allowed"), MARKED)
+@pytest.mark.parametrize(("changes", "sequence", "refinement", "allowed"), CASES.values(), ids=CASES.keys())
 def test_plant_moves_like_the_second_model(
     changes: dict[str, object], sequence: Sequence, refinement: int, allowed: tuple[float, float]
 ) -> None:

@@ -1,0 +1,298 @@
+"""Mutation tester of the small numerical modules: a changed operator or number in them should make some test fail.
+
+``python -m tests.mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the share of killed
+mutants of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant.
+
+Kernels run uncompiled here, so that a mutant needs no compilation: a forked child replaces the code of one function, runs the
+tests of its module until one fails, and ends. The tests that are quick enough uncompiled are found by running each once.
+An error that compiled code would not raise, such as the root of a negative number, counts as a failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import gc
+import importlib
+import inspect
+import json
+import math
+import os
+import resource
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType, ModuleType
+
+import pytest
+
+MODULES = {
+    "birthsim_env.geometry": ("strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
+    "birthsim_env.mechanics": ("strict_feedback", "cartesian_stiffness", "mechanics"),
+    "birthsim_env.friction": ("strict_feedback", "reference_friction", "friction", "elasto_plastic"),
+    "birthsim_env.chambers": ("chambers",),
+    "birthsim_env.valves": ("valve_inverse", "valves"),
+    "birthsim_env.control_model": ("strict_feedback", "valve_inverse", "control_model"),
+    "baselines.gains": ("gains", "damping"),
+}
+"""The test files (``tests/test_*.py``) that concern a module, the quickest first."""
+
+LIMIT = 40.0
+"""CPU seconds of one test, uncompiled, beyond which it is left out. The mass and energy balance of the chambers needs 25."""
+
+BUDGET = 60.0
+"""CPU seconds of all tests of one module, the quickest first: what a surviving mutant costs at most."""
+
+PATIENCE = 3.0
+"""A mutant that needs so many times the CPU time of its tests, and five seconds more, is taken to run for ever."""
+
+ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
+BOUNDARY = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
+OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
+NAMES = {"min": "max", "sin": "cos", "arcsin": "arccos", "argmin": "argmax", "all": "any"}
+NAMES |= {after: before for before, after in NAMES.items()}
+DROPPED = ("sqrt", "abs")
+UNTOUCHED = ("annotation", "returns", "decorator_list")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change. Its name says module, function, operator and the operator's number in the function."""
+
+    name: str
+    line: int
+    change: str
+    apply: Callable[[], None]
+
+
+def alternatives(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """The changes of one node: name of the operator and new node."""
+    changed = copy.copy(node)
+    match node:
+        case ast.BinOp(op=op) if type(op) in ARITHMETIC:
+            changed.op = ARITHMETIC[type(op)]()
+            yield "arithmetic", changed
+        case ast.Compare(ops=ops):
+            for name, table in (("boundary", BOUNDARY), ("opposite", OPPOSITE)):
+                for k, op in enumerate(ops):
+                    if type(op) in table:
+                        changed = copy.copy(node)
+                        changed.ops = [*ops[:k], table[type(op)](), *ops[k + 1 :]]
+                        yield name, changed
+        case ast.BoolOp(op=op):
+            changed.op = ast.And() if isinstance(op, ast.Or) else ast.Or()
+            yield "logic", changed
+        case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
+            yield "unary", operand
+        case ast.IfExp():
+            changed.body, changed.orelse = node.orelse, node.body
+            yield "ternary", changed
+        case ast.Constant(value=bool(value)):
+            changed.value = not value
+            yield "constant", changed
+        case ast.Constant(value=int(value)):
+            changed.value = value + 1
+            yield "constant", changed
+        case ast.Constant(value=float(value)):
+            changed.value = value * 1.1 or 0.1
+            yield "constant", changed
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+            if name in NAMES:
+                changed.func = copy.copy(node.func)
+                setattr(changed.func, "id" if isinstance(node.func, ast.Name) else "attr", NAMES[name])
+                yield "function", changed
+            elif name in DROPPED:
+                yield "call", node.args[0]
+
+
+def sites(node: ast.AST) -> Iterator[tuple[ast.AST, list | dict, int | str]]:
+    """Every node below ``node`` in the order of the text, with the list or dictionary that holds it and its key there."""
+    for field, value in ast.iter_fields(node):
+        if field not in UNTOUCHED:
+            holder, keys = (value, range(len(value))) if isinstance(value, list) else (vars(node), [field])
+            for key in keys:
+                if isinstance(child := holder[key], ast.AST):
+                    yield child, holder, key
+                    yield from sites(child)
+
+
+def essence(code: CodeType) -> tuple[object, ...]:
+    """What a code object does, whatever its lines."""
+    constants = tuple(essence(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
+    return code.co_code, code.co_names, code.co_varnames, constants
+
+
+def compiled(function: ast.FunctionDef, path: str) -> CodeType:
+    """The code object of a function without its decorators."""
+    bare = copy.copy(function)
+    bare.decorator_list = []
+    everything = compile(ast.Module([bare], []), path, "exec", flags=annotations.compiler_flag, dont_inherit=True)
+    return next(c for c in everything.co_consts if isinstance(c, CodeType) and c.co_name == function.name)
+
+
+def function_mutants(module: ModuleType, function: ast.FunctionDef) -> Iterator[Mutant]:
+    """The mutants of a function whose code differs."""
+    target, counts = inspect.unwrap(getattr(module, function.name)), Counter()
+    seen = {essence(compiled(function, module.__file__))}
+    for node, holder, key in sites(function):
+        for operator, new in alternatives(node):
+            holder[key] = new
+            code = compiled(function, module.__file__)
+            holder[key] = node
+            counts[operator] += 1
+            if essence(code) not in seen:
+                seen.add(essence(code))
+                name = f"{module.__name__}:{function.name}:{operator}:{counts[operator]}"
+                change = f"{ast.unparse(node)}  ->  {ast.unparse(new)}"
+                yield Mutant(name, node.lineno, change, lambda code=code: setattr(target, "__code__", code))
+
+
+def mutants_of(module: ModuleType) -> Iterator[Mutant]:
+    """All mutants of a module: of its functions, and of its constants that are plain numbers."""
+    for node in ast.parse(inspect.getsource(module)).body:
+        match node:
+            case ast.FunctionDef():
+                yield from function_mutants(module, node)
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Constant(value=int() | float()) as old):
+                [(operator, new)] = alternatives(old)
+                change = f"{name} = {old.value}  ->  {new.value}"
+                apply = lambda name=name, new=new: setattr(module, name, new.value)  # noqa: E731
+                yield Mutant(f"{module.__name__}:{name}:{operator}:1", node.lineno, change, apply)
+
+
+def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], None]) -> tuple[str | None, float]:
+    """The first test that fails in a forked child after ``apply``, or "time limit", or None; and the CPU seconds it took."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        try:
+            apply()
+            for item, following in zip(items, [*items[1:], None], strict=True):
+                item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+                if item.session.testsfailed:
+                    os.write(writer, item.nodeid.encode())
+                    break
+        except BaseException as error:
+            os.write(writer, repr(error).encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    _, status, usage = os.wait4(child, 0)
+    with os.fdopen(reader) as pipe:
+        said = pipe.read()
+    return said or ("time limit" if status else None), usage.ru_utime + usage.ru_stime
+
+
+class Tester:
+    """A pytest plugin that runs the collected tests of each module once per mutant."""
+
+    def __init__(self, modules: list[str], every: int, report: Callable[[str, dict], None]) -> None:
+        self.modules, self.every, self.report = modules, every, report
+        self.measured: dict[str, tuple[str | None, float]] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection(self) -> None:
+        """The tests keep their profile, but no failing example is made smaller and slow ones are no fault."""
+        from hypothesis import HealthCheck, Phase, settings  # not earlier: pytest wants to import its plugins itself
+
+        phases, checks = (Phase.explicit, Phase.generate), list(HealthCheck)
+        settings.register_profile("mutation", settings.default, phases=phases, suppress_health_check=checks)
+        settings.load_profile("mutation")
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        if session.testsfailed:
+            raise session.Interrupted("errors while collecting")
+        gc.freeze()  # so that children copy less memory
+        for name in self.modules:
+            self.report(name, self.examine(importlib.import_module(name), session.items))
+        return True
+
+    def select(self, module: str, items: list[pytest.Item]) -> tuple[list[pytest.Item], dict[str, str]]:
+        """The tests of a module that pass uncompiled within the limits, and why others are left out."""
+        concerned = [item for item in items if item.path.stem.removeprefix("test_") in MODULES[module]]
+        for item in concerned:
+            if item.nodeid not in self.measured:
+                self.measured[item.nodeid] = run_in_child([item], LIMIT, lambda: None)
+        chosen, left_out, total = [], {}, 0.0
+        for item in sorted(concerned, key=lambda item: self.measured[item.nodeid][1]):
+            failed, seconds = self.measured[item.nodeid]
+            if failed or total + seconds > BUDGET:
+                left_out[item.nodeid] = "budget" if not failed else failed if failed == "time limit" else "fails uncompiled"
+            else:
+                total += seconds
+                chosen.append(item)
+        return chosen, left_out
+
+    def examine(self, module: ModuleType, items: list[pytest.Item]) -> dict:
+        """CPU seconds of the tests and of all mutants; the tests left out; what killed each mutant, None where it survived."""
+        chosen, left_out = self.select(module.__name__, items)
+        cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter()
+        control, together = run_in_child(chosen, 2 * BUDGET, lambda: None)
+        if control:
+            raise RuntimeError(f"{module.__name__} without a change: {control}")
+        found, total = {"tests": dict(cost), "left_out": left_out, "mutants": {}}, 0.0
+        for mutant in list(mutants_of(module))[:: self.every]:
+            chosen.sort(key=lambda item: cost[item.nodeid] / (1 + kills[item.nodeid]))
+            killer, seconds = run_in_child(chosen, PATIENCE * together + 5, mutant.apply)
+            kills[killer] += 1
+            total += seconds
+            found["mutants"][mutant.name] = {"line": mutant.line, "change": mutant.change, "killed_by": killer}
+        return found | {"seconds": total}
+
+
+def interpreted(function: Callable | None = None, **_options: object) -> Callable:
+    """Stands in for ``numba.njit``: the function as it is, also under the name ``py_func``."""
+    if function is None:
+        return interpreted
+    function.py_func = function
+    return function
+
+
+def print_results(module: str, results: dict, before: dict) -> None:
+    """The share of killed mutants, the survivors, and what differs from the mutants ``before``."""
+    mutants = results["mutants"]
+    alive = [name for name, mutant in mutants.items() if mutant["killed_by"] is None]
+    tests = f"{len(results['tests'])} tests, {len(results['left_out'])} left out, {results['seconds']:.0f} s"
+    print(f"{module}: {len(mutants) - len(alive)} of {len(mutants)} killed ({1 - len(alive) / len(mutants):.1%}); {tests}")
+    for name in alive:
+        print(f"    {module.replace('.', '/')}.py:{mutants[name]['line']}: {mutants[name]['change']}  [{name}]")
+    for name, mutant in mutants.items():
+        was, now = before.get(name, mutant)["killed_by"], mutant["killed_by"]
+        if (was is None) != (now is None):
+            print(f"    {name}: killed by {was} before, by {now} now")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Mutation score of the tests of the small numerical modules.")
+    parser.add_argument("--module", nargs="+", choices=list(MODULES), default=list(MODULES), metavar="NAME")
+    parser.add_argument("--every", type=int, default=1, metavar="K", help="try only every k-th mutant of a module")
+    parser.add_argument("--before", type=Path, metavar="FILE", help="report of an earlier run to compare with")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="where to write the report, as JSON")
+    options = parser.parse_args()
+    before = json.loads(options.before.read_text()) if options.before else {}
+    os.environ |= {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    importlib.import_module("numba").njit = interpreted
+    found = {}
+
+    def report(module: str, results: dict) -> None:
+        found[module] = results
+        if options.out:
+            options.out.write_text(json.dumps(found, indent=1))
+        print_results(module, results, before.get(module, {}).get("mutants", {}))
+
+    files = sorted({str(Path(__file__).with_name(f"test_{name}.py")) for module in options.module for name in MODULES[module]})
+    arguments = ["-qq", "-s", "--tb=no", "--no-header", "-m", "not slow", "-p", "no:xdist", "-p", "no:cacheprovider"]
+    sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options.module, options.every, report)]))
+
+
+if __name__ == "__main__":
+    main()
