@@ -141,7 +141,7 @@ def overview(evaluations: list[Evaluation]) -> str:
     width = max(24, *(len(one.controller) for one in evaluations))
     lines = [f"{'settled error, mm':{width}}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
     for one in evaluations:
-        summary = one.summary()["settled_rms"]
+        summary = summarize(judged(one.metrics["settled_rms"], one.lost, applies=True))
         figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
         lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
     return "\n".join(lines)

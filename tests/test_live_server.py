@@ -19,7 +19,6 @@ from starlette.websockets import WebSocketDisconnect
 from birthsim_env.parameters import Parameters
 from birthsim_live import protocol
 from birthsim_live.addresses import is_loopback, listen
-from birthsim_live.commands.serving import serve
 from birthsim_live.frames import FIELDS, SLICES
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.player import Player
@@ -286,10 +285,15 @@ def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path:
     assert load_recording(tmp_path / message["recording"]["file"]).rows.shape[0] >= 1
 
 
-def test_without_the_extra_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    with socket.socket() as any_socket, pytest.raises(ValueError, match=r"pip install 'birthsim\[live\]'"):
-        serve(None, any_socket, "127.0.0.1", "")  # type: ignore[arg-type]
+    monkeypatch.setattr("birthsim_live.commands.live.Session", None)
+    for command, arguments in (("live", []), ("replay", ["pull.npz"])):
+        status, _, complained = call(command, monkeypatch, capsys, *arguments)
+        assert status == 2
+        assert "pip install 'birthsim[live]'" in complained
 
 
 def test_commands_refuse_in_one_line(

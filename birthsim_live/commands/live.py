@@ -8,7 +8,7 @@ from pathlib import Path
 from baselines.commands.shared import run
 from birthsim_env.parameters import load_parameters
 from birthsim_live.addresses import listen
-from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.live_desk import LiveDesk
 from birthsim_live.session import Session
 
@@ -29,12 +29,13 @@ def main() -> None:
 
 
 def _live(arguments: argparse.Namespace) -> None:
-    listening = listen(arguments.host, arguments.port)
-    session = Session(load_parameters(arguments.parameters))
-    session.advance(1)  # compiles what is not cached yet, before anybody looks
-    session.reset()
-    desk = LiveDesk(session, arguments.record_dir)
-    serve(desk, listening, arguments.host, "birthsim-live", arguments.record_dir)
+    need_server()
+    with listen(arguments.host, arguments.port) as listening:
+        session = Session(load_parameters(arguments.parameters))
+        session.advance(1)  # compiles what is not cached yet, before anybody looks
+        session.reset()
+        desk = LiveDesk(session, arguments.record_dir)
+        serve(desk, listening, arguments.host, "birthsim-live", arguments.record_dir)
 
 
 if __name__ == "__main__":

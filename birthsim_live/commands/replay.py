@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_live.addresses import listen
-from birthsim_live.commands.serving import add_address, serve
+from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.player import Player
 from birthsim_live.recording import load_recording
 from birthsim_live.replay_desk import ReplayDesk
@@ -25,10 +25,11 @@ def main() -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    listening = listen(arguments.host, arguments.port)
-    recording = load_recording(arguments.file)
-    title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
-    serve(ReplayDesk(Player(recording)), listening, arguments.host, title)
+    need_server()
+    with listen(arguments.host, arguments.port) as listening:
+        recording = load_recording(arguments.file)
+        title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
+        serve(ReplayDesk(Player(recording)), listening, arguments.host, title)
 
 
 if __name__ == "__main__":

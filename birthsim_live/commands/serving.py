@@ -31,15 +31,23 @@ def port_number(text: str) -> int:
     return int(text)
 
 
-def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
-    """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; ``ValueError`` without the extra."""
+def need_server() -> None:
+    """``ValueError`` without the extra: to be called before anything that takes time."""
     try:
-        import uvicorn
+        import uvicorn  # noqa: F401
         import websockets  # noqa: F401  uvicorn's own import would name no extra
 
-        from birthsim_live.server import create_app
+        import birthsim_live.server  # noqa: F401
     except ImportError as error:
         raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
+
+
+def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
+    """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
+    import uvicorn
+
+    from birthsim_live.server import create_app
+
     loopback = is_loopback(host)
     shown = f"[{host}]" if ":" in host else host
     print(f"{title}: http://{shown}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True)
