@@ -1,5 +1,10 @@
 """What several tests share: property tests that repeat themselves and may take their time, a short training, a last word."""
 
+import os
+
+# LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import gymnasium
 import pytest
 from hypothesis import settings
