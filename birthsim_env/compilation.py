@@ -119,20 +119,16 @@ class _DiskCache(NullCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         path = self._path(sig, data.codegen)
         content = serialize.dumps(data._reduce())  # type: ignore[no-untyped-call]
+        partial = path.with_suffix(f".{os.getpid()}.partial")
         try:
-            with tempfile.NamedTemporaryFile(dir=self._folder, delete=False) as partial:
-                partial_path = Path(partial.name)
-                try:
-                    partial.write(hashlib.sha256(content).digest() + content)
-                except OSError:
-                    partial_path.unlink()
-                    raise
-            partial_path.replace(path)
+            partial.write_bytes(hashlib.sha256(content).digest() + content)
+            partial.replace(path)
             for other in self._folder.glob(f"{path.stem.rpartition('-')[0]}-*.nbc"):
                 if other != path:
-                    other.unlink()  # of older sources
+                    other.unlink(missing_ok=True)  # of older sources
         except OSError:
-            pass
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
 
 
 class _Announcer(event.Listener):

@@ -143,9 +143,9 @@ def test_what_is_not_finite_is_left_out(values, pair):
         (["--begin", "2", "--end", "2.5", "--out", "a.gif"], "allowed: from 0 to 15 s, a second apart"),
         (["--begin", "nan", "--out", "a.gif"], "allowed: from 0 to 15 s"),
         (["--controller", "backstepping", "nobody", "--out", "a.gif"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--controller", "backstepping", "--out", "a.gif"], "expected 2 arguments"),
+        (["--out", "a.gif", "--controller", "backstepping"], "expected 2 arguments"),
         (["--env", "BirthSIM/Moon-v0", "--out", "a.gif"], "--env 'BirthSIM/Moon-v0'; allowed: BirthSIM/Circle-v0"),
-        (["--rate", "30", "--out", "a.gif"], "invalid choice: 30"),
+        (["--rate", "30", "--out", "a.gif"], "argument --rate: invalid choice: "),
         (["--parameters", "nowhere.toml", "--out", "a.gif"], "parameters = 'nowhere.toml' cannot be read"),
     ],
 )
