@@ -14,7 +14,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import agents
 from agents.policy_files import Policy
 from agents.policy_network import PolicyNetwork
 from baselines.controller import Controller
@@ -30,8 +29,6 @@ from birthsim_env.references import Circle, Hold, Trajectory
 from birthsim_env.signals import displacement
 from birthsim_env.stiffness_schedules import StiffnessSchedule
 from birthsim_env.user_forces import ForceProfile
-
-assert agents  # importing it registers the residual environments
 
 FRICTIONLESS = {f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)}
 """Changes of a rig that take its dry friction away."""
@@ -64,7 +61,8 @@ def _follow(
     """
     env: Any = gymnasium.make_vec(
         "BirthSIM/ProbeResidual-v0", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
-        stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, **policy.settings.to_dict(),
+        stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
+        **policy.settings.to_dict(),
     )  # fmt: skip
     rows = [k for k, name in enumerate(env.observation_names) if name.startswith("smoothed action: believed force")]
     taken: dict[str, list[Array]] = {

@@ -6,6 +6,7 @@ from typing import Any
 
 from agents.residual_law import ResidualActuation
 from agents.settings import ResidualSettings
+from birthsim_env.assembly import refuse_unknown
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.parameters import load_parameters
 from birthsim_env.vector_env import BirthSIMVectorEnv
@@ -23,9 +24,12 @@ class _LawInside:
         time_constant: float = ResidualSettings.time_constant,
         **arguments: Any,
     ) -> None:
-        for name in ("action_mode", "valves", "actuation"):
+        inside = ("action_mode", "valves", "actuation")
+        for name in inside:
             if name in arguments:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
+        own = ("law", "impedance", "authority", "time_constant", "num_envs", "max_episode_steps", "autoreset_mode")
+        refuse_unknown(arguments, own, inside)
         rig = load_parameters(arguments.pop("parameters", None))
         period = arguments.get("policy_period", ResidualSettings.policy_period)
         settings = ResidualSettings(law, impedance, authority, time_constant, period)

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 
 class SB3VecEnv(VecEnv):
-    """Makes ``gymnasium.make_vec(id, num_envs=N)`` usable by Stable-Baselines3.
+    """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
 
     Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
     ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in steps of
@@ -24,7 +24,7 @@ class SB3VecEnv(VecEnv):
 
     def __init__(self, env: Any, staggered: bool = False) -> None:
         if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
-            raise ValueError(f"env = {env!r}; allowed: a vector environment that resets within the same step")
+            raise ValueError(f"env = {env!r}; allowed: one made with autoreset_mode='SameStep'")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.seconds = 0.0

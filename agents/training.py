@@ -7,9 +7,9 @@ from typing import Any
 
 import gymnasium
 import torch
+from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecNormalize
 
-import agents
 from agents.algorithms import make_model
 from agents.checkpoint import load_checkpoint
 from agents.configuration import TrainingSettings
@@ -19,8 +19,6 @@ from agents.settings import LAWS, ResidualSettings
 from agents.validation import SEED_SPACING, TRAINING_SEED
 
 __all__ = ["train"]
-
-assert agents  # importing it registers the residual environments
 
 
 def train(
@@ -41,6 +39,7 @@ def train(
     torch.set_num_threads(1)
     arguments = {
         "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
+        "autoreset_mode": AutoresetMode.SAME_STEP,
     }  # fmt: skip
     env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments), staggered=True)
     checks = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)

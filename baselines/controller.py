@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -23,6 +23,22 @@ class Controller(Protocol):
     def command(self, measurement: Measurement, reference: Reference) -> Array: ...
 
     def reset(self, lanes: Mask | None = None) -> None: ...
+
+
+def checked_command(name: str, command: Any, lanes: int) -> Array:
+    """Spool openings (4, ``lanes``) that the controller ``name`` returned; ``ValueError`` in one line for anything else."""
+    expected = f"allowed: spool openings of chambers P1, N1, P2, N2 of {lanes} lanes, an array (4, {lanes}) in [-1, 1]"
+    try:
+        array = np.asarray(command, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"controller {name!r}: command() returned {command!r}; {expected}") from None
+    if array.shape != (4, lanes):
+        returned = "None" if command is None else f"an array {array.shape}"
+        raise ValueError(f"controller {name!r}: command() returned {returned}; {expected}")
+    if not np.abs(array).max() <= 1.0:
+        row, lane = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
+        raise ValueError(f"controller {name!r}: command()[{row}, {lane}] = {array[row, lane]}; {expected}")
+    return array
 
 
 def lanes_of(measurement: Measurement, reference: Reference) -> int:

@@ -8,11 +8,12 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 import birthsim_env
-from baselines.controller import Controller
+from baselines.controller import Controller, checked_command
 from baselines.feasibility import demand
 from baselines.metrics import UNITS, EpisodeMetrics
 from baselines.statistics import in_words, judged, number, summarize
@@ -100,7 +101,9 @@ def _run_batch(
     progress: bool,
 ) -> None:
     period = birthsim_env.parameters.load_parameters(arguments.get("parameters")).electronics.control_period
-    env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, **arguments)
+    env: Any = gymnasium.make_vec(
+        environment, num_envs=len(seeds), policy_period=period, autoreset_mode=AutoresetMode.SAME_STEP, **arguments
+    )
     _, info = env.reset(seed=list(seeds))
     controller.reset()
     asked = demand(env)
@@ -114,6 +117,7 @@ def _run_batch(
         started = time.perf_counter()
         command = controller.command(env.measurement, env.reference)
         spent.append((time.perf_counter() - started) * 1e6 / len(seeds))
+        command = checked_command(result.controller, command, len(seeds))
         metrics.add(info, command, alive)
         if step % every == 0:
             trace[step // every, alive] = info["tracking_error"][alive]
@@ -144,6 +148,10 @@ def overview(evaluations: list[Evaluation]) -> str:
         summary = summarize(judged(one.metrics["settled_rms"], one.lost, applies=True))
         figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
         lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
+        unsaid = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
+        if unsaid:
+            # A hand that jumps all the time leaves nothing settled.
+            lines.append(f"{'':{width}}{unsaid} of {len(one.lost)} episodes were never settled and are left out above")
     return "\n".join(lines)
 
 

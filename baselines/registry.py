@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any
 
 from baselines.admittance_backstepping import AdmittanceBackstepping
@@ -70,12 +71,21 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             return made
     path, _, attribute = name.rpartition(":")
     if path.endswith(".py"):
-        factory = _from_file(Path(path), attribute)
-        own = factory(parameters, **options) if callable(factory) else None
-        if not (callable(getattr(own, "command", None)) and callable(getattr(own, "reset", None))):
-            raise ValueError(f"controller = {name!r}; allowed: a class with command() and reset()")
-        return own
+        return _own(name, _from_file(Path(path), attribute), parameters, options)
     raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+
+
+def _own(name: str, factory: Any, parameters: Parameters, options: dict[str, Any]) -> Controller:
+    """A controller of a user's own class; raises ``ValueError`` naming what it lacks, in one line."""
+    expected = "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset()"
+    try:
+        own = factory(parameters, **options)
+    except Exception as error:
+        raise ValueError(f"controller = {name!r} cannot be made ({type(error).__name__}: {error}); {expected}") from error
+    if not (callable(getattr(own, "command", None)) and callable(getattr(own, "reset", None))):
+        raise ValueError(f"controller = {name!r} is made without command() or reset(); {expected}")
+    made: Controller = own
+    return made
 
 
 def _from_file(path: Path, attribute: str) -> Factory:
@@ -85,7 +95,14 @@ def _from_file(path: Path, attribute: str) -> Factory:
         raise ValueError(f"controller file {str(path)!r} does not exist; allowed: path/to/file.py:Class")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # where dataclasses look their annotations up
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[spec.name]
+        line = next((frame.lineno for frame in reversed(extract_tb(error.__traceback__)) if frame.filename == str(path)), None)
+        place = "" if line is None else f", line {line}"
+        problem = f"{type(error).__name__}: {error}"
+        raise ValueError(f"controller file {str(path)!r}{place}: {problem}; allowed: a file that Python imports") from error
     if not hasattr(module, attribute):
         raise ValueError(f"controller file {str(path)!r} has no {attribute!r}; allowed: a class with command() and reset()")
     factory: Factory = getattr(module, attribute)

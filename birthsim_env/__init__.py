@@ -1,6 +1,7 @@
 """BirthSIM: a pneumatic haptic interface as Gymnasium environments.
 
-Importing this package registers ``BirthSIM/Circle-v0``, ``Probe-v0``, ``Descent-v0``, ``Forceps-v0`` and ``Dystocia-v0``.
+Importing this package registers ``BirthSIM/Circle-v0``, ``Probe-v0``, ``Descent-v0``, ``Forceps-v0`` and ``Dystocia-v0``, and
+their siblings with a law inside, ``BirthSIM/CircleResidual-v0`` and so on.
 """
 
 from gymnasium.envs.registration import register, registry
@@ -29,12 +30,13 @@ __all__ = [
 
 __version__ = "0.1.0"
 
+_KINDS = {
+    "": ("birthsim_env.env:BirthSIMEnv", "birthsim_env.vector_env:BirthSIMVectorEnv"),
+    # Only names: the package above is imported when such an environment is made.
+    "Residual": ("agents.residual_env:ResidualEnv", "agents.residual_env:ResidualVectorEnv"),
+}
 for _scenario in SCENARIOS:
-    _id = f"BirthSIM/{_scenario.capitalize()}-v0"
-    if _id not in registry:
-        register(
-            _id,
-            entry_point="birthsim_env.env:BirthSIMEnv",
-            vector_entry_point="birthsim_env.vector_env:BirthSIMVectorEnv",
-            kwargs={"scenario": _scenario},
-        )
+    for _kind, (_single, _vector) in _KINDS.items():
+        _id = f"BirthSIM/{_scenario.capitalize()}{_kind}-v0"
+        if _id not in registry:
+            register(_id, entry_point=_single, vector_entry_point=_vector, kwargs={"scenario": _scenario})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,9 @@ from birthsim_env.user_forces import UserForce
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
+
+ROUNDING = 2.0**-20
+"""So far beyond 1 an action still counts as 1: eight units in the last place of a single, as rounding may leave them."""
 
 
 def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
@@ -69,9 +72,9 @@ class Setup:
     observation_names: tuple[str, ...]
 
     @property
-    def frames_per_second(self) -> float:
-        """Rate at which a frame per policy step shows real time."""
-        return 1 / self.policy_period
+    def frames_per_second(self) -> int:
+        """Rate at which a frame per policy step shows real time, rounded: recorders and players take whole numbers."""
+        return max(1, round(1 / self.policy_period))
 
     @property
     def steps(self) -> int:
@@ -96,10 +99,9 @@ def assemble(
     picture_size: tuple[int, int] = (640, 480),
     **unknown: Any,
 ) -> Setup:
-    """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed."""
-    if unknown:
-        known = [name for name in inspect.signature(assemble).parameters if name not in ("num_envs", "scenario", "unknown")]
-        raise ValueError(f"unknown argument {', '.join(map(repr, unknown))}; allowed: {', '.join(known)}")
+    """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed, and
+    ``TypeError`` for arguments that there are not."""
+    refuse_unknown(unknown)
     table = SCENARIOS[one_of("scenario", scenario, tuple(SCENARIOS))]
     rig = load_parameters(parameters)
     one_of("valves", valves, VALVE_LAYOUTS)
@@ -141,6 +143,17 @@ def assemble(
     )
 
 
+def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Sequence[str] = ()) -> None:
+    """Raise ``TypeError``, as Python does, for argument names that ``assemble`` has not; ``more`` and ``less`` than its own are
+    allowed in a derived environment."""
+    own = [name for name in inspect.signature(assemble).parameters if name not in ("num_envs", "scenario", "unknown", *less)]
+    known = [*more, *own, "render_mode"]
+    wrong = [name for name in unknown if name not in known]
+    if wrong:
+        # In Python's words: TorchRL, for one, looks for them.
+        raise TypeError(f"got an unexpected keyword argument {', '.join(map(repr, wrong))}; allowed: {', '.join(known)}")
+
+
 def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong."""
     try:
@@ -152,8 +165,8 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
         shown = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
         raise ValueError(f"action has shape {shown}; allowed: {shape}, in [-1, 1]")
     extreme = np.abs(array).max()
-    if not extreme <= 1.0:
-        lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
+    if not extreme <= 1.0 + ROUNDING:
+        lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0 + ROUNDING))[0])
         raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1")
     # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
-    return np.array(array.T, order="C")
+    return np.array(array.T.clip(-1.0, 1.0), order="C")

@@ -13,6 +13,7 @@ from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_o
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
+from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.signals import Measurement, Reference
 
 _ONE = np.ones(1, dtype=np.bool_)
@@ -76,7 +77,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     scenario's end. `reset(options={"position": (x, y)})` starts the end effector there, at rest.
 
     ## Info
-    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, and the reward terms.
+    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, and the reward terms, which are
+    zero after `reset`.
 
     ## Arguments
     - `action_mode`, `valves`: see above.
@@ -153,7 +155,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(_ONE, options)
         self._render_human()
-        return self._episodes.observation()[0], single_info(self._episodes.describe())
+        return self._episodes.observation()[0], {**single_info(self._episodes.describe()), **dict.fromkeys(REWARD_TERMS, 0.0)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""

@@ -38,6 +38,10 @@ class Episodes:
         self._renderer: Renderer | None = None
         self._path: Array | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the renderer, whose surfaces belong to this process; another is made when it is asked for."""
+        return {**self.__dict__, "_renderer": None}
+
     @property
     def duration(self) -> float:
         """Of an episode that nothing ends early, s."""
@@ -49,10 +53,11 @@ class Episodes:
             self._seeds = lane_seeds(seed, len(self.elapsed), generator)
             self._numbers[:] = -1
 
-    def begin(self, lanes: Mask, options: dict[str, Any] | None = None) -> None:
-        """Start the next episode in the lanes of a mask (N,)."""
+    def begin(self, lanes: Mask, options: dict[str, Any] | None = None, again: bool = False) -> None:
+        """Start the next episode in the lanes of a mask (N,), or the present one ``again``."""
         position = _start(options)
-        self._numbers[lanes] += 1
+        if not again:
+            self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
         self._action[:, lanes] = 0.0
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)

@@ -13,6 +13,7 @@ from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_o
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import vector_info
 from birthsim_env.lanes import Array
+from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.signals import Measurement, Reference
 
 Observations = NDArray[np.float32]
@@ -22,16 +23,17 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     """``num_envs`` lanes of a scenario, made by ``gymnasium.make_vec(id, num_envs=N)``.
 
     Actions, observations, rewards, arguments and episode ends are those of ``BirthSIMEnv``, per lane; arrays carry the lane
-    first. A lane that ends starts anew within the same step (``AutoresetMode.SAME_STEP``): ``infos["final_obs"]`` and
-    ``infos["final_info"]`` hold what it ended with. ``reset(seed=s)`` seeds lane i with s + i (a list gives every lane its
-    own seed); lane i seeded s runs bit for bit as the single environment seeded s. ``max_episode_steps`` shortens episodes.
+    first. ``reset(seed=s)`` seeds lane i with s + i (a list gives every lane its own seed); lane i seeded s runs bit for bit
+    as the single environment seeded s. ``max_episode_steps`` shortens episodes.
+
+    ``autoreset_mode`` says what happens to a lane that ends, as in Gymnasium (``AutoresetMode`` or its value):
+    - ``NEXT_STEP`` (default): the next step ignores its action and returns the first observation of its new episode, reward 0;
+    - ``SAME_STEP``: it starts anew within the same step; ``infos["final_obs"]`` and ``infos["final_info"]`` hold what it ended
+      with;
+    - ``DISABLED``: it waits for ``reset(options={"reset_mask": mask})`` with a mask (num_envs,) of bool.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012  Gymnasium declares it so
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 100,
-        "autoreset_mode": AutoresetMode.SAME_STEP,
-    }
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012  Gymnasium declares it so
 
     def __init__(
         self,
@@ -39,6 +41,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         num_envs: int = 1,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **arguments: Any,
     ) -> None:
         if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
@@ -48,8 +51,14 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         if max_episode_steps is not None and not (isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1):
             raise ValueError(f"max_episode_steps = {max_episode_steps!r}; allowed: None, -1 (no limit) or a whole number >= 1")
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
+            raise ValueError(f"autoreset_mode = {autoreset_mode!r}; allowed: {allowed}") from None
         setup = assemble(int(num_envs), scenario, **arguments)
-        self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
+        frames = setup.frames_per_second
+        self.metadata = {**self.metadata, "render_fps": frames, "autoreset_mode": self.autoreset_mode}
         self.num_envs = int(num_envs)
         self.single_observation_space, self.single_action_space = setup.single_observation_space, setup.single_action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -59,6 +68,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self.steps = min(setup.steps, max_episode_steps or setup.steps)
         """Policy steps of an episode that nothing ends early."""
         self._episodes = Episodes(setup)
+        self._ended: NDArray[np.bool_] = np.zeros(self.num_envs, dtype=np.bool_)
 
     @property
     def measurement(self) -> Measurement:
@@ -80,24 +90,49 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         """
         super().reset(seed=seed if isinstance(seed, int) else None)
         options = dict(options or {})
+        lanes = self._mask(options.pop("reset_mask", None))
         staggered = options.pop("staggered", False)
         if not isinstance(staggered, bool):
             raise ValueError(f"options['staggered'] = {staggered!r}; allowed: True or False")
         self._episodes.seed(seed, self.np_random)
-        self._episodes.begin(np.ones(self.num_envs, dtype=np.bool_), options)
+        self._episodes.begin(lanes, options)
+        self._ended = self._ended & ~lanes
         if staggered:
             self._episodes.elapsed[:] = np.arange(self.num_envs) * self.steps // self.num_envs
-        return self._episodes.observation(), vector_info(self._episodes.describe())
+        terms = {name: np.zeros(self.num_envs) for name in REWARD_TERMS}
+        return self._episodes.observation(), {**vector_info(self._episodes.describe()), **terms}
+
+    def _mask(self, mask: Any) -> NDArray[np.bool_]:
+        """The lanes to reset: all, or those of ``options["reset_mask"]``."""
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        lanes = np.asarray(mask)
+        if lanes.shape != (self.num_envs,) or lanes.dtype != np.bool_ or not lanes.any():
+            raise ValueError(f"options['reset_mask'] = {mask!r}; allowed: ({self.num_envs},) of bool, at least one True")
+        return lanes
 
     def step(self, actions: NDArray[Any]) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """One policy step of all lanes; raises ``ValueError`` for actions that are not (num_envs, size) numbers in [-1, 1]."""
         episodes = self._episodes
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise ValueError(
+                f"lanes {np.flatnonzero(self._ended).tolist()} have ended; allowed: reset(options={{'reset_mask': ...}})"
+            )
         rewards, terms, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
+        if self._ended.any():
+            # They have begun when they ended, so that nothing that is lost is integrated further; their first step is undone.
+            episodes.begin(self._ended, again=True)
+            for values in (rewards, *terms.values()):
+                values[self._ended] = 0.0
+            terminated = terminated & ~self._ended
         truncated = (episodes.elapsed >= self.steps) & ~terminated
         observation = episodes.observation()
         infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms}
         ended = terminated | truncated
-        if ended.any():
+        self._ended = ended if self.autoreset_mode is not AutoresetMode.SAME_STEP else self._ended
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and ended.any():
+            episodes.begin(ended)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
             last, final = observation, infos
             episodes.begin(ended)
             observation = episodes.observation()

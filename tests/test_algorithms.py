@@ -25,7 +25,7 @@ VARIABLE = ResidualSettings(impedance="variable")
 def made(settings, residual=VARIABLE, **arguments):
     """A new model, its normalised environment and the native one below it."""
     torch.set_num_threads(1)
-    native = gymnasium.make_vec(CIRCLE, num_envs=settings.lanes, **residual.to_dict(), **arguments)
+    native = gymnasium.make_vec(CIRCLE, num_envs=settings.lanes, autoreset_mode="SameStep", **residual.to_dict(), **arguments)
     env = VecNormalize(SB3VecEnv(native), gamma=settings.discount)
     return make_model(settings, env), env, native
 

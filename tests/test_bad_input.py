@@ -137,7 +137,10 @@ def test_unknown_ids_and_arguments_name_themselves():
     message = refusal(lambda: gymnasium.make("BirthSIM/Square-v0"), gymnasium.error.NameNotFound)
     assert "Square" in message
     assert "v0" in refusal(lambda: gymnasium.make("BirthSIM/Circle-v9"), gymnasium.error.VersionNotFound)
-    names_all(refusal(lambda: gymnasium.make(CIRCLE, sensor="lab")), ("'sensor'", "action_mode, valves, sensors, randomize"))
+    names_all(
+        refusal(lambda: gymnasium.make(CIRCLE, sensor="lab"), TypeError),
+        ("'sensor'", "action_mode, valves, sensors, randomize"),
+    )
 
 
 def test_the_policy_period_follows_the_rigs_own_control_period():

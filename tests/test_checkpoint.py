@@ -57,7 +57,8 @@ def brief(monkeypatch):
 def new(algorithm="ppo", seed=0):
     """A model and its normalised environment that have seen nothing yet."""
     torch.set_num_threads(1)
-    env = VecNormalize(SB3VecEnv(gymnasium.make_vec(PROBE, num_envs=TINY.lanes, duration=0.5, randomize=True)))
+    arguments = {"duration": 0.5, "randomize": True, "autoreset_mode": "SameStep"}
+    env = VecNormalize(SB3VecEnv(gymnasium.make_vec(PROBE, num_envs=TINY.lanes, **arguments)))
     return make_model(replace(TINY, algorithm=algorithm, seed=seed), env), env
 
 

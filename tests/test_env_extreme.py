@@ -43,7 +43,9 @@ def random_actions(rng: np.random.Generator, steps: int, lanes: int, size: int) 
 @pytest.mark.parametrize("seed", range(len(SETUPS)), ids=["-".join(setup) for setup in SETUPS])
 def test_random_policies_leave_only_finite_states(seed: int, lanes: int, steps: int) -> None:
     name, valves, friction = SETUPS[seed]
-    env = gymnasium.make_vec(name, num_envs=lanes, parameters=corner(seed, friction), valves=valves, randomize="scenario")
+    env = gymnasium.make_vec(
+        name, num_envs=lanes, parameters=corner(seed, friction), valves=valves, randomize="scenario", autoreset_mode="SameStep"
+    )
     env.reset(seed=seed)
     ended = beyond = 0
     for actions in random_actions(np.random.default_rng(seed), steps, lanes, env.single_action_space.shape[0]):

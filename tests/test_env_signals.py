@@ -95,7 +95,7 @@ def test_info_has_every_documented_field_and_agrees_with_the_plant():
     env = make("BirthSIM/Forceps-v0", randomize=True)
     _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
     for step, info in enumerate(infos):
-        assert set(info) == set(FIELDS) | (set(TERMS) if step else set())
+        assert set(info) == {*FIELDS, *TERMS}
         for field, (size, _) in FIELDS.items():
             assert isinstance(info[field], float) if size == 1 else info[field].shape == (size,), field
         assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)

@@ -275,7 +275,7 @@ def test_commands_that_are_not_openings_stop_the_evaluation_by_name():
         def command(self, measurement, reference, believed_force=None):
             return np.full((4, measurement.position.shape[1]), np.nan)
 
-    with pytest.raises(ValueError, match=r"action\[0\] = nan in lane 0; allowed: -1 to 1"):
+    with pytest.raises(ValueError, match=r"command\(\)\[0, 0\] = nan; allowed: spool openings"):
         run(Broken())
 
 

@@ -59,7 +59,7 @@ def settled_rms(record, setpoint):
 def test_the_record_is_the_experiment_of_the_paper(records):
     record = records["backstepping", "ideal"]
     time = record["time"]
-    assert set(record) == set(FIELDS)
+    assert set(record) == {*FIELDS, "lost"}
     np.testing.assert_allclose(time, 1e-3 * np.arange(16001), atol=1e-9)
     # Two identical halves: circles of 50 mm in 4 s about the centre, pushes of 30 N; stiffness doubles, pneumatic falls.
     circle = 0.05 * np.stack([np.cos(np.pi / 2 * time), np.sin(np.pi / 2 * time)], axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.backstepping import BacksteppingController
+from baselines.controller import checked_command
 from baselines.registry import controller_names, make_controller
 from birthsim_env import Parameters
 from tests.test_evaluation import Spy, run
@@ -95,11 +96,38 @@ def test_the_named_controllers_are_the_law_with_and_without_weight():
         ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Class"),
         ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a class with command\(\) and reset\(\)"),
         ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a class"),
-        ("own.py:number", r"'{folder}/own\.py:number'.* allowed: a class with command\(\) and reset\(\)"),
-        ("own.py:Wordless", r"'{folder}/own\.py:Wordless'.* allowed: a class with command\(\) and reset\(\)"),
+        ("own.py:number", r"'{folder}/own\.py:number' cannot be made \(TypeError: .*\); allowed: a class that takes the rig"),
+        ("own.py:Wordless", r"'{folder}/own\.py:Wordless' is made without command\(\) or reset\(\); allowed: a class that"),
     ],
 )
 def test_what_is_no_controller_is_refused_with_its_name_and_what_there_is(own, name, message):
     given = f"{own.parent}/{name}" if ".py" in name else name
     with pytest.raises(ValueError, match=message.replace("{folder}", str(own.parent))):
         make_controller(given, RIG)
+
+
+def test_a_file_that_does_not_import_is_refused_with_its_line(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("import numpy\nimport no_such_module\n")
+    with pytest.raises(ValueError, match=r"broken\.py', line 2: ModuleNotFoundError: No module named 'no_such_module'"):
+        make_controller(f"{path}:Own", RIG)
+    path.write_text("class Own:\n    pass\n")
+    with pytest.raises(ValueError, match=r"cannot be made \(TypeError: Own\(\) takes no arguments\); allowed: a class"):
+        make_controller(f"{path}:Own", RIG)
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        (np.zeros(4), r"returned an array \(4,\)"),
+        ([[0.0] * 2] * 3, r"returned an array \(3, 2\)"),
+        (None, "returned None"),
+        ("open", "returned 'open'"),
+        (np.full((4, 2), np.nan), r"command\(\)\[0, 0\] = nan"),
+        (np.full((4, 2), 1.5), r"command\(\)\[0, 0\] = 1\.5"),
+    ],
+)
+def test_a_command_that_is_none_is_refused_by_name(returned, words):
+    with pytest.raises(ValueError, match=rf"controller 'mine': .*{words}; allowed: spool openings .* an array \(4, 2\)"):
+        checked_command("mine", returned, 2)
+    assert checked_command("mine", [[0.0, 1.0]] * 4, 2).shape == (4, 2)

@@ -210,6 +210,7 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     )
     train(settings, residual, tmp_path, rig)
     expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
+    expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
     for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
         assert name == "BirthSIM/ForcepsResidual-v0"
         assert arguments == {**expected, "num_envs": lanes}

@@ -16,7 +16,7 @@ TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_ch
 
 
 def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
-    env = gymnasium.make_vec(name, num_envs=lanes, **arguments)
+    env = gymnasium.make_vec(name, num_envs=lanes, **{"autoreset_mode": "SameStep", **arguments})
     assert type(env) is BirthSIMVectorEnv
     return env
 
@@ -135,7 +135,7 @@ def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
             np.testing.assert_array_equal(infos["final_obs"][lane], last)
             assert_same(info, lane_of(infos["final_info"], lane))
             np.testing.assert_array_equal(observation[lane], after[0])
-            assert_same(after[1], {name: infos[name][lane] for name in FIELDS})
+            assert_same({name: after[1][name] for name in FIELDS}, {name: infos[name][lane] for name in FIELDS})
             assert (infos["time"][lane], infos[TERMS[-1]][lane]) == (0.0, -250.0 if dead else 0.0)
             instants[lane].append(step)
         if ended.any():

@@ -7,15 +7,12 @@ from pathlib import Path
 
 import gymnasium
 
-import agents
 import birthsim_env
 from agents.settings import NO_LAW
 from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number, whole, write_json
 from baselines.evaluation import Evaluation, evaluate, overview, table
 from baselines.registry import controller_names, make_controller
-
-assert agents  # importing it registers the residual environments
 
 
 def main() -> None:

@@ -14,7 +14,6 @@ from typing import Any
 import gymnasium
 from tqdm import tqdm
 
-import agents
 from agents.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
@@ -56,7 +55,6 @@ def main() -> None:
 def _train(arguments: argparse.Namespace) -> None:
     training, residual = _settings(arguments)
     known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" in name)
-    assert agents
     if training.environment not in known:
         raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
     rig = load_parameters(arguments.parameters)

@@ -40,7 +40,8 @@ def main() -> None:
 def record_run(
     controller: str, sensors: str = "ideal", parameters: Any = None, picture: Path | None = None
 ) -> dict[str, Array]:
-    """The nominal Circle under a controller at the control rate: the ``info`` fields over time, SI units.
+    """The nominal Circle under a controller at the control rate: the ``info`` fields over time, SI units; and ``lost``,
+    which is True where it ended before its time.
 
     ``picture`` is where to save what the rig looks like during the first push.
     """
@@ -50,7 +51,7 @@ def record_run(
     law = make_controller(controller, rig)
     machine: Any = env.unwrapped
     _, info = env.reset(seed=0)
-    record: dict[str, list[Any]] = {name: [info[name]] for name in FIELDS}
+    record: dict[str, list[Any]] = {**{name: [info[name]] for name in FIELDS}, "lost": [False]}
     ended = False
     with tqdm(desc="Fig. 4", unit=" steps", leave=False) as bar:
         while not ended:
@@ -58,6 +59,7 @@ def record_run(
             _, _, terminated, truncated, info = env.step(command)
             for name in FIELDS:
                 record[name].append(info[name])
+            record["lost"].append(terminated)
             ended = terminated or truncated
             if len(record["time"]) % 500 == 0:
                 bar.update(500)
@@ -72,7 +74,7 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
     error, stiffness = 1e3 * record["tracking_error"], record["stiffness_setpoint"][:, 0]
     settled = record["since_jump"] >= SETTLED
     result: dict[str, Any] = {}
-    for setpoint in np.unique(stiffness):
+    for setpoint in np.unique(stiffness[settled]):
         chosen = settled & (stiffness == setpoint)
         result[f"settled_rms_mm_at_{setpoint:.0f}"] = np.sqrt((error[chosen] ** 2).mean(axis=0)).tolist()
         result[f"settled_max_mm_at_{setpoint:.0f}"] = np.abs(error[chosen]).max(axis=0).tolist()
@@ -82,6 +84,7 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
     result["least_clearance_mm"] = (1e3 * (half - np.abs(record["piston_position"]).max(axis=0))).tolist()
     result["finite"] = bool(all(np.isfinite(values).all() for values in record.values()))
     result["duration_s"] = float(record["time"][-1])
+    result["lost"] = bool(record["lost"][-1])
     return result
 
 
@@ -94,6 +97,12 @@ def _figure4(arguments: argparse.Namespace) -> None:
 
     figure4(record, folder)
     write_json(folder / "figure4.json", result)
+    if result["lost"]:
+        raise ValueError(
+            f"{arguments.controller} lost the end effector after {result['duration_s']:.3g} s: a piston ran "
+            f"into its stop, or a chamber left its range; {folder}/ has what came before. Allowed: a rig that "
+            f"carries {rig.mechanics.mass:g} kg"
+        )
     print(f"Fig. 4 with {arguments.controller}, {arguments.sensors} sensors, {result['duration_s']:g} s\n")
     print(f"{'':44}{'x or 1':>10}{'y or 2':>10}")
     for name, values in result.items():

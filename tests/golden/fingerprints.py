@@ -15,14 +15,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import agents
 from agents.policy_files import load_policy
 from agents.seeds import best_policy
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from birthsim_env import Parameters
 from birthsim_env.scenarios import SCENARIOS
 
-assert agents  # importing it registers the residual environments
 
 FILE = Path(__file__).parent / "fingerprints.json"
 LANES, SEED = 3, 7

@@ -1,0 +1,113 @@
+"""What happens to a lane that ends, in every mode that Gymnasium knows, and Gymnasium's own wrappers around it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
+
+import birthsim_env
+
+assert birthsim_env  # importing it registers the ids
+PROBE = "BirthSIM/Probe-v0"
+SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0]], np.float32)
+
+
+def make(mode=AutoresetMode.NEXT_STEP, lanes=2, **arguments):
+    return gymnasium.make_vec(PROBE, num_envs=lanes, duration=0.4, randomize=True, autoreset_mode=mode, **arguments)
+
+
+def test_the_next_step_is_gymnasiums_own_default_and_does_what_its_vectorization_does():
+    native = gymnasium.make_vec(PROBE, num_envs=2, duration=0.4, randomize=True)
+    generic = gymnasium.make_vec(PROBE, num_envs=2, vectorization_mode="sync", duration=0.4, randomize=True)
+    assert native.autoreset_mode is native.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    for one, other in zip(native.reset(seed=3), generic.reset(seed=3), strict=True):
+        if isinstance(one, np.ndarray):
+            np.testing.assert_array_equal(one, other)
+    ends = 0
+    for _ in range(120):
+        (*mine, info), (*its, other) = native.step(SLAM), generic.step(SLAM)
+        for one, expected in zip(mine, its, strict=True):
+            np.testing.assert_array_equal(one, expected)
+        np.testing.assert_array_equal(info["position"], other["position"])
+        ends += mine[2] + mine[3]
+    assert (ends >= 2).all(), "both lanes begin anew, one after it was lost, one at its end"
+
+
+def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
+    env = make("Disabled", lanes=2)
+    env.reset(seed=0)
+    while True:
+        terminated = env.step(SLAM)[2]
+        if terminated.any():
+            break
+    with pytest.raises(ValueError, match=r"lanes \[0\] have ended; allowed: reset\(options=\{'reset_mask': ...\}\)"):
+        env.step(SLAM)
+    _, info = env.reset(options={"reset_mask": terminated})
+    assert info["time"][0] == 0.0
+    assert info["time"][1] > 0.0
+    env.step(SLAM)
+    for mask in (np.array([1, 0]), np.array([True]), np.array([False, False])):
+        with pytest.raises(ValueError, match=r"options\['reset_mask'\] = .*; allowed: \(2,\) of bool"):
+            env.reset(options={"reset_mask": mask})
+
+
+def test_an_unknown_mode_is_refused():
+    with pytest.raises(ValueError, match="autoreset_mode = 'never'; allowed: 'NextStep', 'SameStep', 'Disabled'"):
+        make("never")
+
+
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        wrappers.NormalizeObservation,
+        wrappers.NormalizeReward,
+        wrappers.RecordEpisodeStatistics,
+        wrappers.DictInfoToList,
+        lambda env: wrappers.TransformObservation(env, lambda seen: 2 * seen),
+        lambda env: wrappers.RescaleAction(env, np.float32(-0.5), np.float32(0.5)),
+        lambda env: wrappers.ClipReward(env, -1.0, 1.0),
+        lambda env: wrappers.FlattenObservation(env),
+    ],
+)
+def test_gymnasiums_vector_wrappers_take_it(wrap):
+    env = wrap(make())
+    env.reset(seed=0)
+    for _ in range(60):
+        observation, rewards, *_ = env.step(0.5 * SLAM)
+    assert np.isfinite(observation).all()
+    assert np.isfinite(rewards).all()
+
+
+def test_reset_and_step_say_the_same_things():
+    single, lanes = gymnasium.make(PROBE), make()
+    assert single.reset(seed=0)[1].keys() == single.step(np.zeros(4))[4].keys()
+    assert lanes.reset(seed=0)[1].keys() == lanes.step(0 * SLAM)[4].keys()
+
+
+def test_rounding_in_single_precision_is_no_error_and_the_frame_rate_is_whole():
+    env = gymnasium.make(PROBE, policy_period=0.03)
+    env.reset(seed=0)
+    env.step(np.full(4, np.nextafter(np.float32(1), np.float32(2)), np.float32))
+    with pytest.raises(ValueError, match=r"action\[0\] = 1\.0001"):
+        env.step(np.array([1.0001, 0, 0, 0]))
+    assert env.metadata["render_fps"] == 33
+    assert isinstance(env.metadata["render_fps"], int)
+
+
+@pytest.mark.parametrize("twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_an_environment_that_has_drawn_can_be_copied(twin):
+    env = gymnasium.make(PROBE, render_mode="rgb_array", sensors="lab", randomize=True).unwrapped
+    env.reset(seed=1)
+    env.render()
+    other = twin(env)
+    for _ in range(5):
+        action = np.full(4, 0.2, np.float32)
+        np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
+    np.testing.assert_array_equal(env.render(), other.render())
+    env.close(), other.close()
