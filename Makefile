@@ -51,7 +51,7 @@ portable: $(READY)
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(OUT)/oldest NUMBA_CACHE_DIR=$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests
