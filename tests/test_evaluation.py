@@ -11,7 +11,7 @@ import pytest
 
 from baselines import evaluation
 from baselines.backstepping import BacksteppingController
-from baselines.evaluation import TRACE, Evaluation, evaluate, table
+from baselines.evaluation import TRACE, Evaluation, evaluate, overview, table
 from baselines.metrics import UNITS, EpisodeMetrics
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
@@ -334,3 +334,11 @@ def test_the_environments_arguments_reach_it():
     run(spy, duration=0.02, episodes=1)
     assert set(FIELDS) >= {"tracking_error", "supply_flow"}
     assert len(spy.commands) == 20
+
+
+def test_the_overview_says_which_episodes_were_never_settled_and_calls_the_lost_ones_lost():
+    one = Evaluation("mine", metrics={**{name: [1.0] * 3 for name in UNITS}, "settled_rms": [0.5, np.nan, np.nan]})
+    one.lost = [False, False, True]
+    lines = overview([one]).splitlines()
+    assert lines[1].split() == ["mine", "lost", "lost", "lost", "1", "of", "3"]
+    assert lines[2].strip() == "1 of 3 episodes were never settled and are left out above"

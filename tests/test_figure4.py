@@ -18,7 +18,7 @@ from baselines.commands.figure4 import FIELDS, figures_of, record_run
 from baselines.evaluation import Evaluation
 from baselines.figures import error_over_time, figure4
 from birthsim_env import Parameters
-from tests.console import strict
+from tests.console import call, strict
 from tests.test_evaluation import Slam, run
 
 RIG = Parameters()
@@ -208,3 +208,13 @@ def test_the_error_over_time_shows_the_median_of_every_controller_in_a_style_of_
     assert axes.get_xlabel() == "time (s)"
     assert axes.get_ylabel() == "tracking error (mm)"
     plt.close(drawn[0])
+
+
+def test_a_rig_that_cannot_carry_its_load_is_said_to_be_lost(tmp_path, monkeypatch, capsys):
+    (tmp_path / "heavy.toml").write_text("[mechanics]\nmass = 400.0\n")
+    arguments = ("--parameters", tmp_path / "heavy.toml", "--out", tmp_path / "out")
+    status, printed, complained = call("figure4", monkeypatch, capsys, *arguments)
+    assert (status, printed) == (2, "")
+    assert "backstepping lost the end effector after 0.001 s" in complained
+    assert complained.rstrip().endswith("Allowed: a rig that carries 400 kg")
+    assert strict(tmp_path / "out" / "figure4.json")["lost"] is True

@@ -365,3 +365,17 @@ def test_the_default_training_improves_on_the_law_on_the_circle(tmp_path):
     assert reached["policy"]["lost"] == 0
     assert reached["policy"]["pooled_mm"] < 0.8 * reached["law"]["pooled_mm"]
     assert reached["policy"]["tail_mm"] < 0.8 * reached["law"]["tail_mm"]
+
+
+def test_a_training_ends_once_it_is_far_enough_below_the_papers_law(tmp_path, short_probe):
+    """The law underneath is better than the paper's from the first validation on; a stricter one than can be is not reached."""
+    easy, residual = replace(BRIEF, until=0.01, steps=2 * BRIEF.steps), ResidualSettings("backstepping-force-first")
+    for settings, enough in ((easy, True), (replace(easy, until=99.9), False)):
+        reached = train(settings, residual, tmp_path / str(enough), Parameters().replace({"mechanics.mass": 3.0}))
+        below = reached["policy"]["pooled_mm"] <= (1 - settings.until / 100) * reached["paper"]["pooled_mm"]
+        assert below == enough
+        assert (reached["curve"][-1]["steps"] < settings.steps) == enough
+    again = train(easy, residual, tmp_path / "True", Parameters().replace({"mechanics.mass": 3.0}), resume=True)
+    assert again["curve"][-1]["steps"] < easy.steps, "resumed, it is still good enough"
+    with pytest.raises(ValueError, match=r"until = 0\.0; allowed: above 0 and up to 100 \(%\)"):
+        replace(easy, until=0.0)
