@@ -155,7 +155,8 @@ def kernel(function: F) -> F:
     """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     folder = _cache_folder()
-    if folder is not None and hasattr(compiled, "_cache"):
+    # With the compiler off there is nothing to keep; what a closure holds, no hash of sources knows.
+    if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None:
         compiled._cache = _DiskCache(function, folder)
     return compiled  # type: ignore[no-any-return]
 

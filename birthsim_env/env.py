@@ -96,8 +96,9 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     Controllers read `env.unwrapped.measurement` and `env.unwrapped.reference`, one rig's `Measurement` and `Reference`.
 
     ## Errors
-    `ValueError` naming the argument, its value and what is allowed: modes, parameters, ranges, references that leave the
-    workspace, actions that are not finite numbers in [-1, 1] of the right shape.
+    `TypeError` for arguments that there are not. `ValueError` naming the argument, its value and what is allowed: modes,
+    parameters, ranges, references that leave the workspace, actions that are not finite numbers in [-1, 1] of the right
+    shape.
 
     ## Version history
     - v0: first version.

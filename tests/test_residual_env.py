@@ -8,7 +8,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
-import agents
+import birthsim_env
 from agents.experience import Experience
 from agents.guard import Guard
 from agents.residual_env import ResidualEnv, ResidualVectorEnv
@@ -20,7 +20,7 @@ from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
 from birthsim_env.scenarios import SCENARIOS
 
-assert agents  # importing it registers the ids
+assert birthsim_env  # importing it registers the ids
 IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v0" for name in SCENARIOS)
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v0", "BirthSIM/ProbeResidual-v0"
 RIG = Parameters()
@@ -298,7 +298,7 @@ def test_importing_twice_registers_once():
 
     before = {name: spec for name, spec in gymnasium.registry.items() if "Residual" in name}
     assert set(before) == set(IDS)
-    importlib.reload(agents)
+    importlib.reload(birthsim_env)
     assert {name: spec for name, spec in gymnasium.registry.items() if "Residual" in name} == before
 
 
