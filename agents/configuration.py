@@ -28,7 +28,7 @@ class TrainingSettings:
     naming what cannot be.
     """
 
-    environment: str = "BirthSIM/CircleResidual-v0"
+    environment: str = "BirthSIM/CircleResidual-v1"
     algorithm: str = "ppo"
     steps: int = 3_000_000
     seed: int = 0

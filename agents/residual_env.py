@@ -67,6 +67,7 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     `impedance`, `authority` (N) and `time_constant` (s).
 
     ## Version history
+    - v1: as `BirthSIMEnv` v1.
     - v0: first version.
     """
 

@@ -60,6 +60,7 @@ class SB3VecEnv(VecEnv):
                 "terminal_observation": info["final_obs"][lane],
                 "TimeLimit.truncated": bool(truncated[lane]),
                 "episode": {"r": float(self._returns[lane]), "l": int(self._lengths[lane])},
+                **({"is_success": bool(info["final_info"]["is_success"][lane])} if "is_success" in info else {}),
             }
         self._returns[ended] = 0
         self._lengths[ended] = 0

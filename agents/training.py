@@ -16,6 +16,7 @@ from agents.configuration import TrainingSettings
 from agents.monitor import Monitor, described
 from agents.sb3_adapter import SB3VecEnv
 from agents.settings import LAWS, ResidualSettings
+from agents.shifted_reward import ShiftedReward
 from agents.validation import SEED_SPACING, TRAINING_SEED
 
 __all__ = ["train"]
@@ -47,7 +48,9 @@ def train(
     if settings.until < 100:
         law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
         paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
-    normalized = VecNormalize(env, gamma=settings.discount)
+    # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
+    paid = ShiftedReward(env, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else env
+    normalized = VecNormalize(paid, gamma=settings.discount)
     model = make_model(settings, normalized, str(folder / "tensorboard"))
     past = (
         load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.compilation import helper, kernel
 from birthsim_env.lanes import Array
-
-SETTLED = 0.5
-"""s after a jump of force or setpoint (or the start) from which an error counts as settled."""
+from birthsim_env.success import SETTLED
 
 QUIET = 1.0
 """s for which reference, force and setpoints must have been constant before motion counts as hunting."""

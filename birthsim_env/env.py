@@ -30,11 +30,11 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     | id | experiment | s |
     |---|---|---|
-    | `BirthSIM/Circle-v0` | Fig. 4: a circle of 50 mm under pushes of 30 N, stiffness 2000 then 4000 N/m | 16 |
-    | `BirthSIM/Probe-v0` | hold still and be pushed: the stiffness test | 5 |
-    | `BirthSIM/Descent-v0` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
-    | `BirthSIM/Forceps-v0` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
-    | `BirthSIM/Dystocia-v0` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
+    | `BirthSIM/Circle-v1` | Fig. 4: a circle of 50 mm under pushes of 30 N, stiffness 2000 then 4000 N/m | 16 |
+    | `BirthSIM/Probe-v1` | hold still and be pushed: the stiffness test | 5 |
+    | `BirthSIM/Descent-v1` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
+    | `BirthSIM/Forceps-v1` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
+    | `BirthSIM/Dystocia-v1` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
 
     ## Action space
     `Box(-1, 1, (n,), float32)`, held for one policy period (10 ms):
@@ -64,11 +64,12 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     | 20 ... | last action | 1 |
 
     ## Reward
-    Per step of 10 ms, the sum of five terms that are also in `info`:
-    `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm) and `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s), e and w
+    Between 0 and 1 per 10 ms, so that ending early never pays, whatever the discount: the sum of five terms that are also in
+    `info`, `reward_survive` = 1 and four that cost a share of c = 8.75:
+    `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm)/c and `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s)/c, e and w
     position and speed relative to the compliant target, except that what a jump of the force or of a stiffness setpoint moves
-    it by is asked for little by little (time constant 60 ms); `reward_effort` = -0.01 sum a^2; `reward_action_change` =
-    -0.05 sum |a - last a|; `reward_failure` = -250 when the episode terminates.
+    it by is asked for little by little (time constant 60 ms); `reward_effort` = -0.04 mean(a^2)/c; `reward_action_change` =
+    -0.2 mean(|a - last a|)/c. An episode that terminates pays nothing more.
 
     ## Start and end of an episode
     It starts on the target, moving with it, chambers in balance with weight and friction at the pneumatic stiffness asked
@@ -77,16 +78,22 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     scenario's end. `reset(options={"position": (x, y)})` starts the end effector there, at rest.
 
     ## Info
-    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, and the reward terms, which are
-    zero after `reset`.
+    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`; the reward terms, which are
+    zero after `reset`; and `is_success`: the settled error, root mean square distance from the compliant target from 0.5 s
+    after a jump on, has been below 1 mm so far, and the episode has not terminated.
 
     ## Arguments
     - `action_mode`, `valves`: see above.
     - `sensors`: `"ideal"`, or `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures.
-    - `randomize`: `False`; `"plant"` draws the rig from its documented ranges at every episode, `"scenario"` varies the
-      experiment, `True` does both; a mapping such as `{"mechanics.mass": (2, 5)}` draws just these parameters.
-    - `reference` (`Trajectory`), `user_force` (`UserForce`), `stiffness` (`StiffnessSchedule`): your own instead of the
-      scenario's.
+    - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
+      (`birthsim_env.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
+      `{"mechanics.mass": (2, 5)}` draws just these parameters.
+    - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
+      CSV file of time, x, y, or `"file.py:Name"`.
+    - `user_force`: likewise: a `UserForce`, a function of time, or of time, position and velocity, that returns (Fx, Fy) in
+      N, a CSV file of time, Fx, Fy, or `"file.py:Name"`; or a hand that comes with the package: `"steps"`, and the moving
+      ones `"sine"`, `"noise"` and `"guided"`, which holds the end effector and has mass, damper and spring.
+    - `stiffness`: a `StiffnessSchedule` of your own.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
     - `actuation`: an object of your own between action and valves (`birthsim_env.actuation.Actuation`) instead of a mode.
@@ -101,6 +108,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     shape.
 
     ## Version history
+    - v1: the reward is never negative; a circle starts without preloaded friction.
     - v0: first version.
     """
 
@@ -156,7 +164,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(_ONE, options)
         self._render_human()
-        return self._episodes.observation()[0], {**single_info(self._episodes.describe()), **dict.fromkeys(REWARD_TERMS, 0.0)}
+        info = {**single_info(self._episodes.describe()), **dict.fromkeys(REWARD_TERMS, 0.0), "is_success": False}
+        return self._episodes.observation()[0], info
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""
@@ -167,6 +176,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         info: dict[str, Any] = single_info(episodes.describe())
         for name, values in terms.items():
             info[name] = float(values[0])
+        info["is_success"] = bool(episodes.success[0])
         self._render_human()
         return episodes.observation()[0], float(rewards[0]), terminated, truncated, info
 

@@ -14,6 +14,7 @@ from birthsim_env.info import describe
 from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
 from birthsim_env.seeding import lane_seeds
 from birthsim_env.signals import Mask
+from birthsim_env.success import Success
 
 if TYPE_CHECKING:
     from birthsim_env.rendering import Renderer
@@ -35,6 +36,7 @@ class Episodes:
         self._seeds: list[int] = []
         self._action: Array = np.zeros((self.action_size, lanes))
         self._moved: Array = np.zeros((4, lanes))
+        self._success = Success(lanes)
         self._renderer: Renderer | None = None
         self._path: Array | None = None
 
@@ -60,6 +62,7 @@ class Episodes:
             self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
         self._action[:, lanes] = 0.0
+        self._success.begin(lanes)
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
         # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
         given = self.simulation.reference.compliant_target(self.simulation.force) - self.simulation.reference.position
@@ -79,8 +82,16 @@ class Episodes:
             simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, jumped, self._moved,
             actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
         )  # fmt: skip
+        self._success.add(
+            simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump, failed
+        )  # fmt: skip
         self._action = actions
         return terms.sum(axis=0), dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
+        return self._success.now
 
     def observation(self) -> NDArray[np.float32]:
         """Observations of all lanes now, (N, size)."""

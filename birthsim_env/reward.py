@@ -1,5 +1,8 @@
 """What a policy is paid, from the true state: to stay on the compliant target, calmly and with little effort.
 
+Every 10 ms pay one, less the share that its costs have of the largest ones. So no step pays less than nothing, and an episode
+that ends early, after which nothing is paid, is never worth more than one that goes on, whatever the discount.
+
 Nothing can follow a jump of the hand. What a jump moves the compliant target by is therefore asked for little by little, and
 the way there is paid as everything else is: a reward that is blind for a while after a jump teaches haste, and rigs near their
 limit do not come back from an overshoot.
@@ -28,11 +31,14 @@ FARTHEST, FASTEST = 1.0, 10.0
 """m, m/s: more than the rig can be off and no more is paid for; what has become no number counts as that."""
 
 HUNTING_COST = 0.2
-EFFORT_COST = 0.01
-ACTION_CHANGE_COST = 0.05
-FAILURE_COST = 250.0
-"""Cost of leaving the physical range: more than the 208 that tracking and hunting cost at most within the 25 steps that a
-discount of 0.96 looks ahead, so that ending early does not pay."""
+EFFORT_COST = 0.04
+"""Of the mean square of the action, per 10 ms."""
+
+ACTION_CHANGE_COST = 0.2
+"""Of the mean change of the action's entries from one policy step to the next, per 10 ms."""
+
+LARGEST_COST = 8.75
+"""All costs together are at most 1.2 ln(1001) + 0.44 = 8.7305 per 10 ms; this is a little more, so that rounding is none."""
 
 GIVING_WAY = 0.06
 """s, time constant of what is asked for after a jump; assumed: about that of ``admittance-backstepping``."""
@@ -43,7 +49,7 @@ PRESSURE_RANGE = (0.2e5, 20e5)
 TEMPERATURE_RANGE = (100.0, 1000.0)
 """K, likewise."""
 
-REWARD_TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
+REWARD_TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 
 @kernel
@@ -52,6 +58,7 @@ def _assess(
     last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     steps, kept = period / 0.01, exact.exp(-period / GIVING_WAY)
+    unit = steps / LARGEST_COST
     for i in range(state.shape[1]):
         given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         error, speed = 0.0, 0.0
@@ -76,11 +83,11 @@ def _assess(
             inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
         inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
         failed[i] = not inside or max(impacts[0, i], impacts[1, i]) > impact_speed
-        terms[0, i] = -cost * steps
-        terms[1, i] = -HUNTING_COST * hunting * steps
-        terms[2, i] = -EFFORT_COST * effort * steps
-        terms[3, i] = -ACTION_CHANGE_COST * turned
-        terms[4, i] = -FAILURE_COST if failed[i] else 0.0
+        terms[0, i] = steps
+        terms[1, i] = -unit * cost
+        terms[2, i] = -unit * HUNTING_COST * hunting
+        terms[3, i] = -unit * EFFORT_COST * effort / action.shape[0]
+        terms[4, i] = -unit * ACTION_CHANGE_COST * turned / action.shape[0]
 
 
 def assess(

@@ -100,7 +100,8 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         if staggered:
             self._episodes.elapsed[:] = np.arange(self.num_envs) * self.steps // self.num_envs
         terms = {name: np.zeros(self.num_envs) for name in REWARD_TERMS}
-        return self._episodes.observation(), {**vector_info(self._episodes.describe()), **terms}
+        success = self._episodes.success
+        return self._episodes.observation(), {**vector_info(self._episodes.describe()), **terms, "is_success": success}
 
     def _mask(self, mask: Any) -> NDArray[np.bool_]:
         """The lanes to reset: all, or those of ``options["reset_mask"]``."""
@@ -127,7 +128,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             terminated = terminated & ~self._ended
         truncated = (episodes.elapsed >= self.steps) & ~terminated
         observation = episodes.observation()
-        infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms}
+        infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms, "is_success": episodes.success}
         ended = terminated | truncated
         self._ended = ended if self.autoreset_mode is not AutoresetMode.SAME_STEP else self._ended
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and ended.any():
@@ -137,7 +138,8 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             episodes.begin(ended)
             observation = episodes.observation()
             # The signals of this instant are those of the new episodes; the reward still belongs to the ended step.
-            infos = {**vector_info(episodes.describe()), **terms, "final_info": {**final, **{f"_{k}": ended for k in final}}}
+            infos = {**vector_info(episodes.describe()), **terms, "is_success": episodes.success}
+            infos["final_info"] = {**final, **{f"_{name}": ended for name in final}}
             infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
             for lane in np.flatnonzero(ended):
                 infos["final_obs"][lane] = last[lane]

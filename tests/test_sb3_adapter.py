@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from agents.sb3_adapter import SB3VecEnv
 
-PROBE, RESIDUAL = "BirthSIM/Probe-v0", "BirthSIM/CircleResidual-v0"
+PROBE, RESIDUAL = "BirthSIM/Probe-v1", "BirthSIM/CircleResidual-v1"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
 """Lane 0 runs into an end stop after some tenths of a second, the others live until their time is over."""
 
@@ -54,7 +54,7 @@ def test_rollouts_are_those_of_the_native_environment_through_several_episodes()
                 assert infos[lane] == {}
                 continue
             ends[int(truncated[lane]), lane] += 1
-            assert set(infos[lane]) == {"terminal_observation", "TimeLimit.truncated", "episode"}
+            assert set(infos[lane]) == {"terminal_observation", "TimeLimit.truncated", "episode", "is_success"}
             np.testing.assert_array_equal(infos[lane]["terminal_observation"], info["final_obs"][lane])
             assert not np.array_equal(infos[lane]["terminal_observation"], observation[lane])
             assert infos[lane]["TimeLimit.truncated"] is bool(truncated[lane])

@@ -59,7 +59,7 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
         env: Any = gymnasium.make_vec(policy.environment, **shared, **policy.settings.to_dict())
     else:
         period = 0.01 if who == "openings" else Parameters().electronics.control_period
-        env = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v0", **shared, policy_period=period)
+        env = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v1", **shared, policy_period=period)
     controller = None if who in ("openings", "residual") else make_controller(who, Parameters())
     rng = np.random.default_rng(SEED)
     observation, _ = env.reset(seed=SEED)

@@ -36,7 +36,7 @@ def plant_run(law: str) -> np.ndarray[Any, Any]:
 
 
 def circle_run() -> np.ndarray[Any, Any]:
-    env = gymnasium.make("BirthSIM/Circle-v0", policy_period=0.001)
+    env = gymnasium.make("BirthSIM/Circle-v1", policy_period=0.001)
     rig: Any = env.unwrapped
     env.reset(seed=0)
     law = BacksteppingController()

@@ -1,0 +1,49 @@
+"""Success is what its definition says of the errors in ``info``, and no lost episode is one."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.registry import make_controller
+from birthsim_env.parameters import Parameters
+from birthsim_env.success import Success
+
+CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
+
+
+@pytest.mark.parametrize(("name", "kept"), [("admittance-backstepping", True), ("backstepping", False)])
+def test_it_is_the_settled_error_so_far(name, kept):
+    env = gymnasium.make(CIRCLE, policy_period=0.001, duration=3.0).unwrapped
+    controller = make_controller(name, Parameters())
+    _, info = env.reset(seed=0)
+    assert info["is_success"] is False
+    every, settled, seen = [], [], set()
+    truncated = False
+    while not truncated:
+        _, _, _, truncated, info = env.step(controller.command(env.measurement, env.reference))
+        squared = float(np.sum(info["tracking_error"] ** 2))
+        every.append(squared)
+        if info["since_jump"] >= 0.5:
+            settled.append(squared)
+        seen.add(info["is_success"])
+        assert info["is_success"] is bool(np.sqrt(np.mean(settled or every)) < 1e-3)
+    assert info["is_success"] is kept
+    assert seen == ({True} if kept else {True, False}), "the start is on the target"
+
+
+def test_a_lost_episode_is_no_success_and_the_next_one_begins_anew():
+    success, zero = Success(2), np.zeros((2, 2))
+    reference = np.zeros((15, 2))
+    reference[8:10] = 2000.0
+    motion, since = np.zeros((4, 2)), np.ones(2)
+    success.add(motion, reference, zero, since, np.array([True, False]))
+    np.testing.assert_array_equal(success.now, [False, True])
+    motion[0] = 0.1
+    success.add(motion, reference, zero, since, np.zeros(2, dtype=bool))
+    assert not success.now.any()
+    success.begin(np.array([True, False]))
+    motion[0] = 0.9e-3
+    success.add(motion, reference, zero, since, np.zeros(2, dtype=bool))
+    np.testing.assert_array_equal(success.now, [True, False])
