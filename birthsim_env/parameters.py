@@ -147,8 +147,9 @@ class Electronics(Part):
 class Parameters:
     """A whole rig. ``Parameters()`` is the paper's BirthSIM with the assumptions of the design made explicit.
 
-    Every part is a frozen dataclass; ``dataclasses.replace`` makes a changed copy, ``from_toml`` and ``to_toml`` read and
-    write a laboratory's own rig (a file names only what differs from the defaults).
+    Every part is a frozen dataclass; ``replace`` makes a changed copy, ``from_toml`` and ``to_toml`` read and write a
+    laboratory's own rig (a file names only what differs from the defaults). ``ranges`` are the owner's own for domain
+    randomisation, (dotted name, low, high): the table ``[randomize]`` of a file, ``"mechanics.mass" = [7.2, 10.8]``.
     Raises ``ValueError`` naming the field, its value and what is allowed.
     """
 
@@ -161,9 +162,10 @@ class Parameters:
     valves: Valves = Valves()
     air: Air = Air()
     electronics: Electronics = Electronics()
+    ranges: tuple[tuple[str, float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
+        for field in _parts(type(self)):
             expected = type(field.default)
             if not isinstance(getattr(self, field.name), expected):
                 raise ValueError(f"{field.name} = {getattr(self, field.name)!r}; allowed: an instance of {expected.__name__}")
@@ -189,7 +191,7 @@ class Parameters:
 
     def _check_dead_volume(self) -> None:
         # A hard collision pushes a piston millimetres into its end stop; the chamber there must not lose all its volume.
-        least = STOP_DEPTH * max(self.cylinder1.area_p, self.cylinder2.area_p)
+        least = least_dead_volume(self)
         if self.chambers.dead_volume < least:
             raise ValueError(
                 f"Chambers.dead_volume = {self.chambers.dead_volume!r} is impossible; allowed: at least {least:.3g} m3, "
@@ -207,18 +209,24 @@ class Parameters:
             )
 
     def replace(self, changes: dict[str, Any]) -> Parameters:
-        """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``."""
+        """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
+
+        What hangs on bores and strokes follows where ``changes`` do not name it: the dead volume grows with the largest
+        piston, the linkage with a stroke of cylinder 1 that it has no room for, k2 with a longer cylinder 2.
+        """
         grouped: dict[str, dict[str, Any]] = {}
         for dotted, value in changes.items():
             section, _, name = dotted.partition(".")
             field_of(dotted)
             grouped.setdefault(section, {})[name] = value
         parts = {section: dataclasses.replace(getattr(self, section), **values) for section, values in grouped.items()}
+        follow(parts, self, changes)
         return dataclasses.replace(self, **parts)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """All values as ``{section: {field: value}}``."""
-        return dataclasses.asdict(self)
+        """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges."""
+        sections = {field.name: dataclasses.asdict(getattr(self, field.name)) for field in _parts(type(self))}
+        return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
     def from_dict(cls, sections: dict[str, dict[str, Any]]) -> Parameters:
@@ -226,9 +234,10 @@ class Parameters:
         changes = {}
         for section, values in sections.items():
             if not isinstance(values, dict):
-                raise ValueError(f"{section} = {values!r}; allowed: a section, one of {', '.join(_SECTIONS)}")
-            changes.update({f"{section}.{name}": value for name, value in values.items()})
-        return cls().replace(changes)
+                raise ValueError(f"{section} = {values!r}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}")
+            if section != RANDOMIZE:
+                changes.update({f"{section}.{name}": value for name, value in values.items()})
+        return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
 
     def to_toml(self, path: str | Path) -> None:
         """Write every value to a TOML file, one table per part."""
@@ -246,7 +255,56 @@ class Parameters:
             raise ValueError(f"parameters = {str(path)!r}: {error}") from error
 
 
-_SECTIONS = {field.name: field.default for field in dataclasses.fields(Parameters)}
+def _parts(rig: type[Parameters]) -> list[dataclasses.Field[Any]]:
+    return [field for field in dataclasses.fields(rig) if field.name != "ranges"]
+
+
+def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
+    """The table ``[randomize]`` of a file; names and limits are checked where they are drawn from."""
+    found = []
+    for name, bounds in table.items():
+        try:
+            low, high = (float(bound) for bound in bounds)
+        except (TypeError, ValueError):
+            raise ValueError(f'[{RANDOMIZE}] {name} = {bounds!r}; allowed: "section.field" = [low, high]') from None
+        field_of(name)
+        found.append((name, low, high))
+    return tuple(sorted(found))
+
+
+def follow(parts: dict[str, Any], rig: Parameters, changes: dict[str, Any]) -> None:
+    """Put into ``parts`` of a changed ``rig`` what hangs on its bores and strokes, as far as ``changes`` do not name it."""
+
+    def part(name: str) -> Any:
+        return parts.get(name, getattr(rig, name))
+
+    def bore(one: Any, other: Any) -> float:
+        return float(max(one.area_p, other.area_p))
+
+    grown = bore(part("cylinder1"), part("cylinder2")) / bore(rig.cylinder1, rig.cylinder2)
+    if grown != 1.0 and "chambers.dead_volume" not in changes:
+        parts["chambers"] = dataclasses.replace(part("chambers"), dead_volume=grown * rig.chambers.dead_volume)
+    g = part("geometry")
+    if not {"geometry.d3", "geometry.d6", "geometry.k1"} & set(changes):
+        room = 1.9 * min(0.98 * (g.d3 + g.d6) - g.k1, g.k1 - 1.05 * abs(g.d3 - g.d6))
+        longer = max(1.0, part("cylinder1").stroke / max(room, rig.cylinder1.stroke))
+        if longer > 1.0:
+            g = dataclasses.replace(g, d3=longer * g.d3, d6=longer * g.d6, k1=longer * g.k1)
+    if part("cylinder2").stroke > rig.cylinder2.stroke and "geometry.k2" not in changes:
+        g = dataclasses.replace(g, k2=max(g.k2, 0.6 * part("cylinder2").stroke))
+    if g is not part("geometry"):
+        parts["geometry"] = g
+
+
+RANDOMIZE = "randomize"
+"""The table of a file that holds an owner's own ranges."""
+
+_SECTIONS = {field.name: field.default for field in _parts(Parameters)}
+
+
+def least_dead_volume(rig: Parameters) -> float:
+    """The least possible of a rig, m3: ``STOP_DEPTH`` of its largest piston."""
+    return STOP_DEPTH * max(rig.cylinder1.area_p, rig.cylinder2.area_p)
 
 
 def field_of(dotted: str) -> dataclasses.Field[Any]:

@@ -25,6 +25,7 @@ from birthsim_env.seeding import STREAMS, stream
 from birthsim_env.sensors import SENSORS
 from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.stiffness_schedules import StiffnessSchedule
+from birthsim_env.strength import require_carried
 from birthsim_env.user_forces import UserForce
 
 CHECKS = 64
@@ -73,7 +74,7 @@ class Simulation:
         self.measurement: Measurement
         stepwise = actuation.every_period or self.sensors.sampled or user_force.closed_loop
         self._stride, self._strides = (1, periods) if stepwise else (periods, 1)
-        self._ranges = ranges
+        self._ranges, self._begun = ranges, False
         self._forces: Array = np.zeros((self._stride, 2, num_envs))
 
     @property
@@ -87,7 +88,7 @@ class Simulation:
         """Start new episodes in the lanes of a mask (N,): draw their world and put the pistons on the reference, in balance.
 
         ``position`` (2,), m, starts the end effector there, at rest, instead. Raises ``ValueError`` for a reference that
-        leaves the workspace within ``duration`` s or a position outside it.
+        leaves the workspace within ``duration`` s, a position outside it, and at first for a rig that cannot carry its weight.
         """
         chosen = np.flatnonzero(lanes)
         for lane in chosen.tolist():
@@ -110,6 +111,10 @@ class Simulation:
         start, speed = rows[0:2], rows[2:4]
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
+        if not self._begun:
+            # The rig as described: that one of those drawn cannot carry its mass is part of the experiment.
+            require_carried(start, self.parameters)
+            self._begun = True
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))
         pistons_at(np.concatenate([start, speed]), self.nominal, joints)
@@ -142,6 +147,8 @@ class Simulation:
         self.motion = motion
         times = self.time + self.period * np.arange(self._stride)[:, None]
         force = self.user_force.force(times, motion[:2], motion[2:])
+        if self._stride == 1 and np.shape(force) == motion[:2].shape:
+            force = np.asarray(force)[None]
         # A copy: the hand may fill one array anew each time, and jumps are told from the old samples and the new.
         self._forces = checked("user_force.force(...)", force, self._forces.shape, "N").copy()
         self.reference = self.reference_at(self.time)

@@ -22,7 +22,7 @@ from birthsim_env.plant import Plant
 
 RANGES: dict[str, tuple[float, float]] = {
     f"{section.name}.{field.name}": field.metadata["randomized"]
-    for section in dataclasses.fields(Parameters)
+    for section in dataclasses.fields(Parameters)[:-1]
     for field in dataclasses.fields(type(section.default))
     if field.metadata["randomized"]
 }

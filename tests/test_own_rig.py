@@ -1,0 +1,142 @@
+"""A rig of one's own is the one that runs: ranges lie about it, bores and strokes have consequences, the rest is refused."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from birthsim_env import Parameters
+from birthsim_env.geometry import end_effector, jacobian
+from birthsim_env.inverse_kinematics import pistons_at
+from birthsim_env.lanes import FC1, MASS, parameter_column
+from birthsim_env.randomization import described, documented_ranges
+from birthsim_env.strength import carried
+
+HEAVY = """
+[mechanics]
+mass = 9.0
+[cylinder1]
+coulomb_friction = 60.0
+[cylinder2]
+coulomb_friction = 60.0
+"""
+
+
+def drawn(tmp_path, text, lanes=64):
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=lanes, parameters=tmp_path / "rig.toml", randomize="plant")
+    env.reset(seed=0)
+    return env.simulation.plant.lane_parameters
+
+
+def test_drawn_rigs_lie_about_the_one_described(tmp_path):
+    p = drawn(tmp_path, HEAVY)
+    assert 7.2 <= p[MASS].min() < 7.5
+    assert 10.5 < p[MASS].max() <= 10.8
+    assert 48 <= p[FC1].min() < p[FC1].max() <= 72
+
+
+def test_the_default_rig_has_the_documented_ranges_and_a_file_may_give_its_own(tmp_path):
+    own = HEAVY + '[randomize]\n"mechanics.mass" = [8.9, 9.1]\n"air.supply_pressure" = [6e5, 7e5]\n'
+    p = drawn(tmp_path, own)
+    assert 8.9 <= p[MASS].min() < p[MASS].max() <= 9.1
+    rig = Parameters.from_toml(tmp_path / "rig.toml")
+    assert documented_ranges(rig)["air.supply_pressure"] == (6e5, 7e5)
+    rig.to_toml(tmp_path / "again.toml")
+    assert Parameters.from_toml(tmp_path / "again.toml") == rig
+    assert rig.replace({"mechanics.mass": 5.0}).ranges == rig.ranges
+    assert documented_ranges(Parameters())["mechanics.mass"] == (2, 5)
+
+
+def test_what_is_drawn_is_said():
+    words = described(Parameters().replace({"mechanics.mass": 9.0}), True)
+    assert words.startswith("rigs drawn: ")
+    assert "mass 7.2 to 10.8 kg" in words
+    assert "coulomb friction of cylinder1 6 to 25 N" in words
+    assert described(Parameters(), False) == described(Parameters(), "scenario") == "the rig as described"
+    assert described(Parameters(), {"mechanics.mass": (2, 3)}) == "rigs drawn: mass 2 to 3 kg"
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('"mechanics.mass" = 3', r"\[randomize\] mechanics\.mass = 3; allowed: "),
+        ('"mechanics.weight" = [1, 2]', r"unknown parameter 'mechanics\.weight'"),
+        ('"mechanics.mass" = [3, 2]', r"randomize\['mechanics\.mass'\] = .*ordered"),
+        ('"cylinder1.stroke" = [0.2, 0.3]', r"randomize\['cylinder1\.stroke'\]: allowed"),
+    ],
+)
+def test_ranges_that_cannot_be(tmp_path, table, message):
+    with pytest.raises(ValueError, match=message):
+        drawn(tmp_path, f"[randomize]\n{table}\n")
+
+
+def test_draws_that_are_impossible_together_are_refused_before_any_episode():
+    with pytest.raises(ValueError, match=r"randomize: some of the rigs drawn are impossible: Mechanics\.mass"):
+        gymnasium.make(
+            "BirthSIM/Probe-v1", parameters=Parameters().replace({"friction.law": "coulomb"}),
+            randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
+        )  # fmt: skip
+
+
+def test_the_dead_volume_follows_the_bore(tmp_path):
+    rig = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}})
+    assert rig.chambers.dead_volume == pytest.approx(4 * Parameters().chambers.dead_volume)
+    kept = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 3e-5}})
+    assert kept.chambers.dead_volume == 3e-5
+    with pytest.raises(ValueError, match=r"dead_volume = 1e-05 is impossible"):
+        Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 1e-5}})
+    p = drawn(tmp_path, "[cylinder1]\npiston_diameter = 0.032\n")
+    assert np.isfinite(p).all()
+
+
+@pytest.mark.parametrize("stroke", [0.05, 0.2, 0.29, 0.31, 0.6])
+def test_the_linkage_has_room_for_any_stroke_of_cylinder_1(stroke):
+    rig, default = Parameters.from_dict({"cylinder1": {"stroke": stroke}}), Parameters().geometry
+    scale = rig.geometry.d3 / default.d3
+    assert (scale > 1) == (stroke > 0.3)
+    assert rig.geometry.d6 / default.d6 == pytest.approx(scale)
+    assert rig.geometry.k1 / default.k1 == pytest.approx(scale)
+    for y in (-stroke / 2, stroke / 2):
+        assert np.isfinite(jacobian(np.array([y, 0.0]), rig)).all()
+
+
+def test_named_lengths_are_kept():
+    with pytest.raises(ValueError, match=r"Geometry\.k1 = 0\.43 with stroke 0\.4"):
+        Parameters.from_dict({"cylinder1": {"stroke": 0.4}, "geometry": {"d3": 0.35}})
+    assert Parameters.from_dict({"cylinder2": {"stroke": 1.0}}).geometry.k2 == 0.6
+
+
+def test_a_rig_that_cannot_carry_its_load_is_said_to_be_so():
+    for mass in (25.0, 400.0):
+        env = gymnasium.make("BirthSIM/Circle-v1", parameters=Parameters().replace({"mechanics.mass": mass}))
+        with pytest.raises(
+            ValueError, match=rf"Mechanics\.mass = {mass:g} kg is more than this rig can carry: .* cylinder 1"
+        ) as caught:
+            env.reset(seed=0)
+        assert "\n" not in str(caught.value)
+
+
+def test_what_is_carried_is_newtons_law():
+    """Virtual work: the force along a cylinder times its speed is the weight times the speed at which it rises."""
+    rig, place = Parameters(), np.array([[0.45, 0.55], [-0.05, 0.03]])
+    spare = rig.air.supply_pressure - rig.air.atmospheric_pressure
+    shares = carried(place, rig)
+    for lane in range(2):
+        for k, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+            rise = []
+            for speed in (1e-3, -1e-3):
+                joints = np.empty((4, 1))
+                pistons_at(np.concatenate([place[:, [lane]], np.zeros((2, 1))]), parameter_column(rig), joints)
+                moved = joints[:2, 0] + speed * np.eye(2)[k]
+                rise.append(end_effector(moved, rig)[1])
+            force = rig.mechanics.mass * rig.mechanics.gravity * (rise[0] - rise[1]) / 2e-3
+            strength = spare * (cylinder.area_p if force > 0 else cylinder.area_n)
+            assert shares[k, lane] == pytest.approx(abs(force) / strength, rel=1e-4)
+
+
+def test_a_drawn_rig_that_cannot_carry_its_mass_is_part_of_the_experiment():
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=8, randomize={"mechanics.mass": (2.0, 30.0)})
+    env.reset(seed=0)
+    env.step(np.zeros((8, 4)))
