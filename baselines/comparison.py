@@ -18,16 +18,19 @@ import numpy as np
 
 from baselines.evaluation import evaluate
 from baselines.metrics import UNITS
-from baselines.registry import CONTROLLERS, SLOW, make_controller
+from baselines.registry import CONTROLLERS, SLOW, make_controller, split_options
 from baselines.statistics import described, judged, paired_ratios
 from baselines.tasks import Result, Task
 from birthsim_env.parameters import Parameters
 from birthsim_env.scenarios import SCENARIOS
 
-ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v0" for scenario in SCENARIOS)
+ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
 SENSORS = ("ideal", "lab")
 PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
 """Plant -> the environments' argument ``randomize``."""
+
+MOVING = ("sine", "noise", "guided")
+"""Hands of ``birthsim_env.moving_hands`` that move all the time."""
 
 REFERENCE = "backstepping"
 """The law that the others are compared with, episode by episode."""
@@ -38,14 +41,16 @@ METRICS = {**UNITS, "hunting": "mm"}
 
 @dataclass(frozen=True)
 class Conditions:
-    """Where a controller is measured: environment id, sensor model and plant, one of ``PLANTS``."""
+    """Where a controller is measured: environment id, sensor model, plant, one of ``PLANTS``, and what moves the hand, one of
+    ``MOVING`` or "" for the environment's own hand."""
 
     environment: str
     sensors: str
     plant: str
+    hand: str = ""
 
     def __str__(self) -> str:
-        return f"{self.short}, {self.sensors} sensors, {self.plant} plant"
+        return f"{self.short}, {self.sensors} sensors, {self.plant} plant{f', moving hand: {self.hand}' if self.hand else ''}"
 
     @property
     def short(self) -> str:
@@ -81,8 +86,11 @@ def default_controllers() -> list[str]:
 def all_conditions(
     environments: Sequence[str] = ENVIRONMENTS, sensors: Sequence[str] = SENSORS, plants: Sequence[str] = tuple(PLANTS)
 ) -> list[Conditions]:
-    """Every combination."""
-    return [Conditions(*chosen) for chosen in product(environments, sensors, plants)]
+    """Every combination, and the moving hands on rigs drawn at random where the circle is among them."""
+    own = [Conditions(*chosen) for chosen in product(environments, sensors, plants)]
+    where = [name for name in environments if name == ENVIRONMENTS[0]]
+    moving = product(where, sensors, [name for name in plants if name == "randomised"], MOVING)
+    return [*own, *(Conditions(*chosen) for chosen in moving)]
 
 
 def file_stem(name: str) -> str:
@@ -97,7 +105,7 @@ def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
     Raises ``ValueError`` for a name that is no controller.
     """
     make_controller(name, rig)
-    path = Path(name.rpartition(":")[0])
+    path = Path(split_options(name)[0].rpartition(":")[0])
     source = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
     return {"controller": name, "source": source, "rig": rig.to_dict()}
 
@@ -105,18 +113,21 @@ def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
 def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, seed: int) -> Task:
     """The task that computes one cell of the controller with these ``controller_settings``."""
     name = settings["controller"]
-    where = {"environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant}
-    stem = f"cells/{file_stem(name)}/{conditions.short}-{conditions.sensors}-{conditions.plant}"
+    where = {
+        "environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant, "hand": conditions.hand
+    }  # fmt: skip
+    stem = f"cells/{file_stem(name)}/{'-'.join(filter(None, (conditions.short, *list(where.values())[1:])))}"
     return Task(stem, name, run_cell, {**settings, **where, "episodes": episodes, "seed": seed})
 
 
 def run_cell(
-    controller: str, source: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, episodes: int, seed: int
-) -> Result:
+    controller: str, source: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, hand: str, episodes: int,
+    seed: int,
+) -> Result:  # fmt: skip
     """Values per episode, lost episodes and cost of one cell; ``source`` only tells cells of different files apart."""
     parameters = Parameters.from_dict(rig)
     law = make_controller(controller, parameters)
-    setting = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant]}
+    setting = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
     result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a cell is complete or it is none
@@ -157,7 +168,7 @@ def statistics(cells: Cells) -> list[dict[str, Any]]:
                 figures["ratios"][metric] = described(paired_ratios(mine, theirs))
         found.append({
             "controller": controller, "environment": conditions.environment, "sensors": conditions.sensors,
-            "plant": conditions.plant, "episodes": len(cell.lost), "lost": int(sum(cell.lost)),
+            "plant": conditions.plant, "hand": conditions.hand, "episodes": len(cell.lost), "lost": int(sum(cell.lost)),
             "cost_us_per_lane_and_call": cell.cost, **figures,
         })  # fmt: skip
     return found

@@ -24,6 +24,7 @@ CONDITIONS = {
 
 def draw_comparison(figures: Figures, folder: Path) -> list[Path]:
     """Both figures; returns the files written."""
+    figures = [cell for cell in figures if not cell.get("hand")]
     if not figures:
         return []
     with plt.rc_context(STYLE):

@@ -38,7 +38,7 @@ class Column:
         return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
 
 
-CIRCLE, PROBE = "BirthSIM/Circle-v0", "BirthSIM/Probe-v0"
+CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
 COLUMNS = (
     Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
     Column(f"over {REFERENCE}", CIRCLE, "ideal", "randomised", "settled_rms", "ratios"),
@@ -63,7 +63,10 @@ def controllers_of(figures: Figures) -> list[str]:
 
 def overview(figures: Figures) -> str:
     """One row per controller; columns whose environment did not run are left out."""
-    found = {(cell["controller"], cell["environment"], cell["sensors"], cell["plant"]): cell for cell in figures}
+    found = {
+        (cell["controller"], cell["environment"], cell["sensors"], cell["plant"]): cell
+        for cell in figures if not cell.get("hand")
+    }  # fmt: skip
     columns = [c for c in COLUMNS if any(key[1:] == (c.environment, c.sensors, c.plant) for key in found)]
     rows = [["controller", *(column.title for column in columns), "lost episodes", "cost per call, us"]]
     for name in controllers_of(figures):
@@ -91,10 +94,14 @@ def losses(figures: Figures) -> str:
 
 
 def full(figures: Figures) -> str:
-    """A section per environment, sensor model and plant, with a row per metric and controller."""
+    """A section per environment, sensor model, plant and moving hand, with a row per metric and controller."""
     sections = []
-    for where in dict.fromkeys((cell["environment"], cell["sensors"], cell["plant"]) for cell in figures):
-        here = [cell for cell in figures if (cell["environment"], cell["sensors"], cell["plant"]) == where]
+
+    def place(cell: dict[str, Any]) -> tuple[str, ...]:
+        return (cell["environment"], cell["sensors"], cell["plant"], cell.get("hand", ""))
+
+    for where in dict.fromkeys(map(place, figures)):
+        here = [cell for cell in figures if place(cell) == where]
         rows = [["metric", "controller", "median [95 % interval]", "95 %", "worst", f"over {REFERENCE} [95 % interval]"]]
         for metric in IN_FULL:
             for cell in here:
@@ -106,7 +113,8 @@ def full(figures: Figures) -> str:
             rows.append(["lost episodes", cell["controller"], f"{cell['lost']} of {cell['episodes']}", "", "", ""])
         for cell in here:
             rows.append(["cost per call, us", cell["controller"], number(cell["cost_us_per_lane_and_call"]), "", "", ""])
-        sections.append("## {}, {} sensors, {} plant\n\n".format(*where) + markdown(rows))
+        hand = f", moving hand: {where[3]}" if where[3] else ""
+        sections.append("## {}, {} sensors, {} plant".format(*where) + f"{hand}\n\n{markdown(rows)}")
     return "\n\n".join(sections)
 
 

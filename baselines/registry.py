@@ -5,13 +5,10 @@ A factory takes the rig as its owner describes it, and keyword options, and retu
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+import inspect
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import entry_points
-from pathlib import Path
-from traceback import extract_tb
 from typing import Any
 
 from baselines.admittance_backstepping import AdmittanceBackstepping
@@ -19,6 +16,8 @@ from baselines.backstepping import BacksteppingController
 from baselines.cartesian_backstepping import CartesianBackstepping
 from baselines.controller import Controller
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
+from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
+from birthsim_env.own_parts import from_file
 from birthsim_env.parameters import Parameters
 
 Factory = Callable[..., Controller]
@@ -27,17 +26,9 @@ ENTRY_POINTS = "birthsim.controllers"
 """Entry point group by which a package that builds on this one adds controllers."""
 
 
-def _backstepping(parameters: Parameters) -> Controller:
-    return BacksteppingController(parameters)
-
-
-def _backstepping_weight(parameters: Parameters) -> Controller:
-    return BacksteppingController(parameters, weight_compensation=True)
-
-
 CONTROLLERS: dict[str, Factory] = {
-    "backstepping": _backstepping,
-    "backstepping-weight": _backstepping_weight,
+    "backstepping": BacksteppingController,
+    "backstepping-weight": partial(BacksteppingController, weight_compensation=True),
     "backstepping-frozen": partial(BacksteppingController, weight_compensation=True, frozen_friction=True),
     "backstepping-one-valve": partial(BacksteppingController, weight_compensation=True, valves="one_valve"),
     "backstepping-force-first": partial(BacksteppingController, force_first=True),
@@ -49,33 +40,80 @@ CONTROLLERS: dict[str, Factory] = {
     "nonlinear-mpc": NonlinearMPC,
 }
 
+UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
+"""What any controller should beat; ``birthsim-evaluate --all`` leaves them out."""
+
 SLOW = frozenset({"nonlinear-mpc"})
 """Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
 
 
 def controller_names() -> list[str]:
     """Every name that ``make_controller`` knows."""
-    return [*CONTROLLERS, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+    return [*CONTROLLERS, *UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+
+
+def split_options(name: str) -> tuple[str, dict[str, Any]]:
+    """``"pid[bandwidth=60,friction_share=0]"`` -> the name and its options; numbers and true or false are what they say.
+
+    Raises ``ValueError`` for options that are no such list.
+    """
+    if not name.endswith("]"):
+        return name, {}
+    plain, _, listed = name[:-1].partition("[")
+    options: dict[str, Any] = {}
+    for entry in listed.split(","):
+        key, equals, value = (text.strip() for text in entry.partition("="))
+        if not (equals and key.isidentifier() and value):
+            raise ValueError(f"controller = {name!r}: {entry!r}; allowed: name[gain=60,other=2]")
+        try:
+            options[key] = {"true": True, "false": False}[value.lower()] if value.lower() in ("true", "false") else float(value)
+        except ValueError:
+            options[key] = value
+    return plain, options
+
+
+def _factory(name: str) -> Factory:
+    """What makes the controller ``name``, which has no options; ``ValueError`` names what is unknown and what there is."""
+    if name in CONTROLLERS or name in UNCONTROLLED:
+        return (CONTROLLERS | UNCONTROLLED)[name]
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name == name:
+            factory: Factory = point.load()
+            return factory
+    if name.rpartition(":")[0].endswith(".py"):
+        return partial(_own, name, from_file("controller", name))
+    raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+
+
+def known_options(name: str) -> list[str] | None:
+    """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
+    factory: Any = _factory(split_options(name)[0])
+    kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
+    if tunable := getattr(kind, "TUNABLE", None):
+        return list(tunable)
+    parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return None
+    fixed = getattr(factory, "keywords", {})
+    return [parameter.name for parameter in parameters[1:] if parameter.name not in fixed]
 
 
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
     """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
 
-    Raises ``ValueError`` naming what is unknown and what there is.
+    A name may carry options: ``pid[bandwidth=60]``. Raises ``ValueError`` naming what is unknown and what there is.
     """
-    if name in CONTROLLERS:
-        return CONTROLLERS[name](parameters, **options)
-    for point in entry_points(group=ENTRY_POINTS):
-        if point.name == name:
-            made: Controller = point.load()(parameters, **options)
-            return made
-    path, _, attribute = name.rpartition(":")
-    if path.endswith(".py"):
-        return _own(name, _from_file(Path(path), attribute), parameters, options)
-    raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+    plain, named = split_options(name)
+    factory = _factory(plain)
+    known = known_options(plain)
+    for option, value in named.items():
+        if known is not None and option not in known:
+            allowed = ", ".join(known) or "no options"
+            raise ValueError(f"controller = {name!r}: {option} = {value!r} is unknown; allowed for {plain}: {allowed}")
+    return factory(parameters, **{**named, **options})
 
 
-def _own(name: str, factory: Any, parameters: Parameters, options: dict[str, Any]) -> Controller:
+def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Controller:
     """A controller of a user's own class; raises ``ValueError`` naming what it lacks, in one line."""
     expected = "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset()"
     try:
@@ -86,24 +124,3 @@ def _own(name: str, factory: Any, parameters: Parameters, options: dict[str, Any
         raise ValueError(f"controller = {name!r} is made without command() or reset(); {expected}")
     made: Controller = own
     return made
-
-
-def _from_file(path: Path, attribute: str) -> Factory:
-    # No package has a path for a name, whatever the file is called.
-    spec = importlib.util.spec_from_file_location(str(path.resolve()), path)
-    if not path.is_file() or spec is None or spec.loader is None:
-        raise ValueError(f"controller file {str(path)!r} does not exist; allowed: path/to/file.py:Class")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where dataclasses look their annotations up
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[spec.name]
-        line = next((frame.lineno for frame in reversed(extract_tb(error.__traceback__)) if frame.filename == str(path)), None)
-        place = "" if line is None else f", line {line}"
-        problem = f"{type(error).__name__}: {error}"
-        raise ValueError(f"controller file {str(path)!r}{place}: {problem}; allowed: a file that Python imports") from error
-    if not hasattr(module, attribute):
-        raise ValueError(f"controller file {str(path)!r} has no {attribute!r}; allowed: a class with command() and reset()")
-    factory: Factory = getattr(module, attribute)
-    return factory

@@ -14,15 +14,14 @@ from gymnasium import spaces
 
 from birthsim_env import observation
 from birthsim_env.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
+from birthsim_env.own_parts import hand_of, trajectory_of
 from birthsim_env.parameters import Parameters, load_parameters
 from birthsim_env.randomization import checked_ranges, documented_ranges
-from birthsim_env.references import Trajectory
 from birthsim_env.rendering import checked_size
 from birthsim_env.scenarios import SCENARIOS
 from birthsim_env.sensors import SENSORS
 from birthsim_env.simulation import Simulation
 from birthsim_env.stiffness_schedules import StiffnessSchedule
-from birthsim_env.user_forces import UserForce
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
@@ -89,8 +88,8 @@ def assemble(
     valves: str = "two_valves",
     sensors: str = "ideal",
     randomize: Randomize = False,
-    reference: Trajectory | None = None,
-    user_force: UserForce | None = None,
+    reference: Any = None,
+    user_force: Any = None,
     stiffness: StiffnessSchedule | None = None,
     parameters: Parameters | str | Path | None = None,
     policy_period: float = 0.01,
@@ -111,7 +110,7 @@ def assemble(
         ranges, varied = checked_ranges(randomize, rig), False
     else:
         one_of("randomize", randomize, (False, True, "plant", "scenario"))
-        ranges = checked_ranges(documented_ranges(), rig) if randomize in (True, "plant") else {}
+        ranges = checked_ranges(documented_ranges(rig), rig) if randomize in (True, "plant") else {}
         varied = randomize in (True, "scenario")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not (isinstance(duration, (int, float)) and math.isfinite(duration) and duration > 0):
@@ -120,8 +119,8 @@ def assemble(
         num_envs,
         rig,
         ranges,
-        instance_of("reference", reference, Trajectory, default_reference),
-        instance_of("user_force", user_force, UserForce, default_force),
+        trajectory_of(reference, duration or table.duration) or default_reference,
+        hand_of(user_force, varied) or default_force,
         instance_of("stiffness", stiffness, StiffnessSchedule, default_stiffness),
         sensors,
         chosen,

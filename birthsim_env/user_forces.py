@@ -22,7 +22,8 @@ class UserForce:
     random stream; both may stay as they are. ``force(time, position, velocity)`` gets K instants of every lane, s, (K, N),
     and the end effector's position and velocity at the first of them, (2, N), m and m/s; it returns (K, 2, N), N. Each
     sample is held for one control period. A force that depends on position or velocity sets ``closed_loop = True`` and
-    is then asked at every control period (K = 1), and again at the same instant where another lane starts anew.
+    is then asked at every control period (K = 1), and again at the same instant where another lane starts anew; it may
+    return one force per lane, (2, N).
     A component that changes faster than ``jump_rate``, N/s, jumps: no tracking can follow, and ``info["since_jump"]`` starts
     anew.
     """

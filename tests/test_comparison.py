@@ -30,8 +30,8 @@ from birthsim_env import Parameters
 from tests.test_named_controllers import OWN
 
 RIG = Parameters()
-CIRCLE = Conditions("BirthSIM/Circle-v0", "ideal", "randomised")
-PROBE = Conditions("BirthSIM/Probe-v0", "ideal", "nominal")
+CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
+PROBE = Conditions("BirthSIM/Probe-v1", "ideal", "nominal")
 NAN, INF = math.nan, math.inf
 
 
@@ -70,7 +70,7 @@ def cell(controller, conditions=PROBE, episodes=3, seed=4):
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_every_controller_meets_the_same_worlds_and_every_episode_another(worlds, plant):
-    conditions = Conditions("BirthSIM/Circle-v0", "lab", plant)
+    conditions = Conditions("BirthSIM/Circle-v1", "lab", plant)
     law, weight = cell("backstepping", conditions), cell("backstepping-weight", conditions)
     assert law["seeds"] == weight["seeds"] == [4, 5, 6]
     for what in ("plant", "reference", "force"):
@@ -83,7 +83,7 @@ def test_every_controller_meets_the_same_worlds_and_every_episode_another(worlds
 
 def test_the_scenario_is_the_same_with_either_plant(worlds):
     for plant in PLANTS:
-        cell("backstepping", Conditions("BirthSIM/Circle-v0", "ideal", plant))
+        cell("backstepping", Conditions("BirthSIM/Circle-v1", "ideal", plant))
     np.testing.assert_array_equal(worlds[0]["reference"], worlds[1]["reference"])
 
 
@@ -105,7 +105,11 @@ def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
 
 
 def test_the_grid_is_five_environments_two_sensor_models_and_two_plants():
-    assert len(all_conditions()) == 20
+    assert len(all_conditions()) == 26
+    moving = [conditions for conditions in all_conditions() if conditions.hand]
+    assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
+    assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
+    assert str(moving[0]) == "Circle, ideal sensors, randomised plant, moving hand: sine"
     assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
     assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
         *("Circle", "Probe", "Descent", "Forceps", "Dystocia")
@@ -238,7 +242,7 @@ def test_lost_episodes_are_counted_by_environment(figures):
 def test_the_full_tables_have_a_section_per_condition_and_a_row_per_metric_and_controller(figures):
     text = full(figures)
     circle, probe = text.split("## ")[1:]
-    assert circle.startswith("BirthSIM/Circle-v0, ideal sensors, randomised plant\n")
+    assert circle.startswith("BirthSIM/Circle-v1, ideal sensors, randomised plant\n")
     found = {(row[0], row[1]): row[2:] for row in rows(circle)}
     assert found["settled_rms, mm", "other"][0].startswith("2 [")
     assert found["settled_rms, mm", "other"][1:3] == ["lost", "lost"]

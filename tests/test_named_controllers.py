@@ -12,7 +12,7 @@ from baselines.registry import controller_names, make_controller
 from birthsim_env import Parameters
 from tests.test_evaluation import Spy, run
 
-PROBE, CIRCLE = "BirthSIM/Probe-v0", "BirthSIM/Circle-v0"
+PROBE, CIRCLE = "BirthSIM/Probe-v1", "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 
@@ -93,9 +93,9 @@ def test_the_named_controllers_are_the_law_with_and_without_weight():
         ("backsteping", r"controller = 'backsteping'; allowed: backstepping, backstepping-weight, .*path/to/file\.py:Class"),
         ("", r"controller = ''; allowed: backstepping"),
         ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
-        ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Class"),
-        ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a class with command\(\) and reset\(\)"),
-        ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a class"),
+        ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),
+        ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a name that it defines: "),
+        ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a name"),
         ("own.py:number", r"'{folder}/own\.py:number' cannot be made \(TypeError: .*\); allowed: a class that takes the rig"),
         ("own.py:Wordless", r"'{folder}/own\.py:Wordless' is made without command\(\) or reset\(\); allowed: a class that"),
     ],

@@ -13,10 +13,12 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
+from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters, load_parameters
+from birthsim_env.randomization import described
 from birthsim_env.rendering import PairRenderer, Scene
 
 RATES = (10, 20, 25, 50)
@@ -46,7 +48,7 @@ def main() -> None:
         description="Two controllers beside each other on the same rig under the same hand, in real time: linkage, magnifier "
         "(the same for both) and error from the compliant target.",
     )
-    parser.add_argument("--env", default="BirthSIM/Forceps-v0", help="environment id (default: %(default)s)")
+    parser.add_argument("--env", default="BirthSIM/Forceps-v1", help="environment id (default: %(default)s)")
     parser.add_argument(
         "--controller",
         "--controllers",
@@ -62,6 +64,8 @@ def main() -> None:
         "--randomize", default="all", choices=tuple(RANDOMIZE), help="what the seed draws (default: %(default)s)"
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    add_parts(parser)
+    add_set(parser)
     parser.add_argument("--begin", type=float, default=0.5, help="s into the episode (default: %(default)s)")
     parser.add_argument("--end", type=float, default=6.5, help="s into the episode (default: %(default)s)")
     parser.add_argument("--rate", type=int, default=25, choices=RATES, help="frames per second (default: %(default)s)")
@@ -134,25 +138,26 @@ def _animate(arguments: argparse.Namespace) -> None:
         raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(known)}")
     env = gymnasium.make(
         arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
-        policy_period=rig.electronics.control_period,
+        policy_period=rig.electronics.control_period, **environment_parts(arguments),
     )  # fmt: skip
     longest = env.get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
+    names = with_options(arguments.controller, arguments.set)
     controllers = [
-        make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {}))
-        for name in arguments.controller
+        make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {})) for name in names
     ]
+    print(described(rig, RANDOMIZE[arguments.randomize]))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
         takes = [take(env, controller, arguments.seed, span, arguments.rate, bar.update) for controller in controllers]
     title = f"{takes[0].scenes[0].title}, in real time"
     with tqdm(total=len(takes[0].scenes), desc="drawing", unit=" frames", leave=False) as bar:
-        frames = draw(takes, rig, title, arguments.controller, span, arguments.rate, bar.update)
+        frames = draw(takes, rig, title, names, span, arguments.rate, bar.update)
     make_folder(path.parent)
     save(frames, arguments.rate, path)
     print(f"{arguments.env}, seed {arguments.seed}, {arguments.sensors} sensors, randomised: {arguments.randomize}")
-    for name, one in zip(arguments.controller, takes, strict=True):
+    for name, one in zip(names, takes, strict=True):
         rms, largest = 1e3 * np.sqrt(np.mean(np.square(one.errors))), 1e3 * np.max(one.errors)
         print(f"{name:28} error while it is shown: {rms:.2f} mm RMS, {largest:.2f} mm at most")
     print(f"written to {path}: {len(frames)} frames, {path.stat().st_size / 1e6:.2f} MB")

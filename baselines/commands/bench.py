@@ -73,7 +73,7 @@ def _kernel(lanes: int, budget: float) -> float:
 
 
 def _single(budget: float) -> float:
-    env = gymnasium.make("BirthSIM/Circle-v0")
+    env = gymnasium.make("BirthSIM/Circle-v1")
     env.reset(seed=0)
     actions = cycle(_random_openings().astype(np.float32))
 
@@ -122,7 +122,7 @@ def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
     rig = birthsim_env.Parameters()
     law = make_controller(name, rig)
     period = rig.electronics.control_period
-    env: Any = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=lanes, policy_period=period, sensors=sensors)
+    env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, policy_period=period, sensors=sensors)
     env.reset(seed=0)
     met = []
     for _ in range(PERIODS):
@@ -159,7 +159,7 @@ def _bench(arguments: argparse.Namespace) -> None:
     kernel, lane = _kernel(1024, budget), _kernel(1, budget)
     packed, scalar = packed_share()
     single, reference = _single(budget), _scipy(budget)
-    ours, theirs = _frames("BirthSIM/Circle-v0", budget), _frames("CartPole-v1", budget)
+    ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
     rows: list[tuple[str, float, str]] = [
         ("plant, 1024 lanes, one core", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
         ("  per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
@@ -173,8 +173,8 @@ def _bench(arguments: argparse.Namespace) -> None:
         ("gym.make step, valve mode", single, "policy steps/s"),
         ("  the same plant through solve_ivp (RK45, rtol 1e-6)", reference, "policy steps/s"),
         ("  ratio", single / reference, "times"),
-        ("gym.make_vec step, 128 lanes", _vector("BirthSIM/Circle-v0", 128, budget), "policy steps/s"),
-        ("gym.make_vec step, 1024 lanes", _vector("BirthSIM/Circle-v0", 1024, budget), "policy steps/s"),
+        ("gym.make_vec step, 128 lanes", _vector("BirthSIM/Circle-v1", 128, budget), "policy steps/s"),
+        ("gym.make_vec step, 1024 lanes", _vector("BirthSIM/Circle-v1", 1024, budget), "policy steps/s"),
         ("backstepping, 1 lane", _control("backstepping", "ideal", 1, budget), "us per call"),
         *(
             (f"{name}, {sensors} sensors, batch of 256", _control(name, sensors, 256, budget), "us per lane and call")

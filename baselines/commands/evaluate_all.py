@@ -8,14 +8,16 @@ from typing import Any
 
 import birthsim_env
 from baselines import comparison
+from baselines.commands.parts import with_options
 from baselines.commands.shared import make_folder, write_json
 from baselines.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
 from baselines.comparison_tables import full, losses, overview
-from baselines.registry import CONTROLLERS, SLOW
+from baselines.registry import CONTROLLERS, SLOW, split_options
 from baselines.statistics import in_words
 from baselines.studies import study_tasks
 from baselines.tasks import Result, code_stamp, run_tasks
 from birthsim_env.parameters import Parameters
+from birthsim_env.randomization import described
 
 NARROWED = {"scenario": "nominal", "all": "randomised"}
 """The option --randomize -> the one plant that is then compared."""
@@ -28,8 +30,10 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
     """Run what ``--out`` does not hold yet, and write comparison.json, comparison.md and the figures."""
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
+    names = with_options(names, arguments.set)
     for name in names:
-        if name not in CONTROLLERS and not name.rpartition(":")[0].endswith(".py"):
+        plain = split_options(name)[0]
+        if plain not in CONTROLLERS and not plain.rpartition(":")[0].endswith(".py"):
             raise ValueError(f"--controller {name!r} with --all; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
     settings = [controller_settings(name, rig) for name in names]
     conditions = [] if arguments.studies_only else _conditions(arguments)
@@ -38,8 +42,9 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
         (own["controller"], where): cell_task(own, where, arguments.episodes, arguments.seed)
         for own in settings for where in conditions
     }  # fmt: skip
-    quick = [own for own in settings if own["controller"] not in SLOW]
+    quick = [own for own in settings if split_options(own["controller"])[0] not in SLOW]
     studies = {} if arguments.no_studies else study_tasks(quick, rig)
+    print(f"randomised plant: {described(rig, True)}")
     done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison")
     felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies")
     figures = comparison.statistics(comparison.gather({key: done[t.name] for key, t in cells.items() if t.name in done}))

@@ -42,8 +42,8 @@ def seed_number(text: str) -> int:
 
 
 def policy_of(environment: str) -> str:
-    """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v0`` -> ``forceps``."""
-    return environment.removeprefix("BirthSIM/").removesuffix("-v0").lower()
+    """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v1`` -> ``forceps``."""
+    return environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
 
 
 def make_folder(path: Path) -> Path:

@@ -9,6 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from baselines import stability
+from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
 from baselines.registry import make_controller
 from baselines.stability import MAPS
@@ -33,13 +34,14 @@ def main() -> None:
     parser.add_argument("--points", type=whole, help="values along each axis (default: those of the map)")
     parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
     parser.add_argument("--parameters", help="TOML file of the rig as the controller believes it (default: the paper's)")
+    add_set(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for stability.json and the figures")
     run(parser, _stability)
 
 
 def _stability(arguments: argparse.Namespace) -> None:
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
-    rig, name = load_parameters(arguments.parameters), arguments.controller
+    rig, name = load_parameters(arguments.parameters), with_options([arguments.controller], arguments.set)[0]
     make_controller(name, rig)
     from baselines.stability_figures import stability_figure
 

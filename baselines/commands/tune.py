@@ -5,7 +5,7 @@ units; each is a keyword of its constructor. Where low is positive the gain is s
 linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
-the documented ranges: ``Circle-v0``, everything randomised, and the stiffness test of ``baselines.probes``, with each sensor
+the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.probes``, with each sensor
 model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus the
 hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95 %
 quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
@@ -22,17 +22,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 from tqdm import tqdm
 
+from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
 from baselines.controller import Controller
 from baselines.evaluation import evaluate
 from baselines.probes import POSES, Probes, run_probes
-from baselines.registry import CONTROLLERS, make_controller
+from baselines.registry import CONTROLLERS, make_controller, split_options
 from birthsim_env.lanes import Array
 from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.randomization import documented_ranges, draw_parameters
+from birthsim_env.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.seeding import stream
 from birthsim_env.sensors import SENSORS
 
@@ -123,7 +125,7 @@ def proposal(trials: list[Trial], start: Gains, bounds: Bounds, seed: int) -> Ga
 
 def probes(rig: Parameters, lanes: int) -> Probes:
     """Stiffness tests on randomised rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
-    rigs = [draw_parameters(rig, documented_ranges(), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
+    rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
     rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
     force[lane % 2, lane] = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes)
@@ -138,14 +140,15 @@ def robust(losses: Array) -> float:
 
 
 def costs(
-    controller: Controller, rig: Parameters, sensors: tuple[str, ...], lanes: int, seconds: float = 8.0
+    controller: Controller, rig: Parameters, sensors: tuple[str, ...], lanes: int, seconds: float = 8.0, **own: Any
 ) -> dict[str, float]:
-    """What a controller costs, mm, part by part; ``seconds`` is that of the circle."""
+    """What a controller costs, mm, part by part; ``seconds`` is that of the circle, which may have a reference and hand of its
+    ``own``."""
     parts = {}
     periods = round(seconds / rig.electronics.control_period)
-    setting: dict[str, Any] = {"randomize": True, "parameters": rig, "max_episode_steps": periods, "progress": False}
+    setting: dict[str, Any] = {"randomize": True, "parameters": rig, "max_episode_steps": periods, "progress": False, **own}
     for kind in sensors:
-        circle = evaluate("BirthSIM/Circle-v0", controller, "", lanes, WORLDS, sensors=kind, **setting)
+        circle = evaluate("BirthSIM/Circle-v1", controller, "", lanes, WORLDS, sensors=kind, **setting)
         if len(circle.seeds) < lanes:
             raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
         parts[f"circle, {kind}"] = robust(np.where(circle.lost, LOST, circle.metrics["settled_rms"]))
@@ -157,13 +160,13 @@ def costs(
 
 def search(
     name: str, rig: Parameters, bounds: Bounds, start: Gains, sensors: tuple[str, ...], lanes: int, seed: int, count: int,
-    trials: list[Trial],
+    trials: list[Trial], own: dict[str, Any],
 ) -> Iterator[Trial]:  # fmt: skip
     """The trials that ``trials`` lack of ``count``, one by one."""
     trials = list(trials)
     while len(trials) < count:
         gains = proposal(trials, start, bounds, seed)
-        parts = costs(make_controller(name, rig, **gains), rig, sensors, lanes)
+        parts = costs(make_controller(name, rig, **gains), rig, sensors, lanes, **own)
         trials.append(Trial(gains, sum(parts.values()), parts))
         yield trials[-1]
 
@@ -181,6 +184,8 @@ def main() -> None:
     parser.add_argument("--start", type=Path, help="a gains.json, for trial 0 (default: the middle of every range)")
     parser.add_argument("--lanes", type=whole, default=32, help="rigs of each scenario (default: %(default)s)")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    add_parts(parser)
+    add_set(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for trials.json and gains.json")
     run(parser, _tune)
 
@@ -205,19 +210,22 @@ def _stored(path: Path, setting: dict[str, Any]) -> list[Trial]:
 def _tune(arguments: argparse.Namespace) -> None:
     rig = load_parameters(arguments.parameters)
     sensors = tuple(SENSORS) if arguments.sensors == "both" else (arguments.sensors,)
-    bounds = bounds_of(arguments.controller, rig)
+    controller, own = with_options([arguments.controller], arguments.set)[0], environment_parts(arguments)
+    bounds = {name: pair for name, pair in bounds_of(controller, rig).items() if name not in split_options(controller)[1]}
     start = start_of(arguments.start, bounds)
     setting = {
-        "controller": arguments.controller, "seed": arguments.seed, "sensors": list(sensors), "lanes": arguments.lanes,
+        "controller": controller, **own, "seed": arguments.seed, "sensors": list(sensors), "lanes": arguments.lanes,
         "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start, "rig": rig.to_dict(),
     }  # fmt: skip
+    gymnasium.make("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own).reset(seed=WORLDS)  # says what cannot be
+    print(described(rig, True))
     path = arguments.out / "trials.json"
     trials = _stored(path, setting)[: arguments.trials]
     make_folder(arguments.out)
-    bar = tqdm(total=arguments.trials, initial=len(trials), desc=f"tuning {arguments.controller}", unit=" trials", leave=False)
+    bar = tqdm(total=arguments.trials, initial=len(trials), desc=f"tuning {controller}", unit=" trials", leave=False)
     try:
         numbers = (arguments.lanes, arguments.seed, arguments.trials)
-        for trial in search(arguments.controller, rig, bounds, start, sensors, *numbers, trials):
+        for trial in search(controller, rig, bounds, start, sensors, *numbers, trials, own):
             trials.append(trial)
             write_json(path, {**setting, "trials": [vars(one) for one in trials]})
             bar.set_postfix_str(f"best {min(one.cost for one in trials):.3g} mm", refresh=False)
@@ -231,7 +239,7 @@ def _tune(arguments: argparse.Namespace) -> None:
     best = min(trials, key=lambda trial: trial.cost)
     place = {"trial": trials.index(best), "trials": len(trials)}
     write_json(arguments.out / "gains.json", {**setting, **vars(best), **place})
-    print(f"{arguments.controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
+    print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
     print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
     for part, value in {**best.parts, "sum": best.cost}.items():
         before = trials[0].cost if part == "sum" else trials[0].parts[part]

@@ -1,0 +1,212 @@
+"""A user's own reference and hand: functions, files and classes; options of controllers; every mistake is one line."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.commands.parts import with_options
+from baselines.registry import known_options, make_controller, split_options
+from birthsim_env import Circle, Parameters
+from birthsim_env.own_parts import hand_of, trajectory_of
+
+CIRCLE = "BirthSIM/Circle-v1"
+
+
+def round_about(t):
+    return 0.5 + 0.05 * math.cos(math.pi / 2 * t), 0.05 * math.sin(math.pi / 2 * t)
+
+
+@pytest.mark.parametrize("from_file", [False, True])
+def test_a_plain_position_becomes_a_trajectory_with_its_derivatives(from_file, tmp_path):
+    """A spline of degree 5 through samples every h: derivative n is off by about h^(6 - n) |f^(6)|, most at the ends."""
+    times = np.linspace(0, 8, 801)
+    if from_file:
+        lines = ["time,x,y", *(f"{t!r},{x!r},{y!r}" for t, (x, y) in ((float(t), round_about(t)) for t in times))]
+        (tmp_path / "circle.csv").write_text("\n".join(lines), encoding="utf-8")
+    own = trajectory_of(str(tmp_path / "circle.csv") if from_file else round_about, 8.0)
+    true = Circle()
+    true.prepare(1), true.begin(0, None)
+    for t in (0.0, 0.0123, 3.3337, 7.999, 8.0):
+        error = np.abs(own.sample(np.array([t])) - true.sample(np.array([t])))[:, 0]
+        assert error[:2].max() < 1e-11
+        assert error[2:4].max() < 1e-9
+        assert error[4:6].max() < 1e-6
+        assert error[6:].max() < 1e-3
+    after = own.sample(np.array([9.0]))[:, 0]
+    np.testing.assert_allclose(after[:2], round_about(8.0), atol=1e-12)
+    assert not after[2:].any(), "at rest beyond the end"
+
+
+@pytest.mark.parametrize("count", range(2, 8))
+def test_few_points_are_met(count):
+    rng = np.random.default_rng(count)
+    times, points = np.cumsum(rng.uniform(0.5, 1, count)), rng.uniform(0.4, 0.6, (count, 2))
+    from birthsim_env.own_parts import Through
+
+    path = Through(times, points)
+    for t, point in zip(times, points, strict=True):
+        np.testing.assert_allclose(path.sample(np.array([t]))[:2, 0], point, atol=1e-12)
+
+
+def test_the_environment_takes_them_as_it_takes_its_own():
+    env, own = gymnasium.make(CIRCLE), gymnasium.make(CIRCLE, reference=round_about)
+    env.reset(seed=0), own.reset(seed=0)
+    for _ in range(100):
+        one, other = env.step(np.zeros(4)), own.step(np.zeros(4))
+        np.testing.assert_allclose(one[4]["target"], other[4]["target"], atol=1e-9)
+
+
+def pushing(time):
+    return 5.0 * time, -3.0
+
+
+def spring(time, position, velocity):
+    return 800.0 * (0.55 - position[0]) - 2.0 * velocity[0], 0.0
+
+
+def one_per_lane():
+    from birthsim_env import UserForce
+
+    class Own(UserForce):
+        closed_loop = True
+
+        def force(self, time, position, velocity):
+            return np.stack([800.0 * (0.55 - position[0]), np.zeros(len(position[0]))])
+
+    return Own
+
+
+@pytest.mark.parametrize("hand", [pushing, spring, one_per_lane()])
+def test_a_function_or_a_force_per_lane_is_a_hand(hand):
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, user_force=hand)
+    _, info = env.reset(seed=0)
+    for _ in range(20):
+        _, _, _, _, info = env.step(np.zeros((2, 4)))
+        for lane in range(2):
+            given = (info["time"][lane], info["position"][lane], info["velocity"][lane])
+            if hand is pushing:
+                expected = pushing(given[0])
+            elif hand is spring:
+                expected = spring(*given)
+            else:
+                expected = (800.0 * (0.55 - given[1][0]), 0.0)
+            np.testing.assert_allclose(info["user_force"][lane], expected, rtol=1e-12)
+
+
+def test_a_force_profile_of_a_file(tmp_path):
+    path = tmp_path / "push.csv"
+    path.write_text("# measured on a Sunday\n0, 0, 0\n1.0, 10, -4\n\n2.0, 0, 0\n", encoding="utf-8")
+    hand = hand_of(path, varied=False)
+    hand.prepare(1), hand.begin(0, np.random.default_rng(0))
+    found = hand.force(np.array([[0.5], [1.0], [1.75], [3.0]]), None, None)[:, :, 0]
+    np.testing.assert_allclose(found, [[5, -2], [10, -4], [2.5, -1], [0, 0]])
+
+
+OWN = """
+import birthsim_env
+
+def along(t):
+    return 0.5 + 0.01 * t, 0.0
+
+def wild(t):
+    return 1 / 0
+
+class Needs(birthsim_env.UserForce):
+    def __init__(self, size):
+        pass
+
+class Still(birthsim_env.Hold):
+    pass
+
+number = 3
+"""
+
+MISTAKES = [
+    ("reference", "nowhere.csv", r"reference '.*nowhere\.csv' cannot be read: .*; allowed: a CSV file"),
+    ("reference", "own.py:missing", r"has no 'missing'; allowed: a name that it defines: birthsim_env, along, "),
+    (
+        "reference",
+        "own.py:wild",
+        r"reference: function\(0\) fails \(ZeroDivisionError: .*\); allowed: a function of",
+    ),
+    ("reference", "own.py:number", r"reference = 3; allowed: None, a birthsim_env\.Trajectory, a function of time"),
+    ("reference", "broken.py:x", r"reference file '.*broken\.py': SyntaxError: .* line 1"),
+    ("reference", "plain", r"reference = '.*plain'; allowed: a birthsim_env\.Trajectory"),
+    ("reference", "bad.csv", r"reference '.*bad\.csv', line 3: '0,0\.5,0'; allowed: lines of time, x, y .*increasing times"),
+    ("reference", "words.csv", r"words\.csv', line 2: 'a,b,c'; allowed"),
+    ("reference", "short.csv", r"short\.csv' has 1 lines of numbers; allowed: .*, at least 2"),
+    ("user_force", "own.py:Needs", r"user_force: Needs\(\) fails \(TypeError: .*'size'\); allowed: a birthsim_env\.UserForce"),
+    ("user_force", "own.py:number", r"user_force = 3; allowed: None, a birthsim_env\.UserForce, 'steps', 'sine'"),
+    ("user_force", "soft", r"user_force = '.*soft'; allowed: a birthsim_env\.UserForce, 'steps', 'sine', 'noise', 'guided'"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "own.py").write_text(OWN, encoding="utf-8")
+    (tmp_path / "broken.py").write_text("def\n", encoding="utf-8")
+    (tmp_path / "bad.csv").write_text("t,x,y\n0,0.5,0\n0,0.5,0\n", encoding="utf-8")
+    (tmp_path / "words.csv").write_text("t,x,y\na,b,c\n", encoding="utf-8")
+    (tmp_path / "short.csv").write_text("0,0.5,0\n", encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(("kind", "part", "message"), MISTAKES)
+def test_every_mistake_is_one_line(kind, part, message, folder):
+    with pytest.raises(ValueError, match=message) as caught:
+        gymnasium.make(CIRCLE, **{kind: f"{folder}/{part}"})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_function_that_returns_nothing_of_use():
+    with pytest.raises(ValueError, match=r"reference: function\(0\) = 0\.5; allowed: a function of time"):
+        gymnasium.make(CIRCLE, reference=lambda t: 0.5)
+    env = gymnasium.make(CIRCLE, user_force=lambda t: None)
+    with pytest.raises(ValueError, match=r"user_force: function\(0, \.\.\.\) = None; allowed: a function of time"):
+        env.reset(seed=0)
+
+
+def test_classes_and_functions_of_a_file(folder):
+    env = gymnasium.make(CIRCLE, reference=f"{folder}/own.py:along")
+    _, info = env.reset(seed=0)
+    np.testing.assert_allclose(info["target"], [0.5, 0.0], atol=1e-12)
+    assert type(trajectory_of(f"{folder}/own.py:Still", 1.0)).__name__ == "Still"
+
+
+def test_a_name_carries_options():
+    assert split_options("pid[bandwidth=60,valves=one,on=true]") == ("pid", {"bandwidth": 60.0, "valves": "one", "on": True})
+    assert split_options("pid") == ("pid", {})
+    stiff, soft = (make_controller(name, Parameters()) for name in ("backstepping[pneumatic_gain=80]", "backstepping"))
+    assert type(stiff) is type(soft)
+    assert "pneumatic_gain" in known_options("backstepping")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("pid[gain=3]", r"'pid\[gain=3\]': gain = 3\.0 is unknown; allowed for pid: "),
+        ("pid[gain]", r"'gain'; allowed: name\[gain=60,other=2\]"),
+        ("shut-valves[gain=3]", r"allowed for shut-valves: no options"),
+        ("nobody[gain=3]", r"controller = 'nobody'; allowed: backstepping, "),
+    ],
+)
+def test_options_that_there_are_not(name, message):
+    with pytest.raises(ValueError, match=message):
+        make_controller(name, Parameters())
+
+
+def test_set_goes_to_those_that_have_it():
+    gain = known_options("pid")[0]
+    assert with_options(["pid", "backstepping"], [f"{gain}=3"]) == [f"pid[{gain}=3]", "backstepping"]
+    assert with_options(["pid"], []) == ["pid"]
+    assert with_options(["backstepping[sign_width=0.01]"], ["pneumatic_gain=80"]) == [
+        "backstepping[sign_width=0.01,pneumatic_gain=80]"
+    ]
+    with pytest.raises(ValueError, match=r"--set 'gain=3'; allowed for pid: .*; shut-valves: nothing"):
+        with_options(["pid", "shut-valves"], ["gain=3"])
+    with pytest.raises(ValueError, match=r"--set 'gain'; allowed: GAIN=VALUE"):
+        with_options(["pid"], ["gain"])
