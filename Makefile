@@ -1,15 +1,20 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
+# make test-weekly runs the examples on libraries that are not ours
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
+# make scores measures what every environment pays, to laws and policies (some minutes)
 
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
 OLDEST := numba==0.65.0 llvmlite==0.47.0
+WEEKLY := torchrl tensordict pyvers orjson importlib_metadata zipp "ray>=2.60,<3" dm-tree lz4 ormsgpack pyarrow pandas \
+  filelock jsonschema jsonschema-specifications referencing rpds-py msgpack requests urllib3 idna certifi charset-normalizer \
+  pyyaml tensorboardX wrapt absl-py
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -18,7 +23,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow portable oldest lint bench compare pictures policies learned golden clean
+.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -40,10 +45,15 @@ run: $(READY)
 	@echo "$(BIN)/birthsim-evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
 
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest -n 2 -m "not slow and not weekly"
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -n 2 -m slow
+
+# TorchRL and RLlib beside what is installed; RLlib comes with ray, but its extra pins an older Gymnasium.
+test-weekly: $(READY)
+	test -d $(OUT)/weekly/ray || $(PIP) install --quiet --no-deps --target $(OUT)/weekly $(WEEKLY)
+	PYTHONPATH=$(CURDIR)/$(OUT)/weekly $(BIN)/python -m pytest -m weekly
 
 portable: $(READY)
 	$(BIN)/python -m tests.processors
@@ -51,7 +61,7 @@ portable: $(READY)
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow and not weekly"
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests
@@ -71,8 +81,8 @@ pictures: $(READY)
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v0 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v0 --episodes 8 --no-studies --out $(OUT)/bound-probe
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v1 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	cat $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md >docs/bound.md
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
@@ -86,7 +96,7 @@ policies: $(READY)
 learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
 	for name in probe forceps dystocia descent; do scenario=$$(echo $$name | sed 's/./\u&/'); \
-	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v0 --controller residual --policy $$name \
+	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v1 --controller residual --policy $$name \
 	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
 	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
@@ -94,6 +104,15 @@ learned: $(READY)
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done >docs/learned.md
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
+
+scores: $(READY)
+	$(BIN)/birthsim-scores --out $(OUT)/scores
+	cp $(OUT)/scores/scores.json birthsim_env/
+	cp $(OUT)/scores/scores.md docs/
+
+scratch: $(READY)
+	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
+	cp $(OUT)/scratch/scratch.png docs/
 
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make

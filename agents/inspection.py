@@ -60,7 +60,7 @@ def _follow(
     ``correction`` is the believed force, N; the others are of ``info``.
     """
     env: Any = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v0", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
+        "BirthSIM/ProbeResidual-v1", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
         stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
         **policy.settings.to_dict(),
     )  # fmt: skip
@@ -128,7 +128,7 @@ def rendered(controllers: Sequence[tuple[str, Controller]], seed: int = 0) -> li
         angle = np.array([direction * math.pi / 2 for _, _, direction in cases])
         force = np.array([size for _, size, _ in cases]) * np.stack([np.cos(angle), np.sin(angle)])
         stiffness = np.repeat([[setpoint], [setpoint], [0.0]], len(cases), axis=1)
-        rigs = [draw_parameters(Parameters(), documented_ranges(), rng) for _ in cases]
+        rigs = [draw_parameters(Parameters(), documented_ranges(Parameters()), rng) for _ in cases]
         pneumatic = pneumatic_setpoint(position, np.stack(displacement(*force, *stiffness)), force, Parameters())
         probes = Probes(position, force, stiffness, rigs, pneumatic)
         for name, controller in controllers:

@@ -73,6 +73,9 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
         whole.seeds += one.seeds
         whole.lost += one.lost
         whole.demand += one.demand
+        whole.success += one.success
+        for discount, values in one.returns.items():
+            whole.returns[discount] += values
         for metric in UNITS:
             whole.metrics[metric] += one.metrics[metric]
         whole.traces += one.traces

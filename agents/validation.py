@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.feasibility import demand
-from baselines.metrics import SETTLED, EpisodeMetrics
+from baselines.metrics import EpisodeMetrics
 from baselines.statistics import quantile
+from birthsim_env.success import SETTLED
 
 VALIDATION_SEED = 1_000_000
 """First seed of the validation worlds; evaluation seeds stay below it."""

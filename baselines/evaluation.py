@@ -25,12 +25,16 @@ LANES = 128
 TRACE = 0.01
 """s between the samples of the error kept for the figure."""
 
+DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
+"""Per 10 ms, the default policy period: returns are summed with each of them."""
+
 
 @dataclass
 class Evaluation:
     """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
 
-    ``demand`` is the share of the rig's strength that each episode asks for, whatever controls it.
+    ``demand`` is the share of the rig's strength that each episode asks for, whatever controls it. ``returns`` are the sums of
+    rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
     """
 
     controller: str
@@ -38,6 +42,8 @@ class Evaluation:
     metrics: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in UNITS})
     lost: list[bool] = field(default_factory=list)
     demand: list[float] = field(default_factory=list)
+    returns: dict[float, list[float]] = field(default_factory=lambda: {discount: [] for discount in DISCOUNTS})
+    success: list[bool] = field(default_factory=list)
     cost: float = float("nan")
     traces: list[Array] = field(default_factory=list)
 
@@ -57,6 +63,8 @@ class Evaluation:
             "episodes": self.metrics,
             "lost": self.lost,
             "demand": self.demand,
+            "returns": self.returns,
+            "success": self.success,
         }
 
 
@@ -109,7 +117,9 @@ def _run_batch(
     asked = demand(env)
     metrics = EpisodeMetrics(len(seeds), period)
     alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
-    lost = np.zeros_like(alive)
+    lost, success = np.zeros_like(alive), np.zeros_like(alive)
+    discounts = np.power(DISCOUNTS, period / 0.01)[:, None]
+    returns, weights = np.zeros((len(DISCOUNTS), len(seeds))), np.ones((len(DISCOUNTS), 1))
     every = max(1, round(TRACE / period))
     trace: Array = np.full((-(-env.steps // every), len(seeds), 2), np.nan)
     bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
@@ -121,7 +131,11 @@ def _run_batch(
         metrics.add(info, command, alive)
         if step % every == 0:
             trace[step // every, alive] = info["tracking_error"][alive]
-        _, _, terminated, _, info = env.step(command.T)
+        _, rewards, terminated, truncated, info = env.step(command.T)
+        returns += weights * np.where(alive, rewards, 0.0)
+        weights = weights * discounts
+        if truncated.any():
+            success |= alive & truncated & info["final_info"]["is_success"]
         lost |= alive & terminated
         alive &= ~terminated
         if not alive.any():
@@ -137,6 +151,9 @@ def _run_batch(
     result.seeds += seeds
     result.demand += [float(value) for value in asked]
     result.lost += [bool(value) for value in lost]
+    result.success += [bool(value) for value in success]
+    for discount, sums in zip(DISCOUNTS, returns, strict=True):
+        result.returns[discount] += [float(value) for value in sums]
     result.traces.append(trace)
 
 
@@ -172,9 +189,11 @@ def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
         for summary in summaries:
             row += [number(summary[name][key]) for key in (statistic, "q95", "max")]
         lines.append("| " + " | ".join(row) + " |")
-    lost = ["lost episodes", ""]
+    lost, success, paid = ["lost episodes", ""], ["successful episodes", ""], ["return, mean", ""]
     cost = ["control cost per lane and call", "us"]
     for evaluation in evaluations:
         lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
+        success += [f"{sum(evaluation.success)} of {len(evaluation.success)}", "", ""]
+        paid += [f"{np.mean(evaluation.returns[1.0] or [np.nan]):.4g}", "", ""]
         cost += [number(evaluation.cost), "", ""]
-    return "\n".join([*lines, "| " + " | ".join(lost) + " |", "| " + " | ".join(cost) + " |"])
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid, cost))])

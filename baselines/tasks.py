@@ -29,7 +29,7 @@ _ROOT = Path(__file__).resolve().parent.parent
 _SHOWN_ONLY = (
     *("birthsim_env/drawing", "birthsim_env/rendering.py", "baselines/commands", "baselines/figures.py"),
     *("baselines/statistics.py", "baselines/comparison_tables.py", "baselines/comparison_figures.py"),
-    "baselines/study_figures.py",
+    *("baselines/study_figures.py", "birthsim_env/scores.json"),
 )
 """Sources that show results and do not make them: pieces outlive a change of theirs."""
 

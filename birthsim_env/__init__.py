@@ -1,7 +1,7 @@
 """BirthSIM: a pneumatic haptic interface as Gymnasium environments.
 
-Importing this package registers ``BirthSIM/Circle-v0``, ``Probe-v0``, ``Descent-v0``, ``Forceps-v0`` and ``Dystocia-v0``, and
-their siblings with a law inside, ``BirthSIM/CircleResidual-v0`` and so on.
+Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v1``, ``Descent-v1``, ``Forceps-v1`` and ``Dystocia-v1``, and
+their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 """
 
 from gymnasium.envs.registration import register, registry
@@ -10,6 +10,7 @@ from birthsim_env.parameters import Parameters
 from birthsim_env.plant import Plant
 from birthsim_env.references import Circle, Hold, Path, Trajectory
 from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.scores import normalized_score, reference_scores
 from birthsim_env.signals import Measurement, Reference
 from birthsim_env.stiffness_schedules import StiffnessSchedule
 from birthsim_env.user_forces import ForceProfile, UserForce
@@ -26,17 +27,19 @@ __all__ = [
     "StiffnessSchedule",
     "Trajectory",
     "UserForce",
+    "normalized_score",
+    "reference_scores",
 ]
 
 __version__ = "0.1.0"
 
 _KINDS = {
     "": ("birthsim_env.env:BirthSIMEnv", "birthsim_env.vector_env:BirthSIMVectorEnv"),
-    # Only names: the package above is imported when such an environment is made.
-    "Residual": ("agents.residual_env:ResidualEnv", "agents.residual_env:ResidualVectorEnv"),
+    # The package above is imported when such an environment is made.
+    "Residual": ("birthsim_env.learned:residual_env", "birthsim_env.learned:residual_vector_env"),
 }
 for _scenario in SCENARIOS:
     for _kind, (_single, _vector) in _KINDS.items():
-        _id = f"BirthSIM/{_scenario.capitalize()}{_kind}-v0"
+        _id = f"BirthSIM/{_scenario.capitalize()}{_kind}-v1"
         if _id not in registry:
             register(_id, entry_point=_single, vector_entry_point=_vector, kwargs={"scenario": _scenario})

@@ -15,13 +15,13 @@ import onnxruntime
 
 from agents.residual_law import ResidualLaw
 from agents.settings import NO_LAW, ResidualSettings
-from baselines.metrics import SETTLED
 from baselines.registry import make_controller
 from birthsim_env.assembly import policy_periods
 from birthsim_env.lanes import parameter_column
 from birthsim_env.observation import observe
 from birthsim_env.parameters import Parameters
 from birthsim_env.signals import one_lane
+from birthsim_env.success import SETTLED
 
 # As in agents.onnx_export, which needs PyTorch; running a policy does not.
 FORMAT = "birthsim-residual-onnx-1"

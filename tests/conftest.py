@@ -16,7 +16,7 @@ settings.register_profile("birthsim", deadline=None, derandomize=True, database=
 settings.load_profile("birthsim")
 
 SMALL = """[training]
-environment = "BirthSIM/ProbeResidual-v0"
+environment = "BirthSIM/ProbeResidual-v1"
 lanes = 32
 rollout = 32
 batch = 256

@@ -19,7 +19,7 @@ COMMANDS = {
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "replay")},
 }
 PATIENCE = 600.0  # s; only a state that never comes takes so long
-RESIDUAL = "BirthSIM/ProbeResidual-v0"
+RESIDUAL = "BirthSIM/ProbeResidual-v1"
 
 OWN = """
 import numpy as np

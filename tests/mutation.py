@@ -290,7 +290,18 @@ def main() -> None:
         print_results(module, results, before.get(module, {}).get("mutants", {}))
 
     files = sorted({str(Path(__file__).with_name(f"test_{name}.py")) for module in options.module for name in MODULES[module]})
-    arguments = ["-qq", "-s", "--tb=no", "--no-header", "-m", "not slow", "-p", "no:xdist", "-p", "no:cacheprovider"]
+    arguments = [
+        "-qq",
+        "-s",
+        "--tb=no",
+        "--no-header",
+        "-m",
+        "not slow and not weekly",
+        "-p",
+        "no:xdist",
+        "-p",
+        "no:cacheprovider",
+    ]
     sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options.module, options.every, report)]))
 
 

@@ -17,7 +17,7 @@ from agents.residual_controller import ResidualController
 from agents.sb3_adapter import SB3VecEnv
 from agents.settings import ResidualSettings
 
-CIRCLE = "BirthSIM/CircleResidual-v0"
+CIRCLE = "BirthSIM/CircleResidual-v1"
 TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))
 VARIABLE = ResidualSettings(impedance="variable")
 
@@ -93,7 +93,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(tmp_path, a
         assert len(np.unique(actions.round(3), axis=0)) > 20
     assert (np.abs(taken.actions(rows)) < 1).mean() > 0.5
     controller = ResidualController(policy=tmp_path)
-    plain = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2)
+    plain = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2)
     plain.reset(seed=0)
     assert controller.command(plain.measurement, plain.reference).shape == (4, 2)
 

@@ -61,7 +61,7 @@ def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, ca
 
 
 def test_a_take_shows_the_run_of_the_environment():
-    env = gymnasium.make("BirthSIM/Forceps-v0", randomize=True, policy_period=0.001)
+    env = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001)
     found = take(env, make_controller("backstepping", RIG), 3, (0.5, 1.5), 25, lambda count: None)
     law = make_controller("backstepping", RIG)
     _, info = env.reset(seed=3)
@@ -84,7 +84,7 @@ def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
         def command(self, measurement, reference):
             return np.array([1.0, -1.0, 1.0, -1.0])
 
-    env = gymnasium.make("BirthSIM/Forceps-v0", policy_period=0.001)
+    env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001)
     found = take(env, Slam(), 0, (0.0, 1.5), 10, lambda count: None)
     assert np.isinf(found.errors[-1])
     assert found.scenes[-1].piston == found.scenes[-2].piston
@@ -144,7 +144,7 @@ def test_what_is_not_finite_is_left_out(values, pair):
         (["--begin", "nan", "--out", "a.gif"], "allowed: from 0 to 15 s"),
         (["--controller", "backstepping", "nobody", "--out", "a.gif"], "controller = 'nobody'; allowed: backstepping, "),
         (["--out", "a.gif", "--controller", "backstepping"], "expected 2 arguments"),
-        (["--env", "BirthSIM/Moon-v0", "--out", "a.gif"], "--env 'BirthSIM/Moon-v0'; allowed: BirthSIM/Circle-v0"),
+        (["--env", "BirthSIM/Moon-v1", "--out", "a.gif"], "--env 'BirthSIM/Moon-v1'; allowed: BirthSIM/Circle-v1"),
         (["--rate", "30", "--out", "a.gif"], "argument --rate: invalid choice: "),
         (["--parameters", "nowhere.toml", "--out", "a.gif"], "parameters = 'nowhere.toml' cannot be read"),
     ],

@@ -12,7 +12,7 @@ from birthsim_env import Parameters
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-CIRCLE = "BirthSIM/Circle-v0"
+CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = math.nan, math.inf
 
 
@@ -134,9 +134,9 @@ def test_an_impossible_number_of_lanes_is_refused(lanes):
 
 
 def test_unknown_ids_and_arguments_name_themselves():
-    message = refusal(lambda: gymnasium.make("BirthSIM/Square-v0"), gymnasium.error.NameNotFound)
+    message = refusal(lambda: gymnasium.make("BirthSIM/Square-v1"), gymnasium.error.NameNotFound)
     assert "Square" in message
-    assert "v0" in refusal(lambda: gymnasium.make("BirthSIM/Circle-v9"), gymnasium.error.VersionNotFound)
+    assert "v1" in refusal(lambda: gymnasium.make("BirthSIM/Circle-v9"), gymnasium.error.VersionNotFound)
     names_all(
         refusal(lambda: gymnasium.make(CIRCLE, sensor="lab"), TypeError),
         ("'sensor'", "action_mode, valves, sensors, randomize"),

@@ -29,7 +29,7 @@ from agents.training import train
 from birthsim_env import Parameters
 from tests.console import COMMANDS, PATIENCE, ROOT, call
 
-PROBE = "BirthSIM/ProbeResidual-v0"
+PROBE = "BirthSIM/ProbeResidual-v1"
 RESIDUAL = ResidualSettings()
 TINY = TrainingSettings(
     PROBE, steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
@@ -333,7 +333,7 @@ def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, 
 
 
 CONFIGURATION = """[training]
-environment = "BirthSIM/ProbeResidual-v0"
+environment = "BirthSIM/ProbeResidual-v1"
 steps = 4096
 lanes = 8
 rollout = 32

@@ -13,20 +13,20 @@ from birthsim_env.lanes import Array
 from birthsim_env.randomization import documented_ranges
 
 SETUPS = [
-    ("BirthSIM/Circle-v0", "two_valves", "lugre"),
-    ("BirthSIM/Circle-v0", "one_valve", "coulomb"),
-    ("BirthSIM/Circle-v0", "two_valves", "coulomb"),
-    ("BirthSIM/Circle-v0", "one_valve", "lugre"),
-    ("BirthSIM/Forceps-v0", "two_valves", "lugre"),
-    ("BirthSIM/Forceps-v0", "two_valves", "coulomb"),
-    ("BirthSIM/Forceps-v0", "one_valve", "lugre"),
-    ("BirthSIM/Dystocia-v0", "two_valves", "lugre"),
+    ("BirthSIM/Circle-v1", "two_valves", "lugre"),
+    ("BirthSIM/Circle-v1", "one_valve", "coulomb"),
+    ("BirthSIM/Circle-v1", "two_valves", "coulomb"),
+    ("BirthSIM/Circle-v1", "one_valve", "lugre"),
+    ("BirthSIM/Forceps-v1", "two_valves", "lugre"),
+    ("BirthSIM/Forceps-v1", "two_valves", "coulomb"),
+    ("BirthSIM/Forceps-v1", "one_valve", "lugre"),
+    ("BirthSIM/Dystocia-v1", "two_valves", "lugre"),
 ]
 
 
 def corner(corner_seed: int, friction: str) -> birthsim_env.Parameters:
     rng = np.random.default_rng(corner_seed)
-    changes = {name: float(rng.choice(bounds)) for name, bounds in documented_ranges().items()}
+    changes = {name: float(rng.choice(bounds)) for name, bounds in documented_ranges(birthsim_env.Parameters()).items()}
     return birthsim_env.Parameters().replace({**changes, "friction.law": friction})
 
 

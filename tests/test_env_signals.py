@@ -15,8 +15,8 @@ from birthsim_env.observation import ENTRIES
 from birthsim_env.parameters import Parameters
 from tests import linkage_by_points as by_points
 
-IDS = tuple(f"BirthSIM/{name}-v0" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))
-TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
+IDS = tuple(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))
+TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 
 def make(name=IDS[0], **arguments) -> BirthSIMEnv:
@@ -92,10 +92,10 @@ def test_an_ideal_observation_is_info_over_the_documented_scales(name):
 
 
 def test_info_has_every_documented_field_and_agrees_with_the_plant():
-    env = make("BirthSIM/Forceps-v0", randomize=True)
+    env = make("BirthSIM/Forceps-v1", randomize=True)
     _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
     for step, info in enumerate(infos):
-        assert set(info) == {*FIELDS, *TERMS}
+        assert set(info) == {*FIELDS, *TERMS, "is_success"}
         for field, (size, _) in FIELDS.items():
             assert isinstance(info[field], float) if size == 1 else info[field].shape == (size,), field
         assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)

@@ -16,7 +16,7 @@ from baselines.metrics import UNITS, EpisodeMetrics
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 
-PROBE, CIRCLE = "BirthSIM/Probe-v0", "BirthSIM/Circle-v0"
+PROBE, CIRCLE = "BirthSIM/Probe-v1", "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 
@@ -321,7 +321,8 @@ def test_the_table_has_a_row_per_metric_with_figures_and_three_columns_per_contr
     assert "hunting_x" not in cells, "no controller has anything to say of it"
     assert cells["lost episodes"] == ["", "0 of 3", "", "", "1 of 3", "", ""]
     assert cells["control cost per lane and call"] == ["us", "1.23", "", "", "2", "", ""]
-    assert len(lines) == 2 + 2 + 2
+    assert cells["successful episodes"][1] == "0 of 0"
+    assert len(lines) == 2 + 2 + 4
     means = table([one], "mean").splitlines()
     assert means[0].split("|")[3].strip() == "law: mean"
     assert means[2].split("|")[3].strip() == f"{np.mean([1, 2, 9.87654]):.3g}"

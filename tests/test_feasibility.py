@@ -15,7 +15,7 @@ from tests import linkage_by_points as by_points
 from tests import rigid_body
 from tests.closed_loop import FRICTIONLESS
 
-PROBE = "BirthSIM/Probe-v0"
+PROBE = "BirthSIM/Probe-v1"
 RIG = Parameters()
 STIFF = StiffnessSchedule(closed_loop=(1e5,))
 """The hand moves the place that it acts at by less than 3 mm."""
@@ -130,7 +130,7 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
 
 
 def test_looking_ahead_changes_nothing() -> None:
-    one, other = (gymnasium.make_vec("BirthSIM/Descent-v0", num_envs=3, randomize=True) for _ in range(2))
+    one, other = (gymnasium.make_vec("BirthSIM/Descent-v1", num_envs=3, randomize=True) for _ in range(2))
     one.reset(seed=4), other.reset(seed=4)
     demand(one)
     for _ in range(5):

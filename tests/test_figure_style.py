@@ -29,7 +29,7 @@ def grey(colour):
 
 def cell(controller, sensors, plant):
     said = {"median": 1.0, "low": 0.5, "high": 2.0}
-    place = {"environment": "BirthSIM/Circle-v0", "sensors": sensors, "plant": plant}
+    place = {"environment": "BirthSIM/Circle-v1", "sensors": sensors, "plant": plant}
     return {"controller": controller, **place, "metrics": {"settled_rms": said, "air": said}}
 
 

@@ -46,7 +46,7 @@ def test_it_is_the_papers_law_until_a_valve_saturates_and_then_nearer_to_the_for
 
 def survived(controller: Controller, world: int) -> float:
     """Seconds until the end effector is lost on a varied circle."""
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=1, randomize=True, policy_period=1e-3)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=1, randomize=True, policy_period=1e-3)
     env.reset(seed=[world])
     controller.reset(np.ones(1, dtype=np.bool_))
     for tick in range(12_000):

@@ -23,7 +23,7 @@ from birthsim_env.signals import REFERENCES, Measurement, Reference
 from tests import closed_loop
 
 assert agents  # importing it registers the ids
-PROBE, CIRCLE = "BirthSIM/ProbeResidual-v0", "BirthSIM/CircleResidual-v0"
+PROBE, CIRCLE = "BirthSIM/ProbeResidual-v1", "BirthSIM/CircleResidual-v1"
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -31,7 +31,7 @@ PROBE, CIRCLE = "BirthSIM/ProbeResidual-v0", "BirthSIM/CircleResidual-v0"
 def test_zero_actions_are_bit_for_bit_the_law(law: str, sensors: str) -> None:
     """Fixed impedance, and the laws that have none to vary, are tested with the environment."""
     lanes, arguments = 3, {"sensors": sensors, "randomize": True}
-    outside = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=lanes, policy_period=1e-3, **arguments)
+    outside = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, policy_period=1e-3, **arguments)
     outside.reset(seed=3)
     varied = {}
     for impedance in ("variable_kp", "variable"):
@@ -227,7 +227,7 @@ def test_less_damping_than_the_law_has_is_bit_for_bit_the_law() -> None:
 def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
     arguments = {"num_envs": 3, "sensors": sensors, "randomize": True}
     inside = gymnasium.make_vec(PROBE, law="none", **arguments)
-    outside = gymnasium.make_vec("BirthSIM/Probe-v0", **arguments)
+    outside = gymnasium.make_vec("BirthSIM/Probe-v1", **arguments)
     inside.reset(seed=6), outside.reset(seed=6)
     for action in np.random.default_rng(0).uniform(-0.1, 0.1, (60, 3, 4)).astype(np.float32):
         for one, other in zip(inside.step(action)[1:4], outside.step(action)[1:4], strict=True):
@@ -240,7 +240,7 @@ def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
 def test_whatever_a_policy_says_there_are_gains(scenario: str) -> None:
     """All entries at their limits, in all combinations: a law without gains would refuse by an exception."""
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 5)).reshape(5, -1).T.astype(np.float32)
-    name = f"BirthSIM/{scenario.capitalize()}Residual-v0"
+    name = f"BirthSIM/{scenario.capitalize()}Residual-v1"
     env = gymnasium.make_vec(name, num_envs=len(corners), impedance="variable", randomize=True)
     env.reset(seed=0)
     rng = np.random.default_rng(0)

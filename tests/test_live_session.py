@@ -45,7 +45,7 @@ def part(one: Session, name: str) -> Array:
 )
 def test_without_a_person_it_is_the_environment_bit_for_bit(scenario: str, controller: str, sensors: str) -> None:
     one = session(scenario=scenario, controller=controller, sensors=sensors, scenario_force=True)
-    env: Any = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v0", num_envs=1, policy_period=0.001, sensors=sensors)
+    env: Any = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v1", num_envs=1, policy_period=0.001, sensors=sensors)
     env.reset(seed=[0])
     law = make_controller(controller, RIG)
     for _ in range(12):

@@ -102,7 +102,7 @@ def test_pressures_settle_where_leakage_balances() -> None:
 def test_on_the_circle_the_error_is_that_of_two_valves() -> None:
     """A part of the Circle, with friction: the same error, and more air, since a valve that fills also drains."""
     two, one = (
-        evaluate("BirthSIM/Circle-v0", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=2.5).summary()
+        evaluate("BirthSIM/Circle-v1", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=2.5).summary()
         for name in ("backstepping-weight", "backstepping-one-valve")
     )
     for axis in "xy":
@@ -113,7 +113,7 @@ def test_on_the_circle_the_error_is_that_of_two_valves() -> None:
 def test_an_environment_with_one_valve_takes_rows_0_and_2() -> None:
     states = []
     for valves, rows in (("two_valves", [0, 1, 2, 3]), ("one_valve", [0, 2])):
-        env = gymnasium.make("BirthSIM/Circle-v0", valves=valves, policy_period=0.001)
+        env = gymnasium.make("BirthSIM/Circle-v1", valves=valves, policy_period=0.001)
         env.reset(seed=0)
         rig, law = env.unwrapped, make_controller("backstepping-one-valve", Parameters())
         for _ in range(300):

@@ -36,7 +36,7 @@ class ByNumpy:
 
 def positions(controller, sensors):
     """Of the end effector (T, 2), m, over a second of one rig under the controller."""
-    env = gymnasium.make("BirthSIM/Probe-v0", policy_period=1e-3, randomize=True, sensors=sensors)
+    env = gymnasium.make("BirthSIM/Probe-v1", policy_period=1e-3, randomize=True, sensors=sensors)
     env.reset(seed=4)
     controller.reset()
     path = []
@@ -67,7 +67,7 @@ def test_the_example_moves_the_rig_as_the_controller_does(tmp_path, example, squ
 def test_the_example_begins_anew_after_a_reset(tmp_path, example):
     exported(policy(), tmp_path)
     controller = example["OnnxPolicy"](Parameters(), tmp_path / "policy.onnx")
-    env = gymnasium.make("BirthSIM/Probe-v0", policy_period=1e-3)
+    env = gymnasium.make("BirthSIM/Probe-v1", policy_period=1e-3)
     runs = []
     for steps in (25, 40):
         env.reset(seed=4)
@@ -92,7 +92,7 @@ def test_the_example_runs_without_torch_and_prints_errors_and_times(tmp_path):
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     printed = done.stdout.splitlines()
-    assert printed[0] == "BirthSIM/Probe-v0, 0.7 s, rig and experiment of seed 3; settled RMS error:"
+    assert printed[0] == "BirthSIM/Probe-v1, 0.7 s, rig and experiment of seed 3; settled RMS error:"
     rows = {line[:28].strip(): line[28:].split() for line in printed[1:]}
     for name in ("backstepping", "with the policy"):
         assert 0 < float(rows[name][0]) < 100

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
@@ -27,10 +26,11 @@ from agents.policy_network import PolicyNetwork
 from agents.residual_controller import ResidualController, observation_size
 from agents.residual_law import action_names
 from agents.settings import ResidualSettings
+from birthsim_env.learned import command
 from tests.console import call
 
 ROOT = Path(__file__).parent.parent
-ENVIRONMENT = "BirthSIM/ProbeResidual-v0"
+ENVIRONMENT = "BirthSIM/ProbeResidual-v1"
 SETTINGS = ResidualSettings(impedance="variable_kp", authority=40.0)
 assert agents  # importing it registers the residual environments
 
@@ -247,10 +247,13 @@ def refused(monkeypatch, capsys, *arguments):
     return complaint
 
 
-def test_the_script_is_this_command():
+def test_the_script_is_this_command(monkeypatch, capsys):
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
-    module, _, name = scripts["birthsim-export"].partition(":")
-    assert getattr(import_module(module), name) is export.main
+    assert scripts["birthsim-export"] == "birthsim_env.learned:command"
+    monkeypatch.setattr(sys, "argv", ["/somewhere/birthsim-export"])
+    monkeypatch.setattr(export, "main", lambda: print("export"))
+    command()
+    assert capsys.readouterr().out == "export\n"
 
 
 def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):

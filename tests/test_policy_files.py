@@ -21,7 +21,7 @@ from agents.residual_controller import ResidualController, observation_size
 from agents.settings import ResidualSettings
 
 ROOT = Path(__file__).parent.parent
-ENVIRONMENT = "BirthSIM/CircleResidual-v0"
+ENVIRONMENT = "BirthSIM/CircleResidual-v1"
 SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)
 INPUTS = observation_size(SETTINGS)
 
@@ -141,10 +141,10 @@ def test_eleven_layers_come_back_in_order(tmp_path):
 
 
 def test_writing_again_replaces_the_policy_whole(folder):
-    other = Policy(network(hidden=(4,), seed=5), "BirthSIM/ProbeResidual-v0", ResidualSettings(), {"steps": 9})
+    other = Policy(network(hidden=(4,), seed=5), "BirthSIM/ProbeResidual-v1", ResidualSettings(), {"steps": 9})
     save_policy(other, folder)
     read = load_policy(folder)
-    assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v0", {"steps": 9})
+    assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v1", {"steps": 9})
     assert len(read.network.layers) == 2
     assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
 
@@ -357,7 +357,7 @@ def test_running_a_policy_needs_neither_torch_nor_stable_baselines(folder):
         "from birthsim_env import Parameters\n"
         "import gymnasium, sys\n"
         f"law = make_controller('residual', Parameters(), policy={str(folder)!r})\n"
-        "env = gymnasium.make_vec('BirthSIM/Circle-v0', num_envs=2)\n"
+        "env = gymnasium.make_vec('BirthSIM/Circle-v1', num_envs=2)\n"
         "env.reset(seed=0)\n"
         "print(law.command(env.measurement, env.reference).shape)\n"
     )

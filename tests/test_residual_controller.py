@@ -19,7 +19,7 @@ from birthsim_env import Parameters
 from birthsim_env.observation import SIZE
 
 assert agents  # importing it registers the ids
-CIRCLE, PROBE = "BirthSIM/CircleResidual-v0", "BirthSIM/ProbeResidual-v0"
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
 
 
 def random_network(inputs, outputs, reach=0.5, squashed=False, seed=0) -> PolicyNetwork:
@@ -52,7 +52,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5
     arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
     inside = gymnasium.make_vec(CIRCLE, **arguments, **settings.to_dict())
-    outside = gymnasium.make_vec("BirthSIM/Circle-v0", policy_period=1e-3, **arguments)
+    outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
     observation, _ = inside.reset(seed=11)
     outside.reset(seed=11)
     for _ in range(steps):
@@ -66,7 +66,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     assert np.ptp(actions, axis=0).max() > 0.1 * reach, "it says different things in different worlds"
     # It is not the law alone that went there.
     if settings.law != "none":
-        plain = gymnasium.make_vec("BirthSIM/Circle-v0", policy_period=1e-3, **arguments)
+        plain = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
         law = make_controller(settings.law, Parameters())
         plain.reset(seed=11)
         for _ in range(10 * steps):
@@ -83,7 +83,7 @@ def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
     observation, _ = inside.reset(seed=1)
     states = []
     for believed in (rig, None):
-        outside = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=2, policy_period=1e-3, parameters=rig)
+        outside = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, policy_period=1e-3, parameters=rig)
         controller = ResidualController(believed, tmp_path)
         outside.reset(seed=1)
         for _ in range(200):
@@ -112,8 +112,8 @@ def steering(tmp_path):
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
-    env = gymnasium.make("BirthSIM/Circle-v0", policy_period=1e-3, sensors=sensors).unwrapped
-    lanes = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3, sensors=sensors)
+    env = gymnasium.make("BirthSIM/Circle-v1", policy_period=1e-3, sensors=sensors).unwrapped
+    lanes = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=1e-3, sensors=sensors)
     one, several = ResidualController(policy=steering), ResidualController(policy=steering)
     env.reset(seed=5)
     lanes.reset(seed=5)
@@ -127,7 +127,7 @@ def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_a_reset_forgets_the_last_episode(steering, sensors):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3, sensors=sensors)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3, sensors=sensors)
     controller, runs = ResidualController(policy=steering), []
     for calls in (137, 150):
         env.reset(seed=2)
@@ -152,7 +152,7 @@ SMOOTH, SHARE, MET = slice(SIZE + 2, SIZE + 4), slice(SIZE + 4, SIZE + 6), slice
 
 
 def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, policy_period=1e-3)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
     controller = ResidualController(policy=steering)
     env.reset(seed=2)
     for _ in range(45):
@@ -174,7 +174,7 @@ def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
 
 
 def test_the_policy_is_asked_once_per_policy_period(steering, asked):
-    env = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=1e-3)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=1e-3)
     controller = ResidualController(policy=steering)
     env.reset(seed=0)
     for _ in range(41):

@@ -21,8 +21,8 @@ from birthsim_env.observation import ENTRIES, SIZE
 from birthsim_env.scenarios import SCENARIOS
 
 assert birthsim_env  # importing it registers the ids
-IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v0" for name in SCENARIOS)
-CIRCLE, PROBE = "BirthSIM/CircleResidual-v0", "BirthSIM/ProbeResidual-v0"
+IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS)
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
 RIG = Parameters()
 
 
@@ -94,7 +94,7 @@ def test_zero_actions_on_a_rig_of_ones_own_are_the_law_told_of_that_rig():
     rows = by_hand(CIRCLE, 60, 0, parameters=rig)
     assert_follows(single(parameters=rig), np.zeros((60, 2), np.float32), rows, seed=0)
     # The law's belief follows the rig: a law that believes in the default goes elsewhere.
-    env, law = gymnasium.make("BirthSIM/Circle-v0", policy_period=1e-3, parameters=rig).unwrapped, BacksteppingController()
+    env, law = gymnasium.make("BirthSIM/Circle-v1", policy_period=1e-3, parameters=rig).unwrapped, BacksteppingController()
     env.reset(seed=0)
     for _ in range(600):
         env.step(law.command(env.measurement, env.reference))
@@ -269,7 +269,7 @@ def test_observations_end_with_the_last_action_and_what_the_law_remembers(argume
     observation, _, _, _, infos = env.step(actions)
     np.testing.assert_array_equal(observation[:, SIZE : SIZE + size], actions)
     np.testing.assert_allclose(observation[:, SIZE + size : SIZE + 2 * size], (1 - np.exp(-10 / 20)) * actions, rtol=1e-6)
-    np.testing.assert_allclose(infos["reward_action_change"], -0.05 * np.abs(actions).sum(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(infos["reward_action_change"], -0.2 / 8.75 * np.abs(actions).mean(axis=1), rtol=1e-6)
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])

@@ -121,7 +121,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed
         return made
 
     monkeypatch.setattr(command, "evaluate", stopped)
-    arguments = ("--env", "BirthSIM/Probe-v0", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
+    arguments = ("--env", "BirthSIM/Probe-v1", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     command.main()
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(4))]

@@ -13,7 +13,7 @@ from birthsim_env import Parameters
 from birthsim_env.seeding import stream
 from birthsim_env.sensors import IdealSensors, LabSensors
 
-CIRCLE = "BirthSIM/Circle-v0"
+CIRCLE = "BirthSIM/Circle-v1"
 SEEN = ("position", "position_time", "velocity", "pressures")
 
 

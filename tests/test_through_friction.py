@@ -126,7 +126,7 @@ def test_a_hundred_unknown_rigs_are_held(sensors: str) -> None:
     """Rigs from the whole range, 2-5 kg and valves of 1.5-8 ms, under a controller that believes the default."""
     lanes, rng = 100, np.random.default_rng(1)
     lane = np.arange(lanes)
-    rigs = [draw_parameters(BELIEVED, documented_ranges(), stream(seed, 0, "parameters")) for seed in range(lanes)]
+    rigs = [draw_parameters(BELIEVED, documented_ranges(BELIEVED), stream(seed, 0, "parameters")) for seed in range(lanes)]
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
     force[lane % 2, lane] = rng.uniform(5, 30, lanes) * rng.choice([-1, 1], lanes)
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
@@ -145,7 +145,7 @@ def test_circles_of_unknown_rigs_against_the_papers_law() -> None:
     medians = {}
     for name in ("backstepping", "admittance-backstepping"):
         result = evaluate(
-            "BirthSIM/Circle-v0", make_controller(name, BELIEVED), name, 64, 500, False, sensors="ideal", randomize=True
+            "BirthSIM/Circle-v1", make_controller(name, BELIEVED), name, 64, 500, False, sensors="ideal", randomize=True
         )
         assert not any(result.lost)
         medians[name] = result.summary()["settled_rms"]["median"]

@@ -22,7 +22,7 @@ from baselines.backstepping import BacksteppingController
 from baselines.evaluation import evaluate
 from birthsim_env import Parameters
 
-PROBE = "BirthSIM/ProbeResidual-v0"
+PROBE = "BirthSIM/ProbeResidual-v1"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
     PROBE, steps=30_000, lanes=32, rollout=32, batch=256, epochs=4, hidden=(32, 32), learning_rate=2e-3,
@@ -200,7 +200,7 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     residual = ResidualSettings("backstepping-weight", "variable_kp", 22.0, 0.05, 0.02)
     settings = replace(
         BRIEF,
-        environment="BirthSIM/ForcepsResidual-v0",
+        environment="BirthSIM/ForcepsResidual-v1",
         sensors="lab",
         randomize="plant",
         seed=30,
@@ -212,7 +212,7 @@ def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
     expected = {"sensors": "lab", "randomize": "plant", "parameters": rig, **residual.to_dict()}
     expected["autoreset_mode"] = gymnasium.vector.AutoresetMode.SAME_STEP
     for (name, arguments, _), lanes in zip(made, (4, 4), strict=True):
-        assert name == "BirthSIM/ForcepsResidual-v0"
+        assert name == "BirthSIM/ForcepsResidual-v1"
         assert arguments == {**expected, "num_envs": lanes}
     # Seed 30 starts from worlds of its own; all validations take the same ones, which training never meets.
     (_, _, trains), (_, _, checks) = made
@@ -350,8 +350,8 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
     arguments = {"randomize": True, "duration": 2.5}
     inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
     score = validate(inside, load_policy(folder).network.actions, 40)
-    result = evaluate("BirthSIM/Probe-v0", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
-    law = evaluate("BirthSIM/Probe-v0", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
+    result = evaluate("BirthSIM/Probe-v1", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
+    law = evaluate("BirthSIM/Probe-v1", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
     np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
     np.testing.assert_array_equal(result.demand, score.demand)

@@ -125,7 +125,8 @@ def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_cost
 def test_an_interrupt_before_the_first_trial_ends_with_status_130(own, tmp_path, trial_costs, monkeypatch, capsys):
     trial_costs[1][0] = 0
     status, printed, complained = call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
-    assert (status, printed) == (130, "")
+    assert status == 130
+    assert printed.startswith("rigs drawn: ")
     assert complained.endswith("birthsim-tune: interrupted\n")
     assert not (tmp_path / "out" / "gains.json").exists()
 
@@ -149,7 +150,7 @@ def test_the_robust_statistic():
 
 def test_probes_are_pushed_rigs_of_the_documented_ranges():
     probes = tune.probes(Parameters(), 40)
-    for name, (low, high) in documented_ranges().items():
+    for name, (low, high) in documented_ranges(Parameters()).items():
         section, field = name.split(".")
         values = [getattr(getattr(rig, section), field) for rig in probes.rigs]
         assert low <= min(values) < low + 0.2 * (high - low)

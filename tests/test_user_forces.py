@@ -13,7 +13,7 @@ from birthsim_env.scenarios import SCENARIOS
 from birthsim_env.seeding import stream
 from birthsim_env.user_forces import AlternatingSteps, Contractions, Pulls, Ramp
 
-PROBE = "BirthSIM/Probe-v0"
+PROBE = "BirthSIM/Probe-v1"
 
 
 def course(force, seconds, seed=0, step=0.001):
@@ -183,7 +183,7 @@ def test_impossible_profiles_are_refused_by_name(make, words):
 def test_every_push_of_the_circle_is_a_jump_however_small():
     """2 N over 0.1 s change by 20 N/s, less than a forceps' pull of 45 N/s, which is none."""
     for force, jumps in ((AlternatingSteps(amplitude=2.0), True), (Pulls((90.0,), rate=45.0), False)):
-        env = gymnasium.make("BirthSIM/Circle-v0", user_force=force)
+        env = gymnasium.make("BirthSIM/Circle-v1", user_force=force)
         env.reset(seed=0)
         since = [env.step(np.zeros(env.action_space.shape))[4]["since_jump"] for _ in range(115)]
         assert since[98] == pytest.approx(0.99)

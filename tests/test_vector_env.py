@@ -11,8 +11,8 @@ from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 from birthsim_env.info import FIELDS
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v0", "BirthSIM/Probe-v0", "BirthSIM/Forceps-v0"
-TERMS = ("reward_tracking", "reward_hunting", "reward_effort", "reward_action_change", "reward_failure")
+CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1", "BirthSIM/Forceps-v1"
+TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 
 def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
@@ -37,7 +37,7 @@ def assert_same(expected, actual, where=""):
 
 
 def lane_of(infos, lane):
-    return {name: infos[name][lane] for name in (*FIELDS, *TERMS) if name in infos}
+    return {name: infos[name][lane] for name in (*FIELDS, *TERMS, "is_success") if name in infos}
 
 
 def follow(env, actions, seed):
@@ -74,7 +74,7 @@ def test_make_vec_gives_the_native_class_with_batched_spaces():
             marks=pytest.mark.slow,
         ),
         pytest.param(
-            "BirthSIM/Descent-v0",
+            "BirthSIM/Descent-v1",
             {"randomize": True, "action_mode": "flow", "policy_period": 0.02},
             marks=pytest.mark.slow,
         ),
@@ -136,7 +136,8 @@ def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
             assert_same(info, lane_of(infos["final_info"], lane))
             np.testing.assert_array_equal(observation[lane], after[0])
             assert_same({name: after[1][name] for name in FIELDS}, {name: infos[name][lane] for name in FIELDS})
-            assert (infos["time"][lane], infos[TERMS[-1]][lane]) == (0.0, -250.0 if dead else 0.0)
+            assert (infos["time"][lane], infos["is_success"][lane]) == (0.0, False)
+            assert not (dead and info["is_success"])
             instants[lane].append(step)
         if ended.any():
             np.testing.assert_array_equal(infos["_final_obs"], ended)
@@ -211,7 +212,7 @@ def test_the_callers_action_array_is_neither_kept_nor_written(lanes):
     env.step(action)
     action[:] = -0.1
     # The change of an action counts, though the caller uses one array again and again.
-    np.testing.assert_allclose(env.step(action)[4]["reward_action_change"], -0.05 * 4 * 0.2)
+    np.testing.assert_allclose(env.step(action)[4]["reward_action_change"], -0.2 * 0.2 / 8.75)
     np.testing.assert_array_equal(action, -0.1)
 
 

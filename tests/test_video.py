@@ -29,7 +29,7 @@ def frames_of(path):
 
 def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_path):
     pictures = {"render_mode": "rgb_array", "picture_size": SIZE}
-    env = gymnasium.make("BirthSIM/Forceps-v0", policy_period=0.02, max_episode_steps=STEPS, **pictures)
+    env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.02, max_episode_steps=STEPS, **pictures)
     env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda episode: True, name_prefix="pull")
     drawn = []
     for episode in range(2):
@@ -51,7 +51,7 @@ def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_p
 
 @pytest.mark.filterwarnings("ignore:.*autoreset mode is same-step:UserWarning")
 def test_several_environments_are_recorded_side_by_side(tmp_path):
-    envs = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=3, render_mode="rgb_array", policy_period=0.02, picture_size=SIZE)
+    envs = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, render_mode="rgb_array", policy_period=0.02, picture_size=SIZE)
     recorder = RecordVectorVideo(envs, str(tmp_path / "videos"), video_length=4, video_aspect_ratio=(3, 1))
     recorder.reset(seed=0)
     for _ in range(5):
@@ -64,8 +64,8 @@ def test_several_environments_are_recorded_side_by_side(tmp_path):
 
 @pytest.mark.parametrize("period", [0.001, 0.01, 0.04])
 def test_a_recording_plays_in_real_time(period):
-    single = gymnasium.make("BirthSIM/Circle-v0", policy_period=period)
-    several = gymnasium.make_vec("BirthSIM/Circle-v0", num_envs=2, policy_period=period)
+    single = gymnasium.make("BirthSIM/Circle-v1", policy_period=period)
+    several = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=period)
     assert single.metadata["render_fps"] == several.metadata["render_fps"] == 1 / period
 
 
@@ -74,7 +74,7 @@ def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypa
     monkeypatch.setattr(Renderer, "show", lambda self, scene, rate: shown.append((scene.time, rate)))
     for period, times, rate in ((0.001, (0.0, 0.02, 0.04), 50.0), (0.01, (0.0, 0.02, 0.04), 50.0), (0.04, (0.0, 0.04), 25.0)):
         shown.clear()
-        env = gymnasium.make("BirthSIM/Circle-v0", policy_period=period, render_mode="human")
+        env = gymnasium.make("BirthSIM/Circle-v1", policy_period=period, render_mode="human")
         env.reset(seed=0)
         for _ in range(round(0.04 / period)):
             env.step(np.zeros(4, dtype=np.float32))
@@ -82,10 +82,10 @@ def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypa
 
 
 def test_frames_come_in_the_size_asked_for():
-    env = gymnasium.make("BirthSIM/Probe-v0", render_mode="rgb_array", picture_size=(1280, 960))
+    env = gymnasium.make("BirthSIM/Probe-v1", render_mode="rgb_array", picture_size=(1280, 960))
     env.reset(seed=0)
     assert env.render().shape == (960, 1280, 3)
-    envs = gymnasium.make_vec("BirthSIM/Probe-v0", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
+    envs = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
     envs.reset(seed=0)
     assert [frame.shape for frame in envs.render()] == 2 * [(300, 400, 3)]
 
@@ -93,12 +93,12 @@ def test_frames_come_in_the_size_asked_for():
 @pytest.mark.parametrize("size", [(319, 480), (640, 239), (7681, 480), (640.0, 480.0), (640,), "640x480", None, (True, 480)])
 def test_an_impossible_size_is_refused_by_name(size):
     with pytest.raises(ValueError, match=r"picture_size = .*allowed: two whole numbers from 320 x 240 to 7680 x 4320 px"):
-        gymnasium.make("BirthSIM/Probe-v0", picture_size=size)
+        gymnasium.make("BirthSIM/Probe-v1", picture_size=size)
 
 
 def test_without_moviepy_gymnasium_says_so_before_anything_runs(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "moviepy", None)
-    env = gymnasium.make("BirthSIM/Circle-v0", render_mode="rgb_array")
+    env = gymnasium.make("BirthSIM/Circle-v1", render_mode="rgb_array")
     with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"(?i)moviepy is not installed"):
         RecordVideo(env, str(tmp_path / "videos"))
 

@@ -10,9 +10,11 @@ import gymnasium
 import birthsim_env
 from agents.settings import NO_LAW
 from baselines.commands.evaluate_all import JOBS, evaluate_all
+from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number, whole, write_json
 from baselines.evaluation import Evaluation, evaluate, overview, table
 from baselines.registry import controller_names, make_controller
+from birthsim_env.randomization import described
 
 
 def main() -> None:
@@ -28,7 +30,7 @@ def main() -> None:
     parser.add_argument(
         "--all", action="store_true", help="compare under all conditions; --env, --sensors, --randomize narrow them"
     )
-    parser.add_argument("--env", help="environment id (default: BirthSIM/Circle-v0, with --all every one)")
+    parser.add_argument("--env", help="environment id (default: BirthSIM/Circle-v1, with --all every one)")
     parser.add_argument(
         "--controller",
         "--controllers",
@@ -52,6 +54,8 @@ def main() -> None:
         "first the scenario and then both",
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    add_parts(parser)
+    add_set(parser)
     parser.add_argument("--jobs", type=whole, help=f"processes side by side, with --all (default: {JOBS})")
     studies = parser.add_mutually_exclusive_group()
     studies.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
@@ -69,11 +73,13 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     if arguments.all:
         if arguments.policy is not None:
             raise ValueError("--policy with --all; allowed: without it, --all compares controllers that need no policy")
+        if environment_parts(arguments):
+            raise ValueError("--reference or --user-force with --all; allowed: without it, --all has its own moving hands")
         evaluate_all(arguments)
         return
     if arguments.jobs is not None or arguments.no_studies or arguments.studies_only:
         raise ValueError("--jobs, --no-studies and --studies-only; allowed: with --all")
-    arguments.env = arguments.env or "BirthSIM/Circle-v0"
+    arguments.env = arguments.env or "BirthSIM/Circle-v1"
     arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = birthsim_env.parameters.load_parameters(arguments.parameters)
@@ -89,13 +95,20 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     if policies:
         names = ["backstepping", *laws] if names == ["residual"] else names
         names = list(dict.fromkeys([*names, "residual"]))
-    controllers = [(name, make_controller(name, rig)) for name in names if name != "residual"]
+    names = with_options([name for name in names if name != "residual"], arguments.set)
+    controllers = [(name, make_controller(name, rig)) for name in names]
     known = len(controllers)
     for place in policies:
         name = "residual" if len(policies) == 1 else f"residual {place.name}"
         controllers.append((name, make_controller("residual", rig, policy=place)))
-    folder = make_folder(arguments.out)
-    setting = {"parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize]}
+    setting = {
+        "parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize],
+        **environment_parts(arguments),
+    }  # fmt: skip
+    # What cannot be is said before the folder is made and anything runs.
+    gymnasium.make_vec(arguments.env, **setting).reset(seed=arguments.seed)
+    folder, drawn = make_folder(arguments.out), described(rig, setting["randomize"])
+    print(drawn)
     evaluations: list[Evaluation] = []
     for name, controller in controllers:
         try:
@@ -111,6 +124,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
 
     caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
     caption += f"randomised: {arguments.randomize}"
+    caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in environment_parts(arguments).items())
     classical, learned = evaluations[:known], evaluations[known:]
     # A seed that was interrupted is kept, but the table over seeds compares the same episodes.
     complete = [one for one in learned if len(one.seeds) == arguments.episodes]
@@ -125,7 +139,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         pictures += ", learning_curves"
         draw_learning_curves(learning_curves(policies), folder)
     lines = [caption, "", overview(evaluations)]
-    (folder / "evaluation.md").write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
+    (folder / "evaluation.md").write_text(f"{caption}\n\n{drawn}\n\n{text}\n", encoding="utf-8")
     shown = {key: str(value) for key, value in vars(arguments).items()}
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
     write_json(folder / "evaluation.json", {"arguments": shown, "rig": rig.to_dict(), "results": results})

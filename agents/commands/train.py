@@ -18,6 +18,7 @@ from agents.configuration import ALGORITHMS, TrainingSettings, configuration_nam
 from agents.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
 from birthsim_env.parameters import Parameters, load_parameters
+from birthsim_env.randomization import described
 
 
 def main() -> None:
@@ -58,6 +59,8 @@ def _train(arguments: argparse.Namespace) -> None:
     if training.environment not in known:
         raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
     rig = load_parameters(arguments.parameters)
+    # What cannot be is said before a folder is made and anything runs.
+    gymnasium.make(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors).reset(seed=0)
     first = training.seed if arguments.seed is None else arguments.seed
     seeds = range(first, first + arguments.seeds)
     folders = [arguments.out / f"seed_{seed}" for seed in seeds]
@@ -69,6 +72,7 @@ def _train(arguments: argparse.Namespace) -> None:
         (replace(training, seed=seed), residual, make_folder(folder), rig, arguments.resume, k % arguments.jobs)
         for k, (seed, folder) in enumerate(zip(seeds, folders, strict=True))
     ]
+    print(described(rig, training.randomize))
     results = _side_by_side(work, arguments.jobs) if arguments.jobs > 1 else [_one(*piece) for piece in work]
     _report(training, residual, list(seeds), results)
     print(f"written to {arguments.out}/")

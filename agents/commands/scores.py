@@ -1,0 +1,161 @@
+"""birthsim-scores: what every environment pays to shut valves, to every law and to the policies that come with the package."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.policy_files import WEIGHTS
+from agents.seeds import SHIPPED, policy_folders, shipped_names
+from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
+from baselines.comparison import ENVIRONMENTS, default_controllers, file_stem
+from baselines.evaluation import DISCOUNTS, evaluate
+from baselines.registry import UNCONTROLLED, make_controller
+from baselines.statistics import judged, number, summarize
+from baselines.tasks import Result, Task, code_stamp, run_tasks
+from birthsim_env.parameters import Parameters
+from birthsim_env.scores import BEST, RIGS, ROLES, SHUT
+from birthsim_env.sensors import SENSORS
+
+Rows = dict[str, dict[str, Any]]
+"""Controller -> its figures in one environment under one condition."""
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-scores",
+        description="Measure what every environment pays: shut, slammed and random valves, every law that is not slow, and the "
+        "policies that come with the package, with every sensor model, on the nominal rig and on rigs drawn at random.",
+        epilog="What the output folder holds of the same settings and code is kept, so that an interrupted run goes on.",
+    )
+    parser.add_argument("--episodes", type=whole, default=64, help="per controller and condition (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=70000, help="seed of the first episode (default: %(default)s)")
+    parser.add_argument("--jobs", type=whole, default=2, help="processes side by side (default: %(default)s)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for scores.json and scores.md")
+    run(parser, _scores)
+
+
+def _scores(arguments: argparse.Namespace) -> None:
+    if arguments.episodes < 2:
+        raise ValueError(f"--episodes {arguments.episodes}; allowed: 2 or more, half of them choose the best law")
+    folder = make_folder(arguments.out)
+    conditions = [(name, sensors, rig) for name in ENVIRONMENTS for sensors in SENSORS for rig in RIGS]
+    tasks = {
+        (where, controller): _task(where, controller, seed, arguments)
+        for where in conditions for controller, seed in _contestants(where[0])
+    }  # fmt: skip
+    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs, "scores")
+    if failures:
+        name, problem = next(iter(failures.items()))
+        raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first {name}: {problem}")
+    scores: dict[str, Any] = {}
+    lines = [f"# Scores\n\n{_CAPTION.format(episodes=arguments.episodes, seed=arguments.seed)}"]
+    for where in conditions:
+        name, sensors, rig = where
+        rows = {controller: done[task.name] for (place, controller), task in tasks.items() if place == where}
+        short = name.removeprefix("BirthSIM/").removesuffix("-v1")
+        known = _roles(rows)
+        scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
+        lines.append(f"## {short}, {sensors} sensors, {RIGS[rig]} rig\n\n{_table(rows, known)}")
+    write_json(folder / "scores.json", {"code": code_stamp(), "seed": arguments.seed, "scores": scores})
+    (folder / "scores.md").write_text("\n\n".join(lines) + "\n", encoding="utf-8")
+    print("\n\n".join(lines))
+
+
+_CAPTION = (
+    "What an episode pays, by `birthsim-scores`. {episodes} episodes from seed {seed}; where the rig is drawn, so is the "
+    "scenario. Laws run at 1 kHz, random openings last 10 ms. Discounts are per 10 ms. The error is the settled one, median "
+    "over the episodes; a success is an episode with less than 1 mm. The score is 0 for shut valves and 100 for the best "
+    "law, which is chosen by one half of the episodes and measured by the other. docs/controllers.md says who uses the "
+    "force sensor, which is ideal in both sensor models."
+)
+
+
+def _contestants(environment: str) -> Iterable[tuple[str, str]]:
+    """Names and policy folders ("" for a law) of whatever is measured in an environment."""
+    for law in (*UNCONTROLLED, *default_controllers()):
+        yield law, ""
+    short = environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
+    for name in shipped_names():
+        if name.partition("_")[0] == short:
+            for folder in policy_folders(name):
+                yield f"{name} {folder.name}", f"{name}/{folder.name}"
+
+
+def _task(where: tuple[str, str, bool], controller: str, policy: str, arguments: argparse.Namespace) -> Task:
+    environment, sensors, randomize = where
+    stem = f"cells/{file_stem(controller)}/{environment.removeprefix('BirthSIM/')}-{sensors}-{RIGS[randomize]}"
+    settings = {
+        "controller": controller, "policy": policy, "environment": environment, "sensors": sensors, "randomize": randomize,
+        "episodes": arguments.episodes, "seed": arguments.seed,
+        "network": _digest(SHIPPED / policy) if policy else "",
+    }  # fmt: skip
+    return Task(stem, "policies" if policy else controller, score_cell, settings)
+
+
+@cache
+def _digest(folder: Path) -> str:
+    """Hash of a policy's weights and of the sources that run it."""
+    sources = sorted(SHIPPED.parent.glob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in (folder / WEIGHTS, *sources))).hexdigest()
+
+
+def score_cell(
+    controller: str, policy: str, environment: str, sensors: str, randomize: bool, episodes: int, seed: int, network: str
+) -> Result:
+    """Figures of one controller in one environment under one condition."""
+    rig = Parameters()
+    law = make_controller("residual", rig, policy=SHIPPED / policy) if policy else make_controller(controller, rig)
+    result = evaluate(environment, law, controller, episodes, seed, progress=False, sensors=sensors, randomize=randomize)
+    if len(result.seeds) < episodes:
+        raise KeyboardInterrupt
+    error = summarize(judged(result.metrics["settled_rms"], result.lost, applies=True))["median"]
+    return {
+        "returns": {str(discount): float(np.mean(values)) for discount, values in result.returns.items()},
+        "halves": [float(np.mean(result.returns[1.0][part::2])) for part in (0, 1)],
+        "error": error if np.isfinite(error) else None, "lost": float(np.mean(result.lost)),
+        "success": float(np.mean(result.success)),
+    }  # fmt: skip
+
+
+def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
+    """Who plays which of ``ROLES``: the best are chosen by one half of the episodes, all are measured by the other."""
+
+    def best(names: Iterable[str]) -> str:
+        return max(names, key=lambda name: float(rows[name]["halves"][0]))
+
+    laws = default_controllers()
+    learned = [name for name in rows if name not in laws and name not in UNCONTROLLED]
+    chosen = ("shut-valves", "random-valves", "backstepping", best(laws), best(learned))
+    return {
+        role: {
+            "controller": name, "return": rows[name]["halves"][1],
+            **{key: rows[name][key] for key in ("error", "lost", "success")},
+        }
+        for role, name in zip(ROLES, chosen, strict=True)
+    }  # fmt: skip
+
+
+def _table(rows: Rows, known: dict[str, dict[str, Any]]) -> str:
+    lines = [
+        "| controller | score | error, mm | success, % | lost, % | " + " | ".join(f"return at {d:g}" for d in DISCOUNTS) + " |",
+        "|" + "---|" * (5 + len(DISCOUNTS)),
+    ]
+    low, high = known[SHUT]["return"], known[BEST]["return"]
+    for name, row in sorted(rows.items(), key=lambda item: item[1]["returns"]["1.0"]):
+        score = round(100 * (row["returns"]["1.0"] - low) / (high - low))
+        error = "lost" if row["error"] is None else number(row["error"])
+        paid = " | ".join(f"{row['returns'][str(discount)]:.4g}" for discount in DISCOUNTS)
+        lines.append(f"| {name} | {score} | {error} | {100 * row['success']:.0f} | {100 * row['lost']:.0f} | {paid} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""What any controller should beat: shut valves, slammed valves, random openings. They look at nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from birthsim_env.lanes import Array
+from birthsim_env.parameters import Parameters
+from birthsim_env.signals import Mask, Measurement, Reference
+
+HELD = 0.01
+"""s that a random opening is held: the default policy period."""
+
+
+class ShutValves:
+    """Spools in the middle: what leaks apart, the chambers are air springs."""
+
+    opening = (0.0, 0.0, 0.0, 0.0)
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._opening = np.array(self.opening)
+
+    def command(self, measurement: Measurement, reference: Reference) -> Array:
+        """The same openings (4, N), or (4,) for one rig, at all times."""
+        lanes = measurement.time.shape
+        return np.broadcast_to(self._opening.reshape(4, *[1] * len(lanes)), (4, *lanes)).copy()
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Nothing is remembered."""
+
+
+class SlammedValves(ShutValves):
+    """Both pistons driven out with fully open valves."""
+
+    opening = (1.0, -1.0, 1.0, -1.0)
+
+
+class RandomValves:
+    """Uniform openings, drawn anew every ``HELD`` s from a generator that begins with ``seed``."""
+
+    def __init__(self, parameters: Parameters, seed: int = 0) -> None:
+        self._periods = max(1, round(HELD / parameters.electronics.control_period))
+        self._seed = seed
+        self.reset()
+
+    def command(self, measurement: Measurement, reference: Reference) -> Array:
+        """Openings (4, N), or (4,) for one rig."""
+        if self._count % self._periods == 0:
+            self._openings = self._rng.uniform(-1.0, 1.0, (4, *measurement.time.shape))
+        self._count += 1
+        return self._openings
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """All lanes: begin the generator anew; some lanes: their draws go on."""
+        if lanes is None:
+            self._rng, self._count = np.random.default_rng(self._seed), 0

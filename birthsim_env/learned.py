@@ -1,0 +1,45 @@
+"""The way from here to ``agents``, which stands above this package: by name, and only where that name is BirthSIM's.
+
+Other distributions (``openai-agents``) and folders of users have packages of that name too.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+
+def from_agents(module: str) -> Any:
+    """The module ``agents.<module>``; raises ``ImportError`` in one line where another package of that name is in its place."""
+    mend = "rename or uninstall it, then pip install --force-reinstall --no-deps birthsim (from a clone: -e .)"
+    try:
+        package = import_module("agents")
+    except Exception as error:
+        raise ImportError(f"the package 'agents' cannot be imported ({type(error).__name__}: {error}); {mend}") from error
+    if not getattr(package, "BELONGS_TO_BIRTHSIM", False):
+        place = package.__file__ or ", ".join(package.__path__)
+        raise ImportError(f"the package 'agents' at {place} is not BirthSIM's but hides or overwrites it; {mend}")
+    return import_module(f"agents.{module}")
+
+
+def residual_env(**arguments: Any) -> Any:
+    """Entry point of the ids with a law inside."""
+    return from_agents("residual_env").ResidualEnv(**arguments)
+
+
+def residual_vector_env(**arguments: Any) -> Any:
+    """Entry point of the vectorised ids with a law inside."""
+    return from_agents("residual_env").ResidualVectorEnv(**arguments)
+
+
+def command() -> None:
+    """Entry point of the commands of ``agents``: birthsim-train, -evaluate, -scores, -explain and -export."""
+    name = Path(sys.argv[0]).stem
+    try:
+        module = from_agents(f"commands.{name.removeprefix('birthsim-')}")
+    except ImportError as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    module.main()

@@ -1,0 +1,63 @@
+"""Reference scores: what an episode of an environment pays with shut valves, under the laws, and with a learned policy.
+
+``birthsim-scores`` measures them and writes the file that lies beside this module.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from birthsim_env.assembly import one_of
+from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.sensors import SENSORS
+
+FILE = Path(__file__).with_name("scores.json")
+
+SHUT, BEST = "shut valves", "best classical law"
+"""Scores of 0 and of 100."""
+
+ROLES = (SHUT, "random valves", "paper's law", BEST, "best learned policy")
+
+RIGS = {False: "nominal", True: "drawn"}
+"""The environments' argument ``randomize`` -> the name of its scores."""
+
+
+@cache
+def _scores() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return content["scores"]  # type: ignore[no-any-return]
+
+
+def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
+    """What is known of an environment: role (``ROLES``) -> its ``controller``, mean ``return`` of an episode, undiscounted,
+    ``error`` (mm, median over episodes of the settled error; None where most are lost), shares ``lost`` and ``success``.
+
+    Of the id with its default arguments apart from ``sensors`` and ``randomize`` (rig and scenario together, or neither); an
+    environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no scores.
+    """
+    names = {scenario.capitalize(): scenario for scenario in SCENARIOS}
+    found = re.fullmatch(r"BirthSIM/([A-Za-z]+?)(?:Residual)?-v1", environment) if isinstance(environment, str) else None
+    if found is None or found.group(1) not in names:
+        allowed = ", ".join(f"BirthSIM/{name}-v1" for name in names)
+        raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and their siblings with a law inside")
+    one_of("sensors", sensors, tuple(SENSORS))
+    one_of("randomize", randomize, tuple(RIGS))
+    return _scores()[found.group(1)][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
+
+
+def normalized_score(
+    environment: str, score: ArrayLike, sensors: str = "ideal", randomize: bool = True
+) -> float | NDArray[np.float64]:
+    """An episode's return, undiscounted, or an array of them, on a scale where shut valves have 0 and the best classical law
+    has 100; see ``reference_scores`` for the arguments."""
+    known = reference_scores(environment, sensors, randomize)
+    nothing, best = known[SHUT]["return"], known[BEST]["return"]
+    scaled = 100.0 * (np.asarray(score, dtype=np.float64) - nothing) / (best - nothing)
+    return scaled if scaled.ndim else float(scaled)

@@ -1,0 +1,79 @@
+"""How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, draws their curves.
+
+    python examples/learning_curves.py --out out/scratch       needs pip install 'birthsim[agents]'; a run of 1 million steps
+                                                               takes minutes; what --out holds is kept
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from tqdm import tqdm
+
+import birthsim_env
+
+HERE = Path(__file__).resolve().parent
+EXAMPLES = {"Stable-Baselines3": "sb3_ppo.py", "CleanRL": "cleanrl_ppo.py"}
+LINE = re.compile(r"^\s*([\d,]+) steps: episodes of (\d+) steps, score (-?\d+)", re.MULTILINE)
+
+
+def run(job):
+    """The output of one training, from the folder where it is there."""
+    name, environment, seed, steps, folder = job
+    short = environment.removeprefix("BirthSIM/")
+    path = folder / f"{name}-{short}-{seed}-{steps}.txt"
+    if not path.is_file():
+        command = [sys.executable, str(HERE / EXAMPLES[name]), environment, str(steps), str(seed)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(command)}:\n{done.stderr[-2000:]}")
+        partial = path.with_suffix(".partial")
+        partial.write_text(done.stdout, encoding="utf-8")
+        partial.replace(path)
+    return np.array([[float(x.replace(",", "")) for x in row] for row in LINE.findall(path.read_text(encoding="utf-8"))])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env", nargs="+", default=[f"BirthSIM/{s.capitalize()}-v1" for s in birthsim_env.SCENARIOS])
+    parser.add_argument("--steps", type=int, default=1_000_000)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, required=True)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    jobs = [
+        (name, environment, seed, arguments.steps, arguments.out)
+        for environment in arguments.env for name in EXAMPLES for seed in range(arguments.seeds)
+    ]  # fmt: skip
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        curves = list(tqdm(pool.map(run, jobs), total=len(jobs), unit=" trainings"))
+    figure, panels = plt.subplots(
+        2, len(arguments.env), figsize=(1 + 2.6 * len(arguments.env), 4.6), sharex=True, sharey="row", squeeze=False,
+        layout="constrained",
+    )  # fmt: skip
+    print(f"{'environment':22}{'algorithm':20}{'seed':>5}{'steps of the first':>20}{'and last episodes':>19}{'score':>8}")
+    for (name, environment, seed, *_), curve in zip(jobs, curves, strict=True):
+        above, below = panels[:, arguments.env.index(environment)]
+        style = {"color": "#c25" if name == "CleanRL" else "#058", "ls": "-" if seed == 0 else ":", "label": name}
+        above.plot(curve[:, 0] / 1e6, curve[:, 2], **style)
+        below.plot(curve[:, 0] / 1e6, curve[:, 1] / 100, **style)
+        print(f"{environment:22}{name:20}{seed:5}{curve[0, 1]:20.0f}{curve[-1, 1]:19.0f}{curve[-1, 2]:8.0f}")
+    for environment, (above, below) in zip(arguments.env, panels.T, strict=True):
+        known = birthsim_env.reference_scores(environment)
+        for role, ls in (("shut valves", ":"), ("paper's law", "--"), ("best classical law", "-")):
+            score = birthsim_env.normalized_score(environment, known[role]["return"])
+            above.axhline(score, color="0.5", lw=0.8, ls=ls, label=role)
+        above.set(title=environment.removeprefix("BirthSIM/"), ylim=(-250, 120))
+        below.set(xlabel="million steps", ylim=0)
+    panels[0, 0].set_ylabel("score (shut valves 0,\nbest law 100)")
+    panels[1, 0].set_ylabel("episode, s")
+    named = dict(zip(*reversed(panels[0, 0].get_legend_handles_labels()), strict=True))
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8)
+    figure.savefig(arguments.out / "scratch.png", dpi=130)
+    print(f"written to {arguments.out}/: scratch.png, the output of every training")
