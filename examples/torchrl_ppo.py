@@ -10,7 +10,7 @@ import torch
 from tensordict.nn import TensorDictModule
 from tensordict.nn.distributions import NormalParamExtractor
 from torch import nn
-from torchrl.collectors import SyncDataCollector
+from torchrl.collectors import Collector
 from torchrl.envs import Compose, DoubleToFloat, GymWrapper, RewardSum, StepCounter, TransformedEnv
 from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
 from torchrl.objectives import ClipPPOLoss
@@ -39,7 +39,7 @@ advantage = GAE(gamma=0.99, lmbda=0.95, value_network=critic, average_gae=True)
 loss = ClipPPOLoss(actor, critic, clip_epsilon=0.2)
 optimizer = torch.optim.Adam(loss.parameters(), lr=3e-4)
 done = 0
-for data in SyncDataCollector(worlds, actor, frames_per_batch=batch, total_frames=steps):
+for data in Collector(worlds, actor, frames_per_batch=batch, total_frames=steps):
     for _ in range(10):
         advantage(data)
         flat = data.reshape(-1)

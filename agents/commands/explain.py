@@ -19,7 +19,11 @@ def main() -> None:
         description="Look into a trained residual: its correction against the weight that the law leaves out and against "
         "friction, the frictionless circle, and the stiffness test per setpoint on rigs drawn at random.",
     )
-    parser.add_argument("--policy", default="circle", help="a folder of birthsim-train, or a name that comes with the package")
+    parser.add_argument(
+        "--policy",
+        default="circle",
+        help="a folder of birthsim-train, or a name that comes with the package (default: %(default)s)",
+    )
     parser.add_argument("--no-pushes", action="store_true", help="leave out the stiffness test, which takes minutes")
     parser.add_argument(
         "--out", type=Path, required=True, help="folder for correction.png and .svg, residual.md, residual.json"

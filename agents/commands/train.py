@@ -26,13 +26,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="birthsim-train",
         description="Train residual policies on top of a control law, by PPO, SAC or TQC.",
-        epilog="Options override what the configuration says. The best policy on validation worlds is kept whenever it "
-        "improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command with --resume goes on.",
+        epilog="Options override what the configuration says, and have its values by default. The best policy on validation "
+        "worlds is kept whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command "
+        "with --resume goes on.",
     )
     listed = ", ".join(configuration_names())
     parser.add_argument("--config", default="circle", help=f"{listed}, or a TOML file (default: %(default)s)")
     parser.add_argument("--env", help="residual environment")
-    parser.add_argument("--algorithm", choices=ALGORITHMS)
+    parser.add_argument("--algorithm", choices=ALGORITHMS, help="how it learns")
     parser.add_argument("--law", choices=LAWS, help="law underneath; none: the policy drives the valves by itself")
     parser.add_argument("--impedance", choices=tuple(IMPEDANCES), help="what an action sets beside forces")
     parser.add_argument("--steps", type=whole, help="policy steps per seed")
@@ -42,7 +43,7 @@ def main() -> None:
     parser.add_argument("--seed", type=seed_number, help="first seed (default: the configuration's, 0)")
     parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
     parser.add_argument("--jobs", type=whole, default=1, help="seeds trained side by side (default: 1)")
-    parser.add_argument("--sensors", choices=("ideal", "lab"))
+    parser.add_argument("--sensors", choices=("ideal", "lab"), help="sensor model")
     parser.add_argument("--randomize", choices=tuple(RANDOMIZE), help="what training varies")
     parser.add_argument("--authority", type=float, help="bound of the residual force, N")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")

@@ -59,7 +59,7 @@ def main() -> None:
         "comes with the package for the environment (default: the paper's law and the best one)",
     )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the world (default: %(default)s)")
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
+    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"), help="default: %(default)s")
     parser.add_argument(
         "--randomize", default="all", choices=tuple(RANDOMIZE), help="what the seed draws (default: %(default)s)"
     )

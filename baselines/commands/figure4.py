@@ -38,7 +38,7 @@ def main() -> None:
         help=f"one of {', '.join(controller_names())}, or path/to/file.py:Class (default: the paper's)",
     )
     add_set(parser)
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"))
+    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"), help="default: %(default)s")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png and .svg, figure4.json, rig.png")
     run(parser, _figure4)

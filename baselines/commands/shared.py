@@ -47,8 +47,13 @@ def policy_of(environment: str) -> str:
 
 
 def make_folder(path: Path) -> Path:
-    """The folder ``path``, made if it is missing."""
-    path.mkdir(parents=True, exist_ok=True)
+    """The folder ``path``, made if it is missing; ``ValueError`` where that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
+    except OSError as error:
+        raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
     return path
 
 

@@ -29,7 +29,7 @@ def main() -> None:
         metavar="NAME",
         help="a name, or path/to/file.py:Class (default: %(default)s)",
     )
-    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS))
+    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
     parser.add_argument("--map", action="append", choices=tuple(MAPS), help="may be repeated (default: all)")
     parser.add_argument("--points", type=whole, help="values along each axis (default: those of the map)")
     parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
