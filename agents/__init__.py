@@ -1,6 +1,54 @@
 """Learned residuals on top of a control law; importing this package registers the environments of ``birthsim_env``."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 import birthsim_env as birthsim_env
+
+if TYPE_CHECKING:
+    from agents.policy.controller import ResidualController
+    from agents.policy.files import Policy, load_policy, save_policy
+    from agents.policy.onnx_export import export_onnx
+    from agents.residual.settings import ResidualSettings
+    from agents.training.configuration import TrainingSettings
+    from agents.training.sb3_adapter import SB3VecEnv
+    from agents.training.shifted_reward import ShiftedReward
+    from agents.training.trainer import train
 
 BELONGS_TO_BIRTHSIM = True
 """Tells this package from others of its name: see ``birthsim_env.learned``."""
+
+_PLACES = {
+    "Policy": "policy.files",
+    "ResidualController": "policy.controller",
+    "ResidualSettings": "residual.settings",
+    "SB3VecEnv": "training.sb3_adapter",
+    "ShiftedReward": "training.shifted_reward",
+    "TrainingSettings": "training.configuration",
+    "export_onnx": "policy.onnx_export",
+    "load_policy": "policy.files",
+    "save_policy": "policy.files",
+    "train": "training.trainer",
+}
+"""Public name -> where it lives; it is imported, and PyTorch with it where that is needed, when it is first used."""
+
+__all__ = [
+    "Policy",
+    "ResidualController",
+    "ResidualSettings",
+    "SB3VecEnv",
+    "ShiftedReward",
+    "TrainingSettings",
+    "export_onnx",
+    "load_policy",
+    "save_policy",
+    "train",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)

@@ -1,6 +1,46 @@
-"""Controllers of the rig and their evaluation; they know measurements and references, never an environment."""
+"""Controllers of the rig and their evaluation; laws know measurements and references, never an environment."""
 
-from baselines.backstepping import BacksteppingController
-from baselines.controller import Controller
+from __future__ import annotations
 
-__all__ = ["BacksteppingController", "Controller"]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from baselines.admittance.controller import AdmittanceBackstepping
+    from baselines.backstepping.cartesian_controller import CartesianBackstepping
+    from baselines.backstepping.controller import BacksteppingController
+    from baselines.backstepping.lyapunov import LyapunovFunction
+    from baselines.bench.evaluation import Evaluation, evaluate
+    from baselines.controller import Controller
+    from baselines.registry import controller_names, make_controller
+
+_PLACES = {
+    "AdmittanceBackstepping": "admittance.controller",
+    "BacksteppingController": "backstepping.controller",
+    "CartesianBackstepping": "backstepping.cartesian_controller",
+    "Controller": "controller",
+    "Evaluation": "bench.evaluation",
+    "LyapunovFunction": "backstepping.lyapunov",
+    "controller_names": "registry",
+    "evaluate": "bench.evaluation",
+    "make_controller": "registry",
+}
+"""Public name -> where it lives; it is imported when it is first used."""
+
+__all__ = [
+    "AdmittanceBackstepping",
+    "BacksteppingController",
+    "CartesianBackstepping",
+    "Controller",
+    "Evaluation",
+    "LyapunovFunction",
+    "controller_names",
+    "evaluate",
+    "make_controller",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)

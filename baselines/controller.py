@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from birthsim_env.lanes import Array
-from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.physics.lanes import Array
 
 
 class Controller(Protocol):

@@ -11,14 +11,14 @@ from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
-from baselines.admittance_backstepping import AdmittanceBackstepping
-from baselines.backstepping import BacksteppingController
-from baselines.cartesian_backstepping import CartesianBackstepping
+from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.backstepping.cartesian_controller import CartesianBackstepping
+from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
-from birthsim_env.own_parts import from_file
-from birthsim_env.parameters import Parameters
+from birthsim_env.parts.own_parts import from_file
+from birthsim_env.physics.parameters import Parameters
 
 Factory = Callable[..., Controller]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Mask, Measurement, Reference
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 
 HELD = 0.01
 """s that a random opening is held: the default policy period."""

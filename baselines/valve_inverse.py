@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env import control_model, valves
-from birthsim_env import lanes as at
-from birthsim_env.compilation import helper, kernel
-from birthsim_env.lanes import Array
+from birthsim_env.physics import control_model, valves
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
 
 
 @helper

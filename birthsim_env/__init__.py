@@ -6,14 +6,14 @@ their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 
 from gymnasium.envs.registration import register, registry
 
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.references import Circle, Hold, Path, Trajectory
-from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.user_forces import ForceProfile, UserForce
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from birthsim_env.scores import normalized_score, reference_scores
-from birthsim_env.signals import Measurement, Reference
-from birthsim_env.stiffness_schedules import StiffnessSchedule
-from birthsim_env.user_forces import ForceProfile, UserForce
 
 __all__ = [
     "Circle",

@@ -13,15 +13,15 @@ import numpy as np
 from gymnasium import spaces
 
 from birthsim_env import observation
-from birthsim_env.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
-from birthsim_env.own_parts import hand_of, trajectory_of
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.randomization import checked_ranges, documented_ranges
-from birthsim_env.rendering import checked_size
-from birthsim_env.scenarios import SCENARIOS
-from birthsim_env.sensors import SENSORS
+from birthsim_env.drawing.rendering import checked_size
+from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
+from birthsim_env.parts.own_parts import hand_of, trajectory_of
+from birthsim_env.parts.randomization import checked_ranges, documented_ranges
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.physics.parameters import Parameters, load_parameters
 from birthsim_env.simulation import Simulation
-from birthsim_env.stiffness_schedules import StiffnessSchedule
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")

@@ -13,8 +13,8 @@ from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_o
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
+from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.reward import REWARD_TERMS
-from birthsim_env.signals import Measurement, Reference
 
 _ONE = np.ones(1, dtype=np.bool_)
 
@@ -86,7 +86,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `action_mode`, `valves`: see above.
     - `sensors`: `"ideal"`, or `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures.
     - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
-      (`birthsim_env.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
+      (`birthsim_env.parts.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
       `{"mechanics.mass": (2, 5)}` draws just these parameters.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
@@ -96,7 +96,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `stiffness`: a `StiffnessSchedule` of your own.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
-    - `actuation`: an object of your own between action and valves (`birthsim_env.actuation.Actuation`) instead of a mode.
+    - `actuation`: an object of your own between action and valves (`birthsim_env.parts.actuation.Actuation`) instead of a mode.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`, in real time; `picture_size`: (width, height) in px, (640, 480).
       `gymnasium.wrappers.RecordVideo` needs `pip install 'birthsim[video]'`; its videos play in real time too.
 
@@ -153,7 +153,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     @property
     def scene(self) -> Scene:
-        """What a frame shows now, in any render mode; see ``birthsim_env.rendering.Scene``."""
+        """What a frame shows now, in any render mode; see ``birthsim_env.drawing.rendering.Scene``."""
         return self._episodes.scene(0)
 
     def reset(

@@ -11,13 +11,13 @@ from birthsim_env import observation, reward
 from birthsim_env.assembly import Setup
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.info import describe
-from birthsim_env.lanes import PRESSURES, Y1, Y2, Array
-from birthsim_env.seeding import lane_seeds
-from birthsim_env.signals import Mask
+from birthsim_env.parts.seeding import lane_seeds
+from birthsim_env.parts.signals import Mask
+from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
 from birthsim_env.success import Success
 
 if TYPE_CHECKING:
-    from birthsim_env.rendering import Renderer
+    from birthsim_env.drawing.rendering import Renderer
 
 WINDOW_FRAMES_PER_SECOND = 50
 PATH_POINTS = 160
@@ -108,7 +108,7 @@ class Episodes:
     def render(self, mode: str, lanes: int) -> tuple[Any, ...] | None:
         """Frames (H, W, 3) of the first ``lanes`` lanes, or None once the first is shown in a window."""
         # Rendering needs pygame, which those who only compute need not load.
-        from birthsim_env.rendering import Renderer
+        from birthsim_env.drawing.rendering import Renderer
 
         if self._renderer is None:
             self._renderer = Renderer(self.simulation.parameters, *self._setup.picture_size)

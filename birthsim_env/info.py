@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env import control_model, dynamics
-from birthsim_env import lanes as at
-from birthsim_env.compilation import kernel
-from birthsim_env.lanes import Array
-from birthsim_env.signals import compliance
+from birthsim_env.parts.signals import compliance
+from birthsim_env.physics import control_model, dynamics
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
 from birthsim_env.simulation import Simulation
 
 FIELDS = {

@@ -26,12 +26,12 @@ def from_agents(module: str) -> Any:
 
 def residual_env(**arguments: Any) -> Any:
     """Entry point of the ids with a law inside."""
-    return from_agents("residual_env").ResidualEnv(**arguments)
+    return from_agents("residual.env").ResidualEnv(**arguments)
 
 
 def residual_vector_env(**arguments: Any) -> Any:
     """Entry point of the vectorised ids with a law inside."""
-    return from_agents("residual_env").ResidualVectorEnv(**arguments)
+    return from_agents("residual.env").ResidualVectorEnv(**arguments)
 
 
 def command() -> None:

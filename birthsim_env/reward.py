@@ -15,11 +15,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import exact
-from birthsim_env import lanes as at
-from birthsim_env.compilation import kernel
-from birthsim_env.lanes import Array
-from birthsim_env.signals import compliance
+from birthsim_env.parts.signals import compliance
+from birthsim_env.physics import exact
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
 
 ERROR_UNIT = 1e-3
 """m. A tracking error e costs ln(1 + e/``ERROR_UNIT``) per 10 ms: what is small counts, and what is large still matters."""

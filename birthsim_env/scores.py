@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
-from birthsim_env.scenarios import SCENARIOS
-from birthsim_env.sensors import SENSORS
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors import SENSORS
 
 FILE = Path(__file__).with_name("scores.json")
 

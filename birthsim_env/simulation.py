@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.actuation import Actuation
-from birthsim_env.compilation import kernel
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import end_effector_motion, inverse_geometry
-from birthsim_env.inverse_kinematics import pistons_at
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant, checked
-from birthsim_env.randomization import Ranges, draw_parameters
-from birthsim_env.references import Trajectory
-from birthsim_env.seeding import STREAMS, stream
-from birthsim_env.sensors import SENSORS
-from birthsim_env.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.stiffness_schedules import StiffnessSchedule
-from birthsim_env.strength import require_carried
-from birthsim_env.user_forces import UserForce
+from birthsim_env.parts.actuation import Actuation
+from birthsim_env.parts.randomization import Ranges, draw_parameters
+from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.seeding import STREAMS, stream
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.user_forces import UserForce
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
+from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant, checked
+from birthsim_env.physics.strength import require_carried
 
 CHECKS = 64
 """Instants of a new episode at which its reference is checked against the workspace."""

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.compilation import kernel
-from birthsim_env.lanes import Array
-from birthsim_env.signals import Mask, compliance
+from birthsim_env.parts.signals import Mask, compliance
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
 
 SETTLED = 0.5
 """s after a jump of force or setpoint (or the start) from which an error counts as settled."""

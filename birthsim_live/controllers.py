@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.admittance_backstepping import AdmittanceBackstepping
-from baselines.backstepping import BacksteppingController
+from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from baselines.rivals.follower import Follower
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live.settings import RESIDUAL
 
 DAMPED = (BacksteppingController, AdmittanceBackstepping, Follower)

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from birthsim_env.geometry import end_effector
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.geometry import end_effector
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live import protocol
 from birthsim_live.clock import Clock, Source
 from birthsim_live.hand import DRAG_LIMIT

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env import geometry
 from birthsim_env.info import describe, single_info
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics import geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from birthsim_env.simulation import Simulation
 from birthsim_live.hand import Hands
 

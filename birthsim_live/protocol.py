@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.commands.shared import finite
+from baselines.files import finite
 from birthsim_live.clock import SLOWEST
 from birthsim_live.settings import shown
 

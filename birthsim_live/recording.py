@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import birthsim_env
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live.frames import COLUMNS, FIELDS
 
 if TYPE_CHECKING:

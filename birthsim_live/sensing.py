@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Electronics
-from birthsim_env.sensors import SENSORS
-from birthsim_env.signals import Measurement
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.signals import Measurement
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Electronics
 
 
 class ExchangeableSensors:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from baselines.controller import Controller
-from birthsim_env.actuation import ValveActuation
-from birthsim_env.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
-from birthsim_env.parameters import Parameters
+from birthsim_env.parts.actuation import ValveActuation
+from birthsim_env.parts.scenarios import SCENARIOS, Parts
+from birthsim_env.parts.seeding import stream
+from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
-from birthsim_env.scenarios import SCENARIOS, Parts
-from birthsim_env.seeding import stream
 from birthsim_env.simulation import Simulation
 from birthsim_live.bridge import Course
 from birthsim_live.controllers import as_action, build_controller, has_damping, openings

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from birthsim_env.lanes import Array
-from birthsim_env.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.physics.lanes import Array
 from birthsim_live.bridge import Fade
 
 TRANSITION = 0.05

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.registry import CONTROLLERS, controller_names
-from birthsim_env.actuation import VALVE_LAYOUTS
-from birthsim_env.parameters import Parameters
-from birthsim_env.scenarios import SCENARIOS
-from birthsim_env.sensors import SENSORS
+from birthsim_env.parts.actuation import VALVE_LAYOUTS
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.parameters import Parameters
 
 STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
 """Settings that take the place of the scenario's setpoints, in the order of a reference's rows 8 to 11."""
@@ -87,8 +87,8 @@ def controller_choices() -> list[dict[str, str]]:
             choices.append(choice)
             continue
         try:
-            from agents.policy_files import load_policy  # noqa: F401  needs the extra
-            from agents.seeds import shipped_names
+            from agents.policy.files import load_policy  # noqa: F401  needs the extra
+            from agents.policy.seeds import shipped_names
         except ImportError:
             choices.append({**choice, "missing": "pip install 'birthsim[agents]'"})
             continue

@@ -13,23 +13,23 @@ import gymnasium
 import numpy as np
 import onnxruntime
 
-from agents.residual_law import ResidualLaw
-from agents.settings import NO_LAW, ResidualSettings
+from agents.residual.law import ResidualLaw
+from agents.residual.settings import NO_LAW, ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env.assembly import policy_periods
-from birthsim_env.lanes import parameter_column
 from birthsim_env.observation import observe
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import one_lane
+from birthsim_env.parts.signals import one_lane
+from birthsim_env.physics.lanes import parameter_column
+from birthsim_env.physics.parameters import Parameters
 from birthsim_env.success import SETTLED
 
-# As in agents.onnx_export, which needs PyTorch; running a policy does not.
+# As in agents.policy.onnx_export, which needs PyTorch; running a policy does not.
 FORMAT = "birthsim-residual-onnx-1"
 WARM_UP = 300
 
 
 class OnnxPolicy:
-    """One rig's law with an exported policy on top; does what agents.residual_controller does with a policy folder."""
+    """One rig's law with an exported policy on top; does what agents.policy.controller does with a policy folder."""
 
     def __init__(self, parameters, policy="policy.onnx"):
         options = onnxruntime.SessionOptions()

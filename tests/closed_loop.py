@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from baselines import probes
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import inverse_geometry, jacobian
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from baselines.bench import probes
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry, jacobian
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 
 FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
 """Neither Coulomb nor Stribeck friction; the viscous part stays."""

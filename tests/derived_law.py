@@ -14,9 +14,9 @@ import numpy as np
 import sympy as sp
 from scipy.optimize import brentq
 
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Cylinder, Parameters
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Cylinder, Parameters
 from tests import linkage_by_points as by_points
 
 STATE = sp.symbols("y1 y2 v1 v2 F1 F2", real=True)

@@ -30,13 +30,13 @@ from types import CodeType, ModuleType
 import pytest
 
 MODULES = {
-    "birthsim_env.geometry": ("strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
-    "birthsim_env.mechanics": ("strict_feedback", "cartesian_stiffness", "mechanics"),
-    "birthsim_env.friction": ("strict_feedback", "reference_friction", "friction", "elasto_plastic"),
-    "birthsim_env.chambers": ("chambers",),
-    "birthsim_env.valves": ("valve_inverse", "valves"),
-    "birthsim_env.control_model": ("strict_feedback", "valve_inverse", "control_model"),
-    "baselines.gains": ("gains", "damping"),
+    "birthsim_env.physics.geometry": ("strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
+    "birthsim_env.physics.mechanics": ("strict_feedback", "cartesian_stiffness", "mechanics"),
+    "birthsim_env.physics.friction": ("strict_feedback", "reference_friction", "friction", "elasto_plastic"),
+    "birthsim_env.physics.chambers": ("chambers",),
+    "birthsim_env.physics.valves": ("valve_inverse", "valves"),
+    "birthsim_env.physics.control_model": ("strict_feedback", "valve_inverse", "control_model"),
+    "baselines.backstepping.gains": ("gains", "damping"),
 }
 """The test files (``tests/test_*.py``) that concern a module, the quickest first."""
 

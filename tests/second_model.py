@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.parameters import Parameters
 
 Array = NDArray[np.float64]
 

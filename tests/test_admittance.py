@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, sqrtm
 
-from baselines.admittance import DAMPING_RATIO, Admittance, square_root
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from baselines.estimation.admittance import DAMPING_RATIO, Admittance, square_root
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 
 MASS, PERIOD = 3.0, 1e-3
 COUPLED = np.array([[3000.0, 800.0], [800.0, 1500.0]])

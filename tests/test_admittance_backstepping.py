@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines import admittance_law
-from baselines.admittance_backstepping import LEAST_SHARE, AdmittanceBackstepping
-from birthsim_env.geometry import inverse_geometry
-from birthsim_env.lanes import SPOOLS, Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from baselines.admittance import law as admittance_law
+from baselines.admittance.controller import LEAST_SHARE, AdmittanceBackstepping
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop, rigid_body
 from tests import linkage_by_points as by_points
 

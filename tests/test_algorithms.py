@@ -10,12 +10,12 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.algorithms import make_model, network_of
-from agents.configuration import ALGORITHMS, TrainingSettings
-from agents.policy_files import Policy, load_policy, save_policy
-from agents.residual_controller import ResidualController
-from agents.sb3_adapter import SB3VecEnv
-from agents.settings import ResidualSettings
+from agents.policy.controller import ResidualController
+from agents.policy.files import Policy, load_policy, save_policy
+from agents.residual.settings import ResidualSettings
+from agents.training.algorithms import make_model, network_of
+from agents.training.configuration import ALGORITHMS, TrainingSettings
+from agents.training.sb3_adapter import SB3VecEnv
 
 CIRCLE = "BirthSIM/CircleResidual-v1"
 TINY = TrainingSettings(CIRCLE, lanes=8, rollout=32, batch=64, epochs=2, gradient_steps=2, learning_rate=3e-3, hidden=(16, 16))

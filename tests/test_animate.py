@@ -11,7 +11,7 @@ import birthsim_env
 from baselines.commands import animate
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
-from birthsim_env.rendering import PairRenderer, Scene
+from birthsim_env.drawing.rendering import PairRenderer, Scene
 from tests.console import call
 
 RIG = birthsim_env.Parameters()

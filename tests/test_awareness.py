@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.awareness import BELIEVED_LIMIT, MOVING_SPEED, Awareness, Situation
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import PRESSURES, SPOOLS, Array, parameter_array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.signals import Measurement, Reference
+from baselines.estimation.awareness import BELIEVED_LIMIT, MOVING_SPEED, Awareness, Situation
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import PRESSURES, SPOOLS, Array, parameter_array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop, rigid_body
 
 PERIOD = 1e-3

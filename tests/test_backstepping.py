@@ -11,11 +11,11 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from baselines import BacksteppingController
-from baselines.gains import closed_loop_damping, closed_loop_stiffness
-from birthsim_env import mechanics
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Measurement, Reference
+from baselines.backstepping.gains import closed_loop_damping, closed_loop_stiffness
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics import mechanics
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 from tests import linkage_by_points as by_points

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from birthsim_env.geometry import joint_force
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.geometry import joint_force
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 from tests.test_backstepping import many, of_lanes

@@ -10,14 +10,14 @@ import pytest
 from scipy.linalg import sqrtm
 
 from baselines import BacksteppingController
-from baselines.cartesian_backstepping import CartesianBackstepping
+from baselines.backstepping.cartesian_controller import CartesianBackstepping
+from baselines.bench.probes import POSES, Probes, run_probes
 from baselines.controller import Controller
-from baselines.probes import POSES, Probes, run_probes
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop, rigid_body
 from tests.closed_loop import FRICTIONLESS
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.chamber_observer import ChamberObserver
-from birthsim_env.lanes import SPOOLS, Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from baselines.estimation.chamber_observer import ChamberObserver
+from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import derived_law
 
 PERIOD = 1e-3

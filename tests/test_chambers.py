@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from birthsim_env.dynamics import INTEGRATION_STEP
-from birthsim_env.lanes import PRESSURES, TEMPERATURES, V1, V2, Y1, Y2, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics.dynamics import INTEGRATION_STEP
+from birthsim_env.physics.lanes import PRESSURES, TEMPERATURES, V1, V2, Y1, Y2, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 
 R, GAMMA, WALL = 287.05, 1.4, 293.15
 CV, CP = R / (GAMMA - 1), GAMMA * R / (GAMMA - 1)

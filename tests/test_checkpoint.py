@@ -18,14 +18,15 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents import monitor, training
-from agents.algorithms import make_model, network_of
-from agents.checkpoint import NAME, load_checkpoint, save_checkpoint
-from agents.configuration import TrainingSettings
-from agents.policy_files import load_policy
-from agents.sb3_adapter import SB3VecEnv
-from agents.settings import ResidualSettings
-from agents.training import train
+from agents.policy.files import load_policy
+from agents.residual.settings import ResidualSettings
+from agents.training import monitor
+from agents.training import trainer as training
+from agents.training.algorithms import make_model, network_of
+from agents.training.checkpoint import NAME, load_checkpoint, save_checkpoint
+from agents.training.configuration import TrainingSettings
+from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.trainer import train
 from birthsim_env import Parameters
 from tests.console import COMMANDS, PATIENCE, ROOT, call
 

@@ -9,9 +9,9 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from agents.policy_files import WEIGHTS
-from agents.seeds import policy_folders
-from baselines.commands.shared import write_json
+from agents.policy.files import WEIGHTS
+from agents.policy.seeds import policy_folders
+from baselines.files import write_json
 from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
 
 

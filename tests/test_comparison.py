@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from baselines import comparison, comparison_figures, evaluation
-from baselines.comparison import (
+from baselines.bench import comparison, evaluation
+from baselines.bench.comparison import (
     ENVIRONMENTS,
     METRICS,
     PLANTS,
@@ -25,7 +25,8 @@ from baselines.comparison import (
     run_cell,
     statistics,
 )
-from baselines.comparison_tables import full, losses, overview
+from baselines.bench.comparison_tables import full, losses, overview
+from baselines.figures import comparison as comparison_figures
 from birthsim_env import Parameters
 from tests.test_named_controllers import OWN
 

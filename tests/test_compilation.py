@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from birthsim_env import compilation
-from birthsim_env.compilation import source_stamp
+from birthsim_env.physics import compilation
+from birthsim_env.physics.compilation import source_stamp
 
 ROOT = Path(__file__).parent.parent
 PROBE = """
-from birthsim_env.compilation import kernel
-from birthsim_env.signals import compliance
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.parts.signals import compliance
 
 @kernel
 def displaced(force, x):
@@ -38,9 +38,15 @@ def package(tmp_path):
     """A copy of the few modules that one small kernel needs."""
     folder = tmp_path / "birthsim_env"
     folder.mkdir()
-    for name in ("compilation", "signals", "lanes", "parameters", "quantities", "exact"):
-        shutil.copy(ROOT / "birthsim_env" / f"{name}.py", folder)
-    (folder / "__init__.py").touch()
+    for name in (
+        "physics/compilation",
+        "parts/signals",
+        *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "exact")),
+    ):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
+    for room in (folder, folder / "physics", folder / "parts"):
+        (room / "__init__.py").touch()
     (folder / "probe.py").write_text(PROBE)
     return folder
 
@@ -58,7 +64,7 @@ def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(pack
     assert displaced(package) == (pytest.approx(5.17), True)
     assert displaced(package) == (pytest.approx(5.17), False)
     (kept,) = package.rglob("*.nbc")
-    signals = package / "signals.py"
+    signals = package / "parts" / "signals.py"
     # The helper is made by ``helper(displacement)``: no decorator stands in that file.
     signals.write_text(signals.read_text().replace("kx * ky - kxy * kxy", "2.0 * (kx * ky - kxy * kxy)"))
     assert displaced(package) == (pytest.approx(2.585), True)
@@ -84,10 +90,10 @@ def test_the_stamp_is_of_all_that_a_kernel_imports():
                 waiting += compilation._imports(path)
         return {path.stem for path in seen}
 
-    assert {"dynamics", "chambers", "friction", "geometry", "mechanics", "valves", "lanes"} <= imported("dynamics.py")
+    assert {"dynamics", "chambers", "friction", "geometry", "mechanics", "valves", "lanes"} <= imported("physics/dynamics.py")
     assert "signals" in imported("reward.py"), "compliance is made there"
-    assert "references" not in imported("dynamics.py"), "an edit there need not compile the plant anew"
-    stamps = {source_stamp(ROOT / "birthsim_env" / name) for name in ("dynamics.py", "reward.py")}
+    assert "references" not in imported("physics/dynamics.py"), "an edit there need not compile the plant anew"
+    stamps = {source_stamp(ROOT / "birthsim_env" / name) for name in ("physics/dynamics.py", "reward.py")}
     assert len(stamps) == 2
 
 

@@ -12,9 +12,9 @@ import torch
 import yaml
 
 import agents
-from agents.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
-from agents.settings import ResidualSettings
-from birthsim_env.scenarios import SCENARIOS
+from agents.residual.settings import ResidualSettings
+from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
+from birthsim_env.parts.scenarios import SCENARIOS
 
 assert agents  # importing it registers the ids
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from birthsim_env import control_model
+from birthsim_env.physics import control_model
 
 PP, PN, QP, QN, SP, SN, LENGTH, K, RT = sp.symbols("Pp Pn qp qn Sp Sn l k rT", positive=True)
 Y, V, QA, QT, FORCE, STIFFNESS, RATE = sp.symbols("y v qA qT F K rate", real=True)

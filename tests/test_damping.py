@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.gains import (
+from baselines.backstepping.gains import (
     closed_loop_damping,
     closed_loop_stiffness,
     damping_range,
@@ -17,9 +17,9 @@ from baselines.gains import (
     least_damping,
     least_stiffness,
 )
-from baselines.probes import POSES
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
+from baselines.bench.probes import POSES
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests.closed_loop import FRICTIONLESS
 from tests.test_gains import rigs

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.disturbance_observer import DisturbanceObserver
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Measurement
+from baselines.estimation.disturbance_observer import DisturbanceObserver
+from birthsim_env.parts.signals import Measurement
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
 from tests import linkage_by_points as by_points
 from tests import rigid_body
 

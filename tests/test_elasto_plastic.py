@@ -16,11 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from birthsim_env import friction
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import ELASTO_PLASTIC, PRESSURES, V1, V2, Y2, Z1, Z2, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import friction
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import ELASTO_PLASTIC, PRESSURES, V1, V2, Y2, Z1, Z2, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests.test_friction import FS, FV, INSTANTS, MOTIONS, S0, S1, PlantFriction, along, follows, stribeck
 
 LAW = {"friction.law": "elasto_plastic"}

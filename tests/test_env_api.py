@@ -13,8 +13,8 @@ from stable_baselines3.common.env_checker import check_env as stable_baselines_c
 
 import birthsim_env
 from birthsim_env import Parameters
-from birthsim_env.control_model import active_flow
 from birthsim_env.env import BirthSIMEnv
+from birthsim_env.physics.control_model import active_flow
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 SECONDS = {"Circle": 16, "Probe": 5, "Descent": 24, "Forceps": 15, "Dystocia": 16}

@@ -8,8 +8,8 @@ from functools import partial
 
 import pytest
 
-from baselines import studies
-from baselines.metrics import UNITS
+from baselines.bench import studies
+from baselines.bench.metrics import UNITS
 from tests.console import OWN, assert_picture, call, interrupted, strict
 
 

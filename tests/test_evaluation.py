@@ -9,10 +9,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines import evaluation
-from baselines.backstepping import BacksteppingController
-from baselines.evaluation import TRACE, Evaluation, evaluate, overview, table
-from baselines.metrics import UNITS, EpisodeMetrics
+from baselines.backstepping.controller import BacksteppingController
+from baselines.bench import evaluation
+from baselines.bench.evaluation import TRACE, Evaluation, evaluate, overview, table
+from baselines.bench.metrics import UNITS, EpisodeMetrics
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 

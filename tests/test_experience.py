@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from agents.experience import MOVING, ROWS, Experience
-from baselines.admittance_backstepping import AdmittanceBackstepping
-from birthsim_env.geometry import inverse_geometry
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import Measurement, Reference
+from agents.residual.experience import MOVING, ROWS, Experience
+from baselines.admittance.controller import AdmittanceBackstepping
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop, rigid_body
 from tests import derived_law as derived
 

@@ -6,10 +6,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.admittance_backstepping import AdmittanceBackstepping
-from baselines.feasibility import demand
+from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.bench.feasibility import demand
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
-from birthsim_env.lanes import MASS, Array
+from birthsim_env.physics.lanes import MASS, Array
 from tests import derived_law as derived
 from tests import linkage_by_points as by_points
 from tests import rigid_body

@@ -12,11 +12,11 @@ import pytest
 from matplotlib import pyplot as plt
 from PIL import Image
 
-from baselines import figures
+from baselines.bench.evaluation import Evaluation
 from baselines.commands import figure4 as figure4_command
 from baselines.commands.figure4 import FIELDS, figures_of, record_run
-from baselines.evaluation import Evaluation
-from baselines.figures import error_over_time, figure4
+from baselines.figures import runs as figures
+from baselines.figures.runs import error_over_time, figure4
 from birthsim_env import Parameters
 from tests.console import call, strict
 from tests.test_evaluation import Slam, run

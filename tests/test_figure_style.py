@@ -11,13 +11,13 @@ from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from agents.correction_figure import draw_corrections
-from agents.learning_curves import draw_learning_curves
-from baselines import figures
-from baselines.comparison_figures import CONDITIONS, draw_comparison
-from baselines.figures import COLOURS, look, save
-from baselines.stability_figures import stability_figure
-from baselines.study_figures import draw_studies
+from agents.reports.correction_figure import draw_corrections
+from agents.reports.learning_curves import draw_learning_curves
+from baselines.figures import runs as figures
+from baselines.figures.comparison import CONDITIONS, draw_comparison
+from baselines.figures.runs import COLOURS, look, save
+from baselines.figures.stability import stability_figure
+from baselines.figures.studies import draw_studies
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -96,10 +96,10 @@ def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_pa
 @pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
 def test_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
     drawn = []
-    for module in ("comparison_figures", "study_figures", "stability_figures"):
-        monkeypatch.setattr(f"baselines.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
+    for module in ("comparison", "studies", "stability"):
+        monkeypatch.setattr(f"baselines.figures.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
     for module in ("learning_curves", "correction_figure"):
-        monkeypatch.setattr(f"agents.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
+        monkeypatch.setattr(f"agents.reports.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
     draw(tmp_path)
     assert len(drawn) == len(names)
     for figure in drawn:

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import linprog
 
 from baselines.valve_inverse import force_first_openings, two_valve_openings
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Cylinder, Parameters
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Cylinder, Parameters
 from tests import derived_law
 
 RIG = Parameters()

@@ -17,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from birthsim_env import friction
-from birthsim_env.lanes import PRESSURES, V1, V2, Y1, Y2, Z1, Z2, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import friction
+from birthsim_env.physics.lanes import PRESSURES, V1, V2, Y1, Y2, Z1, Z2, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import linkage_by_points as by_points
 
 FC, FS, VS, FV = (12.0, 15.0), (12.0 * 1.33, 15.0 * 1.33), 0.015, 35.0

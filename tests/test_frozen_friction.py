@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, Probes, run_probes
 from baselines.registry import make_controller
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 
 CASES = [(pose, setpoint, axis) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1)]

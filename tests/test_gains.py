@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from scipy.optimize import minimize_scalar
 
-from baselines.gains import (
+from baselines.backstepping.gains import (
     closed_loop_damping,
     closed_loop_stiffness,
     equal_gain,
@@ -18,7 +18,7 @@ from baselines.gains import (
     gains_for,
     least_stiffness,
 )
-from birthsim_env.lanes import Array
+from birthsim_env.physics.lanes import Array
 
 C1, C2, C3, MASS, FV, PUSH = sp.symbols("c1 c2 c3 m Fv U", positive=True)
 Y, V, F, WEIGHT = sp.symbols("y v F weight", real=True)

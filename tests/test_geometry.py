@@ -10,10 +10,10 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env import geometry
-from birthsim_env.lanes import V1, V2, Y1, Y2
-from birthsim_env.parameters import Geometry, Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import geometry
+from birthsim_env.physics.lanes import V1, V2, Y1, Y2
+from birthsim_env.physics.parameters import Geometry, Parameters
+from birthsim_env.physics.plant import Plant
 from tests import linkage_by_points as by_points
 
 RIGS = {

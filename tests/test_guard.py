@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.guard import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING, Guard
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import REFERENCES, Reference
+from agents.residual.guard import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING, Guard
+from birthsim_env.parts.signals import REFERENCES, Reference
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
 from tests import linkage_by_points as by_points
 
 PERIOD = 1e-3

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 import agents
-from agents.guard import Guard
-from agents.residual_law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, ResidualLaw, stiffened
-from agents.settings import IMPEDANCES, LAWS, ResidualSettings
-from baselines.backstepping import BacksteppingController
+from agents.residual.guard import Guard
+from agents.residual.law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, ResidualLaw, stiffened
+from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
+from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
 from birthsim_env import Parameters
-from birthsim_env.lanes import Array
-from birthsim_env.plant import Plant
-from birthsim_env.scenarios import SCENARIOS
-from birthsim_env.signals import REFERENCES, Measurement, Reference
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop
 
 assert agents  # importing it registers the ids

@@ -6,11 +6,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from birthsim_env import geometry
-from birthsim_env.inverse_kinematics import piston_motion, piston_reference
-from birthsim_env.lanes import V1, V2, Y1, Y2, Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import geometry
+from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
+from birthsim_env.physics.lanes import V1, V2, Y1, Y2, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import linkage_by_points as by_points
 
 RIGS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from birthsim_env.references import Circle, Hold, Trajectory
+from birthsim_env.parts.references import Circle, Hold, Trajectory
 from birthsim_live.bridge import Bridge, Course, Fade
 
 

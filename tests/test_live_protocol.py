@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live import protocol
 from birthsim_live.protocol import parse
 from birthsim_live.settings import STIFFNESSES, Choices, combined, default_settings, merged

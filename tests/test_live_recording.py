@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live import recording
 from birthsim_live.frames import COLUMNS, FIELDS, SLICES
 from birthsim_live.hand import Hold

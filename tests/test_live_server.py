@@ -16,7 +16,7 @@ import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.parameters import Parameters
 from birthsim_live import protocol
 from birthsim_live.addresses import is_loopback, listen
 from birthsim_live.frames import FIELDS, SLICES

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
-from birthsim_env import geometry
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Measurement, Reference
-from birthsim_env.strict_feedback import strict_feedback_rates
+from baselines.backstepping.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
+from baselines.backstepping.strict_feedback import strict_feedback_rates
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics import geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 from tests.closed_loop import FRICTIONLESS

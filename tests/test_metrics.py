@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.metrics import NORMAL_DENSITY, UNITS, WINDOW, EpisodeMetrics
+from baselines.bench.metrics import NORMAL_DENSITY, UNITS, WINDOW, EpisodeMetrics
 
 PERIOD = 4e-3
 """s; four control periods at a time keep the tests short."""

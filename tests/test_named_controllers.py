@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.backstepping import BacksteppingController
+from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import checked_command
 from baselines.registry import controller_names, make_controller
 from birthsim_env import Parameters

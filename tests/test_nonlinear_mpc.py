@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
-from baselines.awareness import Awareness
-from baselines.comparison import default_controllers
-from baselines.probes import Answers, Probes, run_probes
+from baselines.bench.comparison import default_controllers
+from baselines.bench.probes import Answers, Probes, run_probes
+from baselines.estimation.awareness import Awareness
 from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
 from baselines.rivals.predictive import Planner
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import PRESSURES, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import PRESSURES, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop, derived_law, rigid_body
 from tests.test_through_friction import lane_of, recorded
 from tests.test_valve_inverse import into_chambers

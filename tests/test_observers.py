@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.observers import PistonObserver
-from birthsim_env.geometry import jacobian
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import Measurement, Reference
+from baselines.estimation.observers import PistonObserver
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop
 from tests import linkage_by_points as by_points
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.evaluation import evaluate
+from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 

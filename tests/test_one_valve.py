@@ -9,11 +9,11 @@ from scipy.optimize import fsolve
 
 import birthsim_env
 from baselines import BacksteppingController
-from baselines.evaluation import evaluate
-from baselines.probes import POSES, Probes, run_probes
+from baselines.bench.evaluation import evaluate
+from baselines.bench.probes import POSES, Probes, run_probes
 from baselines.registry import make_controller
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Cylinder, Parameters
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Cylinder, Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 from tests.closed_loop import FRICTIONLESS
@@ -125,4 +125,4 @@ def test_an_environment_with_one_valve_takes_rows_0_and_2() -> None:
 def test_an_unknown_layout_is_refused() -> None:
     with pytest.raises(ValueError, match="valves = 'three'; allowed: two_valves, one_valve"):
         BacksteppingController(valves="three")
-    assert birthsim_env.actuation.VALVE_LAYOUTS == ("two_valves", "one_valve")
+    assert birthsim_env.parts.actuation.VALVE_LAYOUTS == ("two_valves", "one_valve")

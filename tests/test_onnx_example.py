@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.onnx_export import PolicyModule
-from agents.policy_files import save_policy
-from agents.residual_controller import ResidualController
+from agents.policy.controller import ResidualController
+from agents.policy.files import save_policy
+from agents.policy.onnx_export import PolicyModule
 from birthsim_env import Parameters
 from tests.test_onnx_export import ROOT, exported, network, policy, tampered
 

@@ -18,14 +18,14 @@ import pytest
 import torch
 
 import agents
-from agents import onnx_export
 from agents.commands import export
-from agents.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
-from agents.policy_files import CONFIGURATION, WEIGHTS, Policy, save_policy
-from agents.policy_network import PolicyNetwork
-from agents.residual_controller import ResidualController, observation_size
-from agents.residual_law import action_names
-from agents.settings import ResidualSettings
+from agents.policy import onnx_export
+from agents.policy.controller import ResidualController, observation_size
+from agents.policy.files import CONFIGURATION, WEIGHTS, Policy, save_policy
+from agents.policy.network import PolicyNetwork
+from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
+from agents.residual.law import action_names
+from agents.residual.settings import ResidualSettings
 from birthsim_env.learned import command
 from tests.console import call
 
@@ -287,8 +287,8 @@ def test_what_a_user_can_mend_is_said_in_one_line(folder, tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("missing", ["onnx", "onnxruntime", "torch"])
 def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
-    monkeypatch.delitem(sys.modules, "agents.onnx_export")
-    monkeypatch.delattr(agents, "onnx_export")
+    monkeypatch.delitem(sys.modules, "agents.policy.onnx_export")
+    monkeypatch.delattr(agents.policy, "onnx_export")
     monkeypatch.setitem(sys.modules, missing, None)
     complaint = refused(monkeypatch, capsys, folder)
     assert missing in complaint

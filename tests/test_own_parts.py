@@ -11,7 +11,7 @@ import pytest
 from baselines.commands.parts import with_options
 from baselines.registry import known_options, make_controller, split_options
 from birthsim_env import Circle, Parameters
-from birthsim_env.own_parts import hand_of, trajectory_of
+from birthsim_env.parts.own_parts import hand_of, trajectory_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -45,7 +45,7 @@ def test_a_plain_position_becomes_a_trajectory_with_its_derivatives(from_file, t
 def test_few_points_are_met(count):
     rng = np.random.default_rng(count)
     times, points = np.cumsum(rng.uniform(0.5, 1, count)), rng.uniform(0.4, 0.6, (count, 2))
-    from birthsim_env.own_parts import Through
+    from birthsim_env.parts.own_parts import Through
 
     path = Through(times, points)
     for t, point in zip(times, points, strict=True):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from birthsim_env import Parameters
-from birthsim_env.geometry import end_effector, jacobian
-from birthsim_env.inverse_kinematics import pistons_at
-from birthsim_env.lanes import FC1, MASS, parameter_column
-from birthsim_env.randomization import described, documented_ranges
-from birthsim_env.strength import carried
+from birthsim_env.parts.randomization import described, documented_ranges
+from birthsim_env.physics.geometry import end_effector, jacobian
+from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.lanes import FC1, MASS, parameter_column
+from birthsim_env.physics.strength import carried
 
 HEAVY = """
 [mechanics]

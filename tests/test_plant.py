@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 
 ROOT = Path(__file__).parent.parent
 RANDOMIZED = {
@@ -205,7 +205,7 @@ def test_balance_has_the_pneumatic_stiffness_asked_for() -> None:
 
 DISASSEMBLE = """
 import numba, numpy as np
-from birthsim_env import dynamics
+from birthsim_env.physics import dynamics
 kernel = numba.njit(error_model="numpy", nogil=True)(dynamics.derivatives.py_func)  # one from the cache shows no assembly
 kernel.compile((numba.typeof(np.zeros((1, 1))),) * 5)
 print(*kernel.inspect_asm().values())

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from birthsim_env import dynamics
-from birthsim_env.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 
 RANGES: dict[str, tuple[float, float]] = {
     f"{section.name}.{field.name}": field.metadata["randomized"]

@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from baselines.reference_friction import ReferenceFriction
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Cylinder, Parameters
+from baselines.estimation.reference_friction import ReferenceFriction
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Cylinder, Parameters
 from tests import linkage_by_points as by_points
 from tests import rigid_body
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env import Circle, Hold, Parameters, Path, Trajectory
-from birthsim_env.geometry import end_effector
-from birthsim_env.scenarios import SCENARIOS
-from birthsim_env.seeding import stream
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.seeding import stream
+from birthsim_env.physics.geometry import end_effector
 
 RIG = Parameters()
 RADIUS = {"least": 0.3, "most": 0.7}

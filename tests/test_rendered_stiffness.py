@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests.closed_loop import FRICTIONLESS
 

@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 
-from birthsim_env.parameters import Parameters
-from birthsim_env.rendering import Renderer, Scene
+from birthsim_env.drawing.rendering import Renderer, Scene
+from birthsim_env.physics.parameters import Parameters
 
 RIG = Parameters()
 NOWHERE = (math.nan, math.nan)
@@ -270,8 +270,8 @@ SCRIPT = """
 import sys
 import numpy as np
 import birthsim_env
-from birthsim_env.parameters import Parameters
-import birthsim_env.rendering as rendering
+from birthsim_env.physics.parameters import Parameters
+import birthsim_env.drawing.rendering as rendering
 assert "pygame" not in sys.modules, "importing must not load pygame"
 scene = rendering.Scene(0.0, (0.0, 0.0), (0.5, 0.0), (0.5, 0.0), (0.0, 0.0), (2e5,) * 4, (1.0, 1.0), np.zeros((0, 2)))
 rendering.Renderer(Parameters()).frame(scene)

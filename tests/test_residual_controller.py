@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import agents
-from agents.policy_files import Policy, load_policy, save_policy
-from agents.policy_network import PolicyNetwork
-from agents.residual_controller import ResidualController, observation_size
-from agents.settings import ResidualSettings
-from baselines.backstepping import BacksteppingController
+from agents.policy.controller import ResidualController, observation_size
+from agents.policy.files import Policy, load_policy, save_policy
+from agents.policy.network import PolicyNetwork
+from agents.residual.settings import ResidualSettings
+from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.observation import SIZE

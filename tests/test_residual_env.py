@@ -9,16 +9,16 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
 import birthsim_env
-from agents.experience import Experience
-from agents.guard import Guard
-from agents.residual_env import ResidualEnv, ResidualVectorEnv
-from agents.settings import LAWS, ResidualSettings
-from baselines.backstepping import BacksteppingController
+from agents.residual.env import ResidualEnv, ResidualVectorEnv
+from agents.residual.experience import Experience
+from agents.residual.guard import Guard
+from agents.residual.settings import LAWS, ResidualSettings
+from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
-from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS
 
 assert birthsim_env  # importing it registers the ids
 IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS)

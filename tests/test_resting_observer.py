@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from baselines.observers import RELUCTANCE, REST_BANDWIDTH, REST_TIME
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import end_effector, jacobian
-from birthsim_env.lanes import PRESSURES, Array, parameter_array
-from birthsim_env.parameters import Parameters
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import Measurement
+from baselines.estimation.observers import RELUCTANCE, REST_BANDWIDTH, REST_TIME
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import Measurement
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import end_effector, jacobian
+from birthsim_env.physics.lanes import PRESSURES, Array, parameter_array
+from birthsim_env.physics.parameters import Parameters
 from tests.test_observers import PERIOD, lane_of, observer, rms
 
 STUCK = np.array([[0.02], [-0.05]])

@@ -11,10 +11,10 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
 from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, prepare
 from baselines.rivals.follower import Follower
-from birthsim_env import geometry
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters
-from birthsim_env.signals import Reference
+from birthsim_env.parts.signals import Reference
+from birthsim_env.physics import geometry
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 from tests.closed_loop import FRICTIONLESS

@@ -15,11 +15,11 @@ from baselines import BacksteppingController
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.follower import Follower, beyond
-from birthsim_env import geometry
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics import geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
 from tests import derived_law as derived
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import birthsim_env
-from baselines.evaluation import DISCOUNTS, evaluate
+from baselines.bench.evaluation import DISCOUNTS, evaluate
 from baselines.registry import make_controller
-from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
 
 IDS = [f"BirthSIM/{name.capitalize()}-v1" for name in SCENARIOS]

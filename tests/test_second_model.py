@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from birthsim_env import dynamics
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests.second_model import SecondModel
 
 PERIOD, PERIODS = 0.01, 50

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from agents import inspection
 from agents.commands import evaluate as command
-from agents.inspection import friction_along_circle, weight_over_workspace
-from agents.learning_curves import over_seeds
-from agents.policy_files import load_policy
-from agents.residual_controller import observation_size
-from agents.seeds import best_policy, merged, policy_folders, pooled, seed_table, shipped_names
-from baselines.evaluation import Evaluation
-from baselines.metrics import UNITS
-from baselines.statistics import crossed_interval, interquartile_mean
+from agents.policy.controller import observation_size
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy, merged, policy_folders, pooled, seed_table, shipped_names
+from agents.reports import inspection
+from agents.reports.inspection import friction_along_circle, weight_over_workspace
+from agents.reports.learning_curves import over_seeds
+from baselines.bench.evaluation import Evaluation
+from baselines.bench.metrics import UNITS
+from baselines.bench.statistics import crossed_interval, interquartile_mean
 
 
 def evaluation(name, error, lost=(), demand=()):

@@ -8,8 +8,8 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.sb3_adapter import SB3VecEnv
-from agents.shifted_reward import ShiftedReward
+from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.shifted_reward import ShiftedReward
 
 EPISODES = [([1.0, 0.5, 0.25], False), ([0.25], False), ([0.0] * 40, False), ([1.0, 0.75, 0.5], True)]
 """Rewards, and whether the end is one of time, after which the last value goes on."""

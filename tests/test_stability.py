@@ -11,9 +11,9 @@ import pytest
 from matplotlib import pyplot as plt
 from scipy.integrate import solve_ivp
 
-from baselines import stability
-from baselines.probes import Window
-from baselines.stability import (
+from baselines.bench import stability
+from baselines.bench.probes import Window
+from baselines.bench.stability import (
     MAPS,
     MOST_FORCE,
     MOST_MOTION,
@@ -27,13 +27,13 @@ from baselines.stability import (
     judge,
     stable_up_to,
 )
-from baselines.stability_figures import _border, _edges, stability_figure
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import inverse_geometry
-from birthsim_env.lanes import STATES, Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.signals import Mask, Measurement, Reference
+from baselines.figures.stability import _border, _edges, stability_figure
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import STATES, Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests.console import call, strict
 
 RIG = Parameters()

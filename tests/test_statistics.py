@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from baselines import statistics
-from baselines.statistics import (
+from baselines.bench import statistics
+from baselines.bench.statistics import (
     LEVEL,
     described,
     in_words,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from baselines import studies, study_figures
-from baselines.pneumatic_range import pneumatic_range, pneumatic_setpoint
-from baselines.probes import POSES, Answers
-from baselines.studies import (
+from baselines.bench import studies
+from baselines.bench.pneumatic_range import pneumatic_range, pneumatic_setpoint
+from baselines.bench.probes import POSES, Answers
+from baselines.bench.studies import (
     COUPLED,
     STUDIES,
     disturbance_study,
@@ -21,11 +21,12 @@ from baselines.studies import (
     stiffness_study,
     study_tasks,
 )
+from baselines.figures import studies as study_figures
 from birthsim_env import Parameters
-from birthsim_env.equilibrium import balanced_state
-from birthsim_env.geometry import inverse_geometry, joint_force
-from birthsim_env.lanes import PRESSURES, V1, V2
-from birthsim_env.plant import Plant
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.lanes import PRESSURES, V1, V2
+from birthsim_env.physics.plant import Plant
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)

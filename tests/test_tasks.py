@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines import tasks
-from baselines.tasks import Task, code_stamp, run_tasks
+from baselines.bench import tasks
+from baselines.bench.tasks import Task, code_stamp, run_tasks
 
 
 def square(log, number):
@@ -117,18 +117,23 @@ def test_a_process_that_dies_is_reported(log, tmp_path):
 
 
 def test_the_stamp_follows_what_computes_and_not_what_shows(tmp_path, monkeypatch):
-    for name in ("birthsim_env/plant.py", "birthsim_env/rendering.py", "baselines/gains.json", "baselines/study_figures.py"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+    for name in (
+        "birthsim_env/physics/plant.py",
+        "birthsim_env/drawing/rendering.py",
+        "baselines/gains.json",
+        "baselines/figures/studies.py",
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("1")
     monkeypatch.setattr(tasks, "_ROOT", tmp_path)
     anew = code_stamp.__wrapped__
     stamp = anew()
     assert {"version", "sources", "numpy", "numba"} <= set(stamp)
-    for name, counts in (("plant.py", True), ("rendering.py", False)):
+    for name, counts in (("physics/plant.py", True), ("drawing/rendering.py", False)):
         (tmp_path / "birthsim_env" / name).write_text("2")
         assert (anew() != stamp) == counts, name
         stamp = anew()
-    for name, counts in (("gains.json", True), ("study_figures.py", False), ("new.py", True)):
+    for name, counts in (("gains.json", True), ("figures/studies.py", False), ("new.py", True)):
         (tmp_path / "baselines" / name).write_text("2")
         assert (anew() != stamp) == counts, name
         stamp = anew()

@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.admittance_backstepping import AdmittanceBackstepping
-from baselines.evaluation import evaluate
-from baselines.probes import POSES, Answers, Probes, run_probes
+from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.bench.evaluation import evaluate
+from baselines.bench.probes import POSES, Answers, Probes, run_probes
 from baselines.registry import make_controller
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
-from birthsim_env.plant import Plant
-from birthsim_env.randomization import documented_ranges, draw_parameters
-from birthsim_env.seeding import stream
-from birthsim_env.sensors import LabSensors
-from birthsim_env.signals import Measurement, Reference
+from birthsim_env.parts.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
 from tests import closed_loop
 
 BELIEVED = Parameters()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.policy_files import CONFIGURATION, WEIGHTS, load_policy
+from agents.policy.files import CONFIGURATION, WEIGHTS, load_policy
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
 

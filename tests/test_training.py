@@ -11,15 +11,16 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents import monitor, training, validation
-from agents.configuration import TrainingSettings
-from agents.policy_files import CONFIGURATION, WEIGHTS, load_policy
-from agents.residual_controller import ResidualController
-from agents.settings import ResidualSettings
-from agents.training import train
-from agents.validation import VALIDATION_SEED, Score, validate
-from baselines.backstepping import BacksteppingController
-from baselines.evaluation import evaluate
+from agents.policy.controller import ResidualController
+from agents.policy.files import CONFIGURATION, WEIGHTS, load_policy
+from agents.residual.settings import ResidualSettings
+from agents.training import monitor, validation
+from agents.training import trainer as training
+from agents.training.configuration import TrainingSettings
+from agents.training.trainer import train
+from agents.training.validation import VALIDATION_SEED, Score, validate
+from baselines.backstepping.controller import BacksteppingController
+from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
 
 PROBE = "BirthSIM/ProbeResidual-v1"

@@ -10,7 +10,7 @@ import pytest
 from baselines.commands import tune
 from baselines.registry import make_controller
 from birthsim_env import Parameters
-from birthsim_env.randomization import documented_ranges
+from birthsim_env.parts.randomization import documented_ranges
 from tests.console import call
 
 OWN = """

@@ -11,7 +11,7 @@ from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 from imageio_ffmpeg import read_frames
 
 import birthsim_env
-from birthsim_env.rendering import Renderer, Scene
+from birthsim_env.drawing.rendering import Renderer, Scene
 
 # moviepy leaves the pipes to its encoder to the garbage collector.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")

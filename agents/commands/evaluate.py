@@ -8,13 +8,14 @@ from pathlib import Path
 import gymnasium
 
 import birthsim_env
-from agents.settings import NO_LAW
+from agents.residual.settings import NO_LAW
+from baselines.bench.evaluation import Evaluation, evaluate, overview, table
 from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number, whole, write_json
-from baselines.evaluation import Evaluation, evaluate, overview, table
+from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number, whole
+from baselines.files import make_folder, write_json
 from baselines.registry import controller_names, make_controller
-from birthsim_env.randomization import described
+from birthsim_env.parts.randomization import described
 
 
 def main() -> None:
@@ -82,7 +83,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     arguments.env = arguments.env or "BirthSIM/Circle-v1"
     arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
-    rig = birthsim_env.parameters.load_parameters(arguments.parameters)
+    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
         allowed = ", ".join(
             sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
@@ -120,7 +121,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         if len(evaluations[-1].seeds) < arguments.episodes:
             break  # interrupted: what is complete is written, and no further controller is begun
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
-    from baselines.figures import error_over_time
+    from baselines.figures.runs import error_over_time
 
     caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
     caption += f"randomised: {arguments.randomize}"
@@ -130,8 +131,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     complete = [one for one in learned if len(one.seeds) == arguments.episodes]
     text, pictures = table(evaluations), "error_over_time"
     if len(complete) > 1:
-        from agents.learning_curves import draw_learning_curves
-        from agents.seeds import learning_curves, merged, seed_table
+        from agents.policy.seeds import learning_curves, merged, seed_table
+        from agents.reports.learning_curves import draw_learning_curves
 
         together = merged(complete, f"residual, {len(complete)} seeds")
         evaluations = [*classical, together]
@@ -153,8 +154,8 @@ def _policies(path: str | None) -> tuple[list[Path], list[str]]:
     if path is None:
         return [], []
     try:
-        from agents.policy_files import load_policy
-        from agents.seeds import policy_folders
+        from agents.policy.files import load_policy
+        from agents.policy.seeds import policy_folders
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     folders = policy_folders(path)

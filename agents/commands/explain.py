@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.commands.shared import make_folder, run, write_json
-from baselines.statistics import number
+from baselines.bench.statistics import number
+from baselines.commands.shared import run
+from baselines.files import make_folder, write_json
 
 
 def main() -> None:
@@ -33,16 +34,16 @@ def main() -> None:
 
 def _explain(arguments: argparse.Namespace) -> None:
     try:
-        from agents import inspection
-        from agents.correction_figure import draw_corrections
-        from agents.policy_files import load_policy
-        from agents.residual_controller import ResidualController
-        from agents.seeds import policy_folders
-        from agents.settings import NO_LAW
+        from agents.policy.controller import ResidualController
+        from agents.policy.files import load_policy
+        from agents.policy.seeds import policy_folders
+        from agents.reports import inspection
+        from agents.reports.correction_figure import draw_corrections
+        from agents.residual.settings import NO_LAW
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     from baselines.registry import make_controller
-    from birthsim_env.parameters import Parameters
+    from birthsim_env.physics.parameters import Parameters
 
     places = policy_folders(arguments.policy)
     policies = [load_policy(place) for place in places]

@@ -33,9 +33,9 @@ def _export(arguments: argparse.Namespace) -> None:
         raise ValueError(f"--format {arguments.format!r}; allowed: {', '.join(FORMATS)}")
     try:
         # PyTorch takes seconds to load; it and the rest come with extras only.
-        from agents.onnx_export import TOLERANCE, export_onnx
-        from agents.policy_files import load_policy
-        from agents.seeds import best_policy
+        from agents.policy.files import load_policy
+        from agents.policy.onnx_export import TOLERANCE, export_onnx
+        from agents.policy.seeds import best_policy
     except ImportError as error:
         raise ValueError(f"{error}; exporting needs the extras agents and onnx: pip install 'birthsim[agents,onnx]'") from error
     folder = best_policy(arguments.policy)

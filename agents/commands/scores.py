@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy_files import WEIGHTS
-from agents.seeds import SHIPPED, policy_folders, shipped_names
-from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
-from baselines.comparison import ENVIRONMENTS, default_controllers, file_stem
-from baselines.evaluation import DISCOUNTS, evaluate
+from agents.policy.files import WEIGHTS
+from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
+from baselines.bench.comparison import ENVIRONMENTS, default_controllers, file_stem
+from baselines.bench.evaluation import DISCOUNTS, evaluate
+from baselines.bench.statistics import judged, number, summarize
+from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
+from baselines.commands.shared import run, seed_number, whole
+from baselines.files import make_folder, write_json
 from baselines.registry import UNCONTROLLED, make_controller
-from baselines.statistics import judged, number, summarize
-from baselines.tasks import Result, Task, code_stamp, run_tasks
-from birthsim_env.parameters import Parameters
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.parameters import Parameters
 from birthsim_env.scores import BEST, RIGS, ROLES, SHUT
-from birthsim_env.sensors import SENSORS
 
 Rows = dict[str, dict[str, Any]]
 """Controller -> its figures in one environment under one condition."""

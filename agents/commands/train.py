@@ -14,11 +14,12 @@ from typing import Any
 import gymnasium
 from tqdm import tqdm
 
-from agents.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
-from agents.settings import IMPEDANCES, LAWS, ResidualSettings
-from baselines.commands.shared import RANDOMIZE, make_folder, run, seed_number, whole, write_json
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.randomization import described
+from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
+from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
+from baselines.commands.shared import RANDOMIZE, run, seed_number, whole
+from baselines.files import make_folder, write_json
+from birthsim_env.parts.randomization import described
+from birthsim_env.physics.parameters import Parameters, load_parameters
 
 
 def main() -> None:
@@ -98,7 +99,7 @@ def _one(
 ) -> dict[str, Any]:  # fmt: skip
     try:
         # Stable-Baselines3 and torch take three seconds to load and come with the extra "agents" only.
-        from agents.training import train
+        from agents.training.trainer import train
     except ImportError as error:
         raise ValueError(f"{error}; training needs the extra: pip install 'birthsim[agents]'") from error
     reached = train(settings, residual, folder, rig, resume, position)

@@ -14,12 +14,13 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, make_folder, policy_of, run, seed_number
+from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number
+from baselines.files import make_folder
 from baselines.registry import controller_names, make_controller
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.randomization import described
-from birthsim_env.rendering import PairRenderer, Scene
+from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.parts.randomization import described
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters, load_parameters
 
 RATES = (10, 20, 25, 50)
 """Frames per second whose period is a whole number of the 10 ms that a GIF counts in."""

@@ -18,11 +18,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
-from baselines.commands.shared import make_folder, run, write_json
-from baselines.comparison import default_controllers
+from baselines.bench.comparison import default_controllers
+from baselines.commands.shared import run
+from baselines.files import make_folder, write_json
 from baselines.registry import make_controller
-from birthsim_env import dynamics
-from birthsim_env.lanes import Array
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.lanes import Array
 
 POLICY_PERIOD = 0.01
 PERIODS = 50

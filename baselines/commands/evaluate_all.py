@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import birthsim_env
-from baselines import comparison
+from baselines.bench import comparison
+from baselines.bench.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
+from baselines.bench.comparison_tables import full, losses, overview
+from baselines.bench.statistics import in_words
+from baselines.bench.studies import study_tasks
+from baselines.bench.tasks import Result, code_stamp, run_tasks
 from baselines.commands.parts import with_options
-from baselines.commands.shared import make_folder, write_json
-from baselines.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
-from baselines.comparison_tables import full, losses, overview
+from baselines.files import make_folder, write_json
 from baselines.registry import CONTROLLERS, SLOW, split_options
-from baselines.statistics import in_words
-from baselines.studies import study_tasks
-from baselines.tasks import Result, code_stamp, run_tasks
-from birthsim_env.parameters import Parameters
-from birthsim_env.randomization import described
+from birthsim_env.parts.randomization import described
+from birthsim_env.physics.parameters import Parameters
 
 NARROWED = {"scenario": "nominal", "all": "randomised"}
 """The option --randomize -> the one plant that is then compared."""
@@ -28,7 +28,7 @@ JOBS = 2
 
 def evaluate_all(arguments: argparse.Namespace) -> None:
     """Run what ``--out`` does not hold yet, and write comparison.json, comparison.md and the figures."""
-    rig = birthsim_env.parameters.load_parameters(arguments.parameters)
+    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
     names = with_options(names, arguments.set)
     for name in names:
@@ -77,8 +77,8 @@ def _write(
     folder: Path,
 ) -> None:  # fmt: skip
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
-    from baselines.comparison_figures import draw_comparison
-    from baselines.study_figures import draw_studies
+    from baselines.figures.comparison import draw_comparison
+    from baselines.figures.studies import draw_studies
 
     by_study: dict[str, dict[str, Result]] = {}
     for (study, label), result in studies.items():

@@ -13,9 +13,10 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.commands.parts import add_set, with_options
-from baselines.commands.shared import make_folder, run, write_json
+from baselines.commands.shared import run
+from baselines.files import make_folder, write_json
 from baselines.registry import controller_names, make_controller
-from birthsim_env.lanes import Array
+from birthsim_env.physics.lanes import Array
 from birthsim_env.success import SETTLED
 
 PICTURE: dict[str, Any] = {"render_mode": "rgb_array", "picture_size": (1280, 960)}
@@ -52,7 +53,7 @@ def record_run(
 
     ``picture`` is where to save what the rig looks like during the first push.
     """
-    rig = birthsim_env.parameters.load_parameters(parameters)
+    rig = birthsim_env.physics.parameters.load_parameters(parameters)
     period = rig.electronics.control_period
     env = gymnasium.make("BirthSIM/Circle-v1", parameters=rig, sensors=sensors, policy_period=period, **PICTURE)
     law = make_controller(controller, rig)
@@ -96,13 +97,13 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
 
 
 def _figure4(arguments: argparse.Namespace) -> None:
-    rig = birthsim_env.parameters.load_parameters(arguments.parameters)
+    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
     controller = with_options([arguments.controller], arguments.set)[0]
     make_controller(controller, rig)
     folder = make_folder(arguments.out)
     record = record_run(controller, arguments.sensors, rig, folder / "rig.png")
     result = figures_of(record, rig)
-    from baselines.figures import figure4
+    from baselines.figures.runs import figure4
 
     figure4(record, folder)
     write_json(folder / "figure4.json", result)

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import sys
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
@@ -44,30 +40,3 @@ def seed_number(text: str) -> int:
 def policy_of(environment: str) -> str:
     """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v1`` -> ``forceps``."""
     return environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
-
-
-def make_folder(path: Path) -> Path:
-    """The folder ``path``, made if it is missing; ``ValueError`` where that cannot be."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
-    except OSError as error:
-        raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
-    return path
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Write JSON as a whole or not at all; a number that is not finite becomes null, for which JSON has no other word."""
-    partial = path.with_suffix(path.suffix + ".partial")
-    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
-    partial.replace(path)
-
-
-def finite(content: Any) -> Any:
-    """``content`` with None for every number that is not finite, at any depth."""
-    if isinstance(content, dict):
-        return {name: finite(value) for name, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content

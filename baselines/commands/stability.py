@@ -8,13 +8,14 @@ from typing import Any
 
 from tqdm import tqdm
 
-from baselines import stability
+from baselines.bench import stability
+from baselines.bench.stability import MAPS
 from baselines.commands.parts import add_set, with_options
-from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
+from baselines.commands.shared import run, seed_number, whole
+from baselines.files import make_folder, write_json
 from baselines.registry import make_controller
-from baselines.stability import MAPS
-from birthsim_env.parameters import load_parameters
-from birthsim_env.sensors import SENSORS
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.parameters import load_parameters
 
 
 def main() -> None:
@@ -43,7 +44,7 @@ def _stability(arguments: argparse.Namespace) -> None:
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     rig, name = load_parameters(arguments.parameters), with_options([arguments.controller], arguments.set)[0]
     make_controller(name, rig)
-    from baselines.stability_figures import stability_figure
+    from baselines.figures.stability import stability_figure
 
     folder, chosen = make_folder(arguments.out), list(dict.fromkeys(arguments.map or MAPS))
     variants, charts = stability.variants_of(name), {}

@@ -5,10 +5,10 @@ units; each is a keyword of its constructor. Where low is positive the gain is s
 linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
-the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.probes``, with each sensor
-model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus the
-hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95 %
-quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
+the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.bench.probes``, with each
+sensor model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus
+the hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95
+% quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
 vary the best so far.
 """
 
@@ -26,17 +26,18 @@ import gymnasium
 import numpy as np
 from tqdm import tqdm
 
+from baselines.bench.evaluation import evaluate
+from baselines.bench.probes import POSES, Probes, run_probes
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import make_folder, run, seed_number, whole, write_json
+from baselines.commands.shared import run, seed_number, whole
 from baselines.controller import Controller
-from baselines.evaluation import evaluate
-from baselines.probes import POSES, Probes, run_probes
+from baselines.files import make_folder, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.randomization import described, documented_ranges, draw_parameters
-from birthsim_env.seeding import stream
-from birthsim_env.sensors import SENSORS
+from birthsim_env.parts.randomization import described, documented_ranges, draw_parameters
+from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters, load_parameters
 
 WORLDS = 3_000_000
 """Seed of the first lane; those of evaluations, trainings and validations are lower."""

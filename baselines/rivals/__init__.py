@@ -1,7 +1,7 @@
 """The controllers that a control engineer would try first: PID, LQR and sliding mode, piston by piston, and nonlinear MPC.
 
-All follow the same compliant motion (``baselines.admittance``) and know the same of the rig: its mass, weight and friction and
-the measured user force. What differs is the loop round each piston; the MPC plans for both together.
+All follow the same compliant motion (``baselines.estimation.admittance``) and know the same of the rig: its mass, weight and
+friction and the measured user force. What differs is the loop round each piston; the MPC plans for both together.
 """
 
 from baselines.rivals.lqr import LinearQuadratic

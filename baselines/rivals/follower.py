@@ -9,15 +9,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.admittance import Admittance
-from baselines.awareness import is_moving
 from baselines.controller import check_gains, lanes_of
-from baselines.observers import PistonObserver
+from baselines.estimation.admittance import Admittance
+from baselines.estimation.awareness import is_moving
+from baselines.estimation.observers import PistonObserver
 from baselines.rivals.feedforward import NEEDED, prepare
-from birthsim_env.compilation import helper
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters, load_parameters
 
 LEAST_LENGTH = 0.002
 """m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""

@@ -19,15 +19,15 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from baselines.backstepping import PNEUMATIC_GAIN
+from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
 from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
-from birthsim_env import control_model
-from birthsim_env import lanes as at
-from birthsim_env.compilation import helper, kernel
-from birthsim_env.lanes import Array
-from birthsim_env.parameters import Parameters
+from birthsim_env.physics import control_model
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 
 RATE_TOLERANCE = 1000.0
 """N/s at the end effector; assumed: what the valves give cylinder 1 with something to spare. Only ratios to it matter."""

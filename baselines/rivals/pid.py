@@ -18,10 +18,10 @@ from typing import Any, ClassVar
 
 from baselines.rivals.feedforward import FORCE1, KAPPA
 from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
-from birthsim_env import lanes as at
-from birthsim_env import valves
-from birthsim_env.compilation import helper, kernel
-from birthsim_env.lanes import Array
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics import valves
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
 
 
 @helper

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from baselines.rivals.follower import LEAST_LENGTH
-from birthsim_env import control_model, geometry, mechanics
-from birthsim_env.parameters import Cylinder, Parameters
+from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics.parameters import Cylinder, Parameters
 
 PRESSURE, FLOW = 1e5, 1e-3
 """Pa and kg/s: units of pressures and flows inside the residuals' arguments, so that all are of like size."""

@@ -17,13 +17,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.awareness import Awareness, Situation
 from baselines.controller import check_gains, lanes_of
+from baselines.estimation.awareness import Awareness, Situation
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.lanes import Array, parameter_column
-from birthsim_env.parameters import Parameters, load_parameters
-from birthsim_env.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters, load_parameters
 
 STEPS = (0.002, 0.003, 0.005, 0.007, 0.010, 0.013, 0.017)
 """s, assumed: from node to node of the horizon, 57 ms in all; rounded to whole control periods."""

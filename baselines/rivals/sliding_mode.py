@@ -17,14 +17,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from baselines.backstepping import PNEUMATIC_GAIN
+from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
 from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
-from birthsim_env import control_model
-from birthsim_env import lanes as at
-from birthsim_env.compilation import kernel
-from birthsim_env.lanes import Array
+from birthsim_env.physics import control_model
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
 
 
 @kernel

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from birthsim_env import geometry
 from birthsim_env.drawing.pen import CAP, FAINT, INK, PAPER, SKIN, SKIN_EDGE, STEEL, Axis, Colour, Pen, Point
-from birthsim_env.parameters import Cylinder, Parameters
+from birthsim_env.physics import geometry
+from birthsim_env.physics.parameters import Cylinder, Parameters
 
 _NEAR_STOP = 1e-4  # m
 

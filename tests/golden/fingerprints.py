@@ -15,11 +15,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policy_files import load_policy
-from agents.seeds import best_policy
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from birthsim_env import Parameters
-from birthsim_env.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS
 
 
 FILE = Path(__file__).parent / "fingerprints.json"

@@ -1,0 +1,1 @@
+"""Policies: their network, files, controller and export."""

@@ -1,0 +1,154 @@
+"""A trained policy with its normalisation as one ONNX file that says what goes in and what comes out.
+
+The file's metadata (``metadata_props``): ``format``; ``environment``, on which the policy was trained; ``settings``, those of
+``ResidualSettings`` as JSON; ``observations`` and ``actions``, the names of the entries as JSON lists.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import onnxruntime  # type: ignore[import-untyped]
+import torch
+from numpy.typing import NDArray
+
+from agents.policy.files import Policy
+from agents.policy.network import CLIP, EPSILON, PolicyNetwork
+from agents.residual.law import action_names, observation_names
+from birthsim_env.observation import LIMIT
+
+FORMAT = "birthsim-residual-onnx-1"
+
+INPUT, OUTPUT = "observation", "action"
+
+OPSET = 17
+"""Old enough for the runtimes of embedded computers."""
+
+TOLERANCE = 2.0**-23
+"""Largest difference of an action, in [-1, 1], that an exported policy may have: one unit in the last place of a single at 1.
+Everything inside is in double precision, where the order of a sum shows only in the rounding of the last step."""
+
+CHECKS = 1000
+"""Random observations of each kind that an exported policy is checked on."""
+
+Actions = NDArray[np.float32]
+Observations = NDArray[np.float32]
+
+
+class PolicyModule(torch.nn.Module):
+    """``PolicyNetwork`` in PyTorch: actions (N, outputs) for observations (N, inputs), both float32."""
+
+    mean: torch.Tensor
+    deviation: torch.Tensor
+
+    def __init__(self, network: PolicyNetwork) -> None:
+        super().__init__()
+        # Doubles throughout, as in PolicyNetwork.
+        self.register_buffer("mean", torch.as_tensor(network.mean, dtype=torch.float64))
+        self.register_buffer("deviation", torch.as_tensor(np.sqrt(network.variance + EPSILON), dtype=torch.float64))
+        parts: list[torch.nn.Module] = []
+        for weight, bias in network.layers:
+            linear = torch.nn.Linear(weight.shape[1], weight.shape[0], dtype=torch.float64)
+            linear.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
+            parts += [linear, torch.nn.Tanh()]
+        if not network.squashed:
+            parts[-1] = torch.nn.Hardtanh(-1.0, 1.0)
+        self.layers = torch.nn.Sequential(*parts)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        normalized = ((observations.double() - self.mean) / self.deviation).clamp(-CLIP, CLIP)
+        actions: torch.Tensor = self.layers(normalized)
+        return actions.float()
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: bytes of the file, and the largest difference of an action from PyTorch's and from NumPy's, over
+    ``observations`` observations."""
+
+    size: int
+    observations: int
+    from_torch: float
+    from_numpy: float
+
+
+def export_onnx(policy: Policy, path: Path) -> Exported:
+    """Write ``policy`` to ``path``, whole or not at all: input "observation" (N, D), output "action" (N, size), both float32.
+
+    Raises ``ValueError`` for a network that does not fit the settings, and where the file, run by onnxruntime, differs from
+    PyTorch or from ``PolicyNetwork`` by more than ``TOLERANCE``; nothing is written then.
+    """
+    network, names = policy.network, observation_names(policy.settings)
+    if (network.inputs, network.outputs) != (len(names), policy.settings.size):
+        raise ValueError(
+            f"policy maps {network.inputs} to {network.outputs} numbers; allowed: {len(names)} to {policy.settings.size}"
+        )
+    if path.is_dir():
+        raise ValueError(f"{str(path)!r} is a folder; allowed: the name of a file")
+    module = PolicyModule(network).eval()
+    model = _traced(module, network.inputs)
+    onnx.helper.set_model_props(
+        model,
+        {
+            "format": FORMAT,
+            "environment": policy.environment,
+            "settings": json.dumps(policy.settings.to_dict()),
+            "observations": json.dumps(names),
+            "actions": json.dumps(action_names(policy.settings)),
+        },
+    )
+    onnx.checker.check_model(model, full_check=True)
+    content = model.SerializeToString()
+    exported = _checked(content, module, network)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    partial.write_bytes(content)
+    partial.replace(path)
+    return exported
+
+
+def _traced(module: PolicyModule, inputs: int) -> Any:
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        path = Path(folder) / "policy.onnx"
+        # PyTorch calls this exporter deprecated; the one that takes its place needs onnxscript, which nothing else here does.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        torch.onnx.export(
+            module, (torch.zeros(1, inputs),), path, dynamo=False, opset_version=OPSET, input_names=[INPUT],
+            output_names=[OUTPUT], dynamic_axes={INPUT: {0: "batch"}, OUTPUT: {0: "batch"}},
+        )  # fmt: skip
+        return onnx.load(path)
+
+
+def _checked(content: bytes, module: PolicyModule, network: PolicyNetwork) -> Exported:
+    """Runs the file as its user will, on many observations at once and on one."""
+    session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
+    seen = _observations(network)
+    with torch.no_grad():
+        by_torch: Actions = module(torch.from_numpy(seen)).numpy()
+    by_numpy = network.actions(seen)
+    many = session.run([OUTPUT], {INPUT: seen})[0]
+    one = session.run([OUTPUT], {INPUT: seen[:1]})[0]
+    from_torch, from_numpy = (
+        float(max(np.abs(many - other).max(), np.abs(one - other[:1]).max())) for other in (by_torch, by_numpy)
+    )
+    for name, difference in (("PyTorch", from_torch), ("NumPy", from_numpy)):
+        # What is not a number is not within the tolerance either.
+        if not difference <= TOLERANCE:
+            raise ValueError(f"exported policy: actions differ from {name}'s by {difference:.2g}; allowed: {TOLERANCE:g}")
+    return Exported(len(content), len(seen), from_torch, from_numpy)
+
+
+def _observations(network: PolicyNetwork) -> Observations:
+    """(3 ``CHECKS``, inputs): like those of training, anywhere within the bounds of the environments, and far beyond them."""
+    rng = np.random.default_rng(0)
+    size = (CHECKS, network.inputs)
+    usual = network.mean + np.sqrt(network.variance) * rng.normal(size=size)
+    extreme = rng.choice([-1e9, -LIMIT, 0.0, LIMIT, 1e9], size)
+    return np.concatenate([usual, rng.uniform(-LIMIT, LIMIT, size), extreme]).astype(np.float32)

@@ -1,0 +1,151 @@
+"""Policies of several training seeds: where they are, and what they reach together."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.policy.files import load_policy
+from baselines.bench.evaluation import Evaluation
+from baselines.bench.metrics import UNITS
+from baselines.bench.statistics import crossed_interval, interquartile_mean, judged, number, quantile
+from birthsim_env.physics.lanes import Array
+
+LOST = 100.0
+"""mm: the error that a lost lane counts as."""
+
+SHIPPED = Path(__file__).resolve().parent.parent / "policies"
+"""Trained policies that come with the package, a folder per configuration and in it one per seed."""
+
+SHOWN = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hunting_x", "hunting_y", "saturation", "air")
+"""Metrics of the table over seeds, where an episode says something about them."""
+
+
+def shipped_names() -> list[str]:
+    """Configurations whose policies come with the package."""
+    return sorted(path.name for path in SHIPPED.iterdir() if path.is_dir()) if SHIPPED.is_dir() else []
+
+
+def policy_folders(path: str | Path) -> list[Path]:
+    """The policy folders at ``path``: itself, or its ``seed_*`` in order; or those of a shipped name.
+
+    Raises ``ValueError`` where there is none.
+    """
+    folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(path)
+    if (folder / "policy.json").is_file():
+        return [folder]
+    found = sorted(
+        (place.parent for place in folder.glob("seed_*/policy.json")), key=lambda place: int(place.name.rpartition("_")[2])
+    )
+    if not found:
+        raise ValueError(
+            f"policy = {str(path)!r} holds no policy; allowed: a folder that birthsim-train wrote, "
+            f"or {', '.join(shipped_names())}"
+        )
+    return found
+
+
+def best_policy(path: str | Path) -> Path:
+    """The policy folder at ``path``, of several seeds the one that did best in validation; ``path`` itself where none is."""
+    try:
+        folders = policy_folders(path)
+    except ValueError:
+        return Path(path)
+    return (
+        min(folders, key=lambda folder: load_policy(folder).training["reached"]["pooled_mm"])
+        if len(folders) > 1
+        else folders[0]
+    )
+
+
+def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
+    """What ``training.json`` of each folder says, of those that have one."""
+    files = [folder / "training.json" for folder in folders]
+    return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
+
+
+def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
+    """All episodes of several evaluations as one."""
+    whole = Evaluation(name)
+    for one in evaluations:
+        whole.seeds += one.seeds
+        whole.lost += one.lost
+        whole.demand += one.demand
+        whole.success += one.success
+        for discount, values in one.returns.items():
+            whole.returns[discount] += values
+        for metric in UNITS:
+            whole.metrics[metric] += one.metrics[metric]
+        whole.traces += one.traces
+    whole.cost = float(np.median([one.cost for one in evaluations]))
+    return whole
+
+
+def pooled(values: Array) -> float:
+    """RMS of all values, mm, of which a lost episode counts as ``LOST``."""
+    return float(np.sqrt(np.mean(np.square(np.where(np.isinf(values), LOST, values)))))
+
+
+def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
+    """A Markdown table of law and residual over training seeds, on the episodes that the rig's strength suffices for.
+
+    Interquartile means with 95 % bootstrap intervals over seeds and episodes, what the residual takes off the law's error,
+    and the pooled error of each seed.
+    """
+    feasible = np.asarray(law.demand) < 1.0
+    lines = [
+        f"{int(feasible.sum())} of {len(feasible)} episodes are within the rig's strength; {len(residuals)} training seeds. "
+        "IQM: interquartile mean, with 95 % intervals over seeds and episodes.",
+        "",
+        f"| metric | unit | statistic | {law.controller} | residual | 95 % interval |",
+        "|---|---|---|---|---|---|",
+    ]
+
+    def sizes(evaluation: Evaluation, metric: str) -> Array:
+        return np.abs(judged(evaluation.metrics[metric], evaluation.lost))
+
+    def rows(metric: str, name: str, statistic: Callable[[Array], float]) -> None:
+        matrix = np.stack([sizes(one, metric) for one in residuals])[:, feasible]
+        if np.isnan(matrix).all():
+            return
+        figures = [statistic(sizes(law, metric)[feasible]), statistic(matrix)]
+        low, high = (number(bound) for bound in crossed_interval(statistic, matrix))
+        shown = " | ".join(number(figure) for figure in figures)
+        lines.append(f"| {metric} | {UNITS[metric]} | {name} | {shown} | {low} to {high} |")
+
+    for metric in SHOWN:
+        rows(metric, "IQM", interquartile_mean)
+    for name, statistic in (("pooled RMS", pooled), ("median", _share(0.5)), ("95 %", _share(0.95)), ("max", _share(1.0))):
+        rows("settled_rms", name, statistic)
+    base = sizes(law, "settled_rms")
+    matrix = np.stack([sizes(one, "settled_rms") for one in residuals])
+    both = np.stack([np.broadcast_to(base, matrix.shape), matrix], axis=-1)
+    lines.append("")
+    for name, statistic in (("Pooled", pooled), ("Interquartile mean of the", interquartile_mean)):
+
+        def less(values: Array, statistic: Callable[[Array], float] = statistic) -> float:
+            return 100 * (1 - statistic(values[..., 1]) / statistic(values[..., 0]))
+
+        off = less(both[:, feasible])
+        if not np.isfinite(off):
+            lines.append(f"{name} settled error: most episodes are lost.  ")
+            continue
+        low, high = crossed_interval(less, both[:, feasible])
+        lines.append(f"{name} settled error: {off:.1f} % less than {law.controller} ({low:.1f} to {high:.1f} %).  ")
+    each = ", ".join(number(pooled(row[feasible])) for row in matrix)
+    lost = ", ".join(str(sum(one.lost)) for one in residuals)
+    lines += [
+        f"Pooled error of each seed: {each} mm. Lost: {sum(law.lost)} by {law.controller}, {lost} by the seeds "
+        f"(in the pooled error as {LOST:g} mm).  ",
+        f"Pooled over all {len(feasible)} episodes, those beyond the rig's strength too: {number(pooled(base))} mm by "
+        f"{law.controller}, {number(pooled(matrix))} mm with the residual.",
+    ]
+    return "\n".join(lines)
+
+
+def _share(share: float) -> Callable[[Array], float]:
+    return lambda values: quantile(values, share)

@@ -1,0 +1,142 @@
+"""What a residual has learned: its correction where the force that the law leaves out is known, and what a hand then feels.
+
+All experiments are of a rig with ideal sensors; a correction is the force that the residual makes the law believe in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from agents.policy.files import Policy
+from agents.policy.network import PolicyNetwork
+from baselines.bench.pneumatic_range import pneumatic_setpoint
+from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.statistics import quantile
+from baselines.controller import Controller
+from birthsim_env.parts.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.references import Circle, Hold, Trajectory
+from birthsim_env.parts.signals import displacement
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.user_forces import ForceProfile
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.geometry import theta1
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+
+FRICTIONLESS = {f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)}
+"""Changes of a rig that take its dry friction away."""
+
+PLACES, MASSES = 128, (2.0, 5.0)
+"""Places in the workspace at which the correction is looked at, and the range of the mass there, kg."""
+
+RUBBED, FRICTIONS = 32, (6.0, 25.0)
+"""Rigs that go round a circle, and the range of their Coulomb friction, N."""
+
+ROUND = 4.0
+"""s, that a circle takes."""
+
+SLIDING = 0.01
+"""m/s: a faster piston tells friction clearly."""
+
+SETPOINTS, FORCES = (1000.0, 2000.0, 3000.0, 4000.0), (10.0, 20.0, 40.0)
+"""N/m and N, of the stiffness test on rigs drawn at random."""
+
+RIGS = 4
+"""Random rigs for each pose, force, direction and setpoint."""
+
+
+def _follow(
+    policy: Policy, lanes: int, seconds: float, trajectory: Trajectory, ranges: dict[str, tuple[float, float]], rig: Parameters
+) -> tuple[Any, dict[str, Array]]:
+    """Lanes without a hand at 2000 N/m under the policy; the environment, and by name what was at each of T steps, (T, N, 2).
+
+    ``correction`` is the believed force, N; the others are of ``info``.
+    """
+    env: Any = gymnasium.make_vec(
+        "BirthSIM/ProbeResidual-v1", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
+        stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
+        **policy.settings.to_dict(),
+    )  # fmt: skip
+    rows = [k for k, name in enumerate(env.observation_names) if name.startswith("smoothed action: believed force")]
+    taken: dict[str, list[Array]] = {
+        name: [] for name in ("correction", "piston_position", "piston_velocity", "tracking_error")
+    }
+    observation, info = env.reset(seed=0)
+    for _ in range(env.steps - 1):
+        observation, _, _, _, info = env.step(policy.network.actions(observation))
+        taken["correction"].append(policy.settings.authority * observation[:, rows].astype(np.float64))
+        for name in list(taken)[1:]:
+            taken[name].append(info[name])
+    return env, {name: np.array(steps) for name, steps in taken.items()}
+
+
+def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
+    """Correction on cylinder 2 and m g cos(theta1), N, (PLACES,) each: held still, without friction, masses drawn at random."""
+    hold, rig = Hold(((0.40, 0.60), (-0.12, 0.08))), Parameters().replace(FRICTIONLESS)
+    env, taken = _follow(policy, PLACES, 3.0, hold, {"mechanics.mass": MASSES}, rig)
+    mass = env.simulation.plant.lane_parameters[at.MASS]
+    angle = theta1(taken["piston_position"][-1, :, 0], rig)
+    return taken["correction"][-100:, :, 1].mean(axis=0), mass * rig.mechanics.gravity * np.cos(angle)
+
+
+def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
+    """Round the circle of Fig. 4: the Coulomb friction that the law believes in less that of the rig, N, and half the
+    difference between the corrections while a piston moves out and in, N; (2, RUBBED) each, of cylinders 1 and 2.
+
+    The halves tell friction, which turns round with the speed, from weight; and the mean of both ways round, since one way
+    round the weight along cylinder 2 goes with its speed, and the other way against it. Frictions are drawn at random.
+    """
+    rig, halves = Parameters(), np.zeros((2, RUBBED))
+    ranges = {f"cylinder{i}.coulomb_friction": FRICTIONS for i in (1, 2)}
+    for period in (ROUND, -ROUND):
+        env, taken = _follow(policy, RUBBED, 12.0, Circle(period=period), ranges, rig)
+        speed, correction = (np.moveaxis(taken[name][400:], 2, 0) for name in ("piston_velocity", "correction"))
+        outwards, inwards = (correction.mean(axis=1, where=moves) for moves in (speed > SLIDING, speed < -SLIDING))
+        halves += (outwards - inwards) / 4
+    believed = np.array([[rig.cylinder1.coulomb_friction], [rig.cylinder2.coulomb_friction]])
+    return believed - env.simulation.plant.lane_parameters[[at.FC1, at.FC2]], halves
+
+
+def frictionless_circle(policy: Policy) -> tuple[float, float]:
+    """Settled RMS error on x, mm, of the law and with the policy: a circle of 100 mm in 4 s at 2000 N/m without friction."""
+    rig, circle = Parameters().replace(FRICTIONLESS), Circle(radius=0.1)
+    silent = PolicyNetwork(
+        policy.network.mean, policy.network.variance, ((np.zeros_like(policy.network.layers[0][0])[: policy.settings.size],
+        np.zeros(policy.settings.size, dtype=np.float32)),),
+    )  # fmt: skip
+    errors = []
+    for network in (silent, policy.network):
+        _, taken = _follow(replace(policy, network=network), 1, 12.0, circle, {}, rig)
+        errors.append(1e3 * float(np.sqrt(np.mean(taken["tracking_error"][400:, 0, 0] ** 2))))
+    return errors[0], errors[1]
+
+
+def rendered(controllers: Sequence[tuple[str, Controller]], seed: int = 0) -> list[dict[str, Any]]:
+    """Stiffness test on rigs drawn at random: per setpoint and controller the median and 95 % of the error of the rendered
+    stiffness, %, and of the hunting on x and y, mm, and how many of the cases were lost."""
+    rng, rows = np.random.default_rng(seed), []
+    for setpoint in SETPOINTS:
+        cases = [case for case in product(POSES, FORCES, range(4)) for _ in range(RIGS)]
+        position = np.array([pose for pose, _, _ in cases]).T.copy()
+        angle = np.array([direction * math.pi / 2 for _, _, direction in cases])
+        force = np.array([size for _, size, _ in cases]) * np.stack([np.cos(angle), np.sin(angle)])
+        stiffness = np.repeat([[setpoint], [setpoint], [0.0]], len(cases), axis=1)
+        rigs = [draw_parameters(Parameters(), documented_ranges(Parameters()), rng) for _ in cases]
+        pneumatic = pneumatic_setpoint(position, np.stack(displacement(*force, *stiffness)), force, Parameters())
+        probes = Probes(position, force, stiffness, rigs, pneumatic)
+        for name, controller in controllers:
+            answers = run_probes(probes, controller, seed=seed)
+            figures = {"error_percent": np.abs(100 * answers.stiffness_error(force))}
+            figures |= {f"hunting_{axis}_mm": 1e3 * answers.hunting[k] for k, axis in enumerate("xy")}
+            row = {"setpoint": setpoint, "controller": name, "lost": int(answers.lost.sum()), "cases": len(cases)}
+            for label, values in figures.items():
+                row |= {f"{label}_{key}": quantile(values, share) for key, share in (("median", 0.5), ("q95", 0.95))}
+            rows.append(row)
+    return rows

@@ -1,0 +1,77 @@
+"""The scenarios with the law inside: a policy adds a residual."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from agents.residual.law import ResidualActuation
+from agents.residual.settings import ResidualSettings
+from birthsim_env.assembly import refuse_unknown
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.physics.parameters import load_parameters
+from birthsim_env.vector_env import BirthSIMVectorEnv
+
+
+class _LawInside:
+    """Puts the law between the policy and the valves of the environment that it is mixed into."""
+
+    def __init__(
+        self,
+        scenario: str,
+        law: str = ResidualSettings.law,
+        impedance: str = ResidualSettings.impedance,
+        authority: float = ResidualSettings.authority,
+        time_constant: float = ResidualSettings.time_constant,
+        **arguments: Any,
+    ) -> None:
+        inside = ("action_mode", "valves", "actuation")
+        for name in inside:
+            if name in arguments:
+                raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
+        own = ("law", "impedance", "authority", "time_constant", "num_envs", "max_episode_steps", "autoreset_mode")
+        refuse_unknown(arguments, own, inside)
+        rig = load_parameters(arguments.pop("parameters", None))
+        period = arguments.get("policy_period", ResidualSettings.policy_period)
+        settings = ResidualSettings(law, impedance, authority, time_constant, period)
+        actuation = ResidualActuation(rig, settings)
+        super().__init__(scenario, parameters=rig, actuation=actuation, **arguments)  # type: ignore[call-arg]
+
+
+class ResidualEnv(_LawInside, BirthSIMEnv):
+    """A scenario of ``BirthSIMEnv`` with a control law running inside at 1 kHz, which a policy corrects.
+
+    ## Action space
+    `Box(-1, 1, (n,), float32)`, held for one policy period and smoothed by a low-pass (`time_constant` = 28 ms). Zero is
+    exactly the law. n and the entries depend on `impedance`:
+
+    | `impedance` | entries |
+    |---|---|
+    | `"fixed"` | a force along cylinders 1 and 2, in units of `authority` (100 N), that the law believes in |
+    | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
+    | `"variable"` | and a power of 2 for the damping; less than zero is zero |
+
+    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. But for
+    `"fixed"` it also works less stiffly for a while where pistons swing beyond 0.25 m/s, whatever the action
+    (`agents.residual.guard`).
+    With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
+
+    ## Observation space
+    That of `BirthSIMEnv`, and after the last action the smoothed action, the shares of the authority that are left (they fall
+    where pistons oscillate), and the forces that an observer finds unexplained on pistons 1 and 2, in units of 100 N: now,
+    when they last moved out, and when they last moved in. `observation_names` lists all.
+
+    ## Reward, start, end and info
+    Those of `BirthSIMEnv`.
+
+    ## Arguments
+    Those of `BirthSIMEnv` without `action_mode`, `valves` and `actuation`, and `law` (one of `agents.residual.settings.LAWS`),
+    `impedance`, `authority` (N) and `time_constant` (s).
+
+    ## Version history
+    - v1: as `BirthSIMEnv` v1.
+    - v0: first version.
+    """
+
+
+class ResidualVectorEnv(_LawInside, BirthSIMVectorEnv):
+    """``ResidualEnv`` over N lanes in one kernel call per control period; see ``BirthSIMVectorEnv``."""

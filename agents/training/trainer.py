@@ -1,0 +1,75 @@
+"""Trains one residual policy: builds worlds and model, learns, keeps the best, and goes on where a killed training stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import torch
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecNormalize
+
+from agents.residual.settings import LAWS, ResidualSettings
+from agents.training.algorithms import make_model
+from agents.training.checkpoint import load_checkpoint
+from agents.training.configuration import TrainingSettings
+from agents.training.monitor import Monitor, described
+from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.shifted_reward import ShiftedReward
+from agents.training.validation import SEED_SPACING, TRAINING_SEED
+
+__all__ = ["train"]
+
+
+def train(
+    settings: TrainingSettings,
+    residual: ResidualSettings,
+    folder: Path,
+    parameters: Any = None,
+    resume: bool = False,
+    position: int = 0,
+) -> dict[str, Any]:
+    """Train one residual policy and write it to ``folder``; returns what was reached.
+
+    The policy that is best on the validation worlds (pooled error and its 95 % tail together) is the one that is kept,
+    written whenever it improves; a checkpoint is written at every validation, ``settings.validations`` times. With ``resume``
+    the training goes on from there, in worlds that it has not met. ``position`` is the row of its progress bar.
+    Raises ``ValueError`` for a checkpoint that is damaged or of other settings.
+    """
+    torch.set_num_threads(1)
+    arguments = {
+        "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }  # fmt: skip
+    env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments), staggered=True)
+    checks = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
+    paper = None
+    if settings.until < 100:
+        law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
+        paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
+    # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
+    paid = ShiftedReward(env, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else env
+    normalized = VecNormalize(paid, gamma=settings.discount)
+    model = make_model(settings, normalized, str(folder / "tensorboard"))
+    past = (
+        load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))
+        if resume
+        else None
+    )
+    done = model.num_timesteps
+    # A training that goes on meets other worlds than it did: lanes use a seed each, which the steps done shift.
+    normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed + done // settings.lanes % SEED_SPACING)
+    callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
+    try:
+        if done < settings.steps and not callback.enough:
+            model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
+    except KeyboardInterrupt:
+        print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
+        raise
+    finally:
+        callback.close()
+        for worlds in (env, checks, paper):
+            if worlds is not None:
+                worlds.close()
+    return callback.reached()

@@ -1,0 +1,111 @@
+"""How good a residual is on worlds that training never sees: settled errors, stiffness, hunting and saturation per lane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.policy.seeds import LOST
+from baselines.bench.feasibility import demand
+from baselines.bench.metrics import EpisodeMetrics
+from baselines.bench.statistics import quantile
+from birthsim_env.success import SETTLED
+
+VALIDATION_SEED = 1_000_000
+"""First seed of the validation worlds; evaluation seeds stay below it."""
+
+TRAINING_SEED = 2_000_000
+"""First seed of the training worlds, which neither validation nor evaluation should meet."""
+
+SEED_SPACING = 10_000
+"""Between the first lanes of neighbouring training seeds, so that they share no worlds."""
+
+PUSHED = 5.0
+"""N: a weaker hand says nothing about the stiffness that it feels."""
+
+Lanes = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Per lane (N,): settled RMS of sqrt(ex^2 + ey^2), mm; error of the rendered stiffness, %: mean settled error along the
+    push over the displacement asked for; hunting, mm; time with a valve at its limit, %; and the share of the rig's strength
+    that the world asks for. NaN where an episode says nothing."""
+
+    error: Lanes
+    stiffness: Lanes
+    hunting: Lanes
+    saturation: Lanes
+    demand: Lanes
+    lost: int
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Lanes (N,) whose world asks for no more than the cylinders can give."""
+        return self.demand < 1.0
+
+    @property
+    def pooled(self) -> float:
+        """RMS over the feasible lanes, mm."""
+        own = self.error[self.feasible]
+        return float(np.sqrt(np.mean(own**2))) if own.size else float("nan")
+
+    @property
+    def tail(self) -> float:
+        """95 % quantile over the feasible lanes, mm."""
+        return quantile(self.error[self.feasible], 0.95)
+
+    def to_dict(self) -> dict[str, float]:
+        """The figures of a learning curve; medians where nothing else is said, NaN without a feasible lane."""
+
+        def over_lanes(values: Lanes, share: float = 0.5) -> float:
+            return quantile(values[self.feasible], share)
+
+        return {
+            "pooled_mm": self.pooled,
+            "tail_mm": self.tail,
+            "median_mm": over_lanes(self.error),
+            "max_mm": over_lanes(self.error, 1.0),
+            "stiffness_error_percent": over_lanes(self.stiffness),
+            "hunting_mm": over_lanes(self.hunting),
+            "saturation_percent": over_lanes(self.saturation),
+            "infeasible": int(np.sum(~self.feasible)),
+            "lost": self.lost,
+        }
+
+
+def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed: int = VALIDATION_SEED) -> Score:
+    """Run one episode in every lane of a residual vector environment under ``act``: observations (N, D) -> actions (N, size).
+
+    Figures are sampled once per policy step.
+    """
+    observation, info = env.reset(seed=seed)
+    asked = demand(env)
+    lanes = env.num_envs
+    metrics = EpisodeMetrics(lanes, env.simulation.period * env.simulation.periods)
+    alive: NDArray[np.bool_] = np.ones(lanes, dtype=np.bool_)
+    felt, counts = np.zeros((2, lanes))
+    for _ in range(env.steps):
+        metrics.add(info, env.simulation.openings, alive)
+        size = np.hypot(*info["user_force"].T)
+        given = info["compliant_target"] - info["target"]
+        along = np.abs((info["tracking_error"] * info["user_force"]).sum(axis=1)) / np.maximum(size, PUSHED)
+        counted = alive & (info["since_jump"] >= SETTLED) & (size >= PUSHED)
+        felt += np.where(counted, along / np.maximum(np.hypot(*given.T), 1e-6), 0.0)
+        counts += counted
+        observation, _, terminated, _, info = env.step(act(observation))
+        alive &= ~terminated
+    result = metrics.result()
+    with np.errstate(invalid="ignore"):
+        return Score(
+            np.where(alive, result["settled_rms"], LOST),
+            100 * felt / np.where(counts > 0, counts, np.nan),
+            np.fmax(result["hunting_x"], result["hunting_y"]),
+            result["saturation"],
+            asked,
+            int(np.sum(~alive)),
+        )

@@ -1,0 +1,1 @@
+"""Backstepping behind a Cartesian mass, spring and damper."""

@@ -1,0 +1,1 @@
+"""The paper's law, and its form in Cartesian coordinates."""

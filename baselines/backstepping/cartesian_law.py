@@ -1,0 +1,127 @@
+"""Backstepping in Cartesian coordinates: a stiffness matrix rendered at any pose, as kernels over lanes.
+
+The end effector is a point of mass m, so with J = (u1, u2) of (16) and L_i = F_i - Fext_i - friction_i along the pistons
+    m a = P + m g,  P = J^-T L,   and a wanted jerk j asks for   L' = J'^T P + m J^T j.
+In components along cylinder 2 (n) and across it (t), u1 = -kappa t, u2 = n, t' = -theta1' n and n' = theta1' t.
+
+The law is that of equal gains with a matrix in the place of the gain, C = (3 K/m - 2)^(1/2), which solves the cubic of
+``gains`` without friction, K = m (C^3 + 2 C)/(3 C). Written out, with e = x - xt and the model's acceleration a,
+    j = jt - 3 C (a - at + K e/m) - (3 C^2 + 2) (v - vt) + D K e/m^2,   D = J^-T diag(Fv) J^-1.
+The last term stands for Fv in ``gains.closed_loop_stiffness``. At rest under a force Fu, a = -Fu/m, and the law's rate of
+friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever the size of e.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.backstepping.law import smooth_sign
+from baselines.estimation.admittance import square_root
+from baselines.valve_inverse import force_first_openings
+from birthsim_env.parts.signals import REFERENCES
+from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.dynamics import load, store
+from birthsim_env.physics.lanes import Array
+
+
+@helper
+def along(x: float, y: float, sine: float, cosine: float) -> float:
+    """Component along cylinder 2 of a Cartesian vector."""
+    return sine * x - cosine * y
+
+
+@helper
+def across(x: float, y: float, sine: float, cosine: float) -> float:
+    """Component across cylinder 2 of a Cartesian vector; extending cylinder 1 makes it negative."""
+    return cosine * x + sine * y
+
+
+@helper
+def cartesian(t: float, n: float, sine: float, cosine: float) -> tuple[float, float]:
+    """x and y of a vector with components ``t`` across and ``n`` along cylinder 2."""
+    return cosine * t + sine * n, sine * t - cosine * n
+
+
+@helper
+def load_rates(
+    load1: float, load2: float, growth: float, turn: float, kappa: float, mass: float, jerk_t: float, jerk_n: float
+) -> tuple[float, float]:
+    """L' of both pistons, N/s, for a jerk (m/s3) across and along cylinder 2; ``growth`` kappa'/kappa, ``turn`` theta1'."""
+    force_t, force_n = -load1 / kappa, load2
+    rate1 = kappa * (turn * force_n - growth * force_t - mass * jerk_t)
+    rate2 = turn * force_t + mass * jerk_n
+    return rate1, rate2
+
+
+@helper
+def pressure_openings(
+    u: Array, i: int, row: int, rate: float, wanted: float, wanted_rate: float, c4: float, pp: float, pn: float, ap: float,
+    an: float, half_stroke: float, y: float, v: float, p: Array,
+) -> None:  # fmt: skip
+    """Openings of one cylinder for dF/dt = ``rate`` while its pneumatic stiffness (9) tends to ``wanted`` at c4."""
+    # Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning.
+    length_p, length_n = max(half_stroke + y, 0.002), max(half_stroke - y, 0.002)
+    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, p[at.INDEX])
+    force_first_openings(
+        u, i, row, rate, wanted_rate - c4 * (stiffness - wanted), pp, pn, ap, an, length_p, length_n, v, p
+    )  # fmt: skip
+
+
+@helper
+def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, width: float, u: Array, n: int) -> None:
+    """Openings (4, n). ``joints`` (4, n): y1, y2, v1, v2; ``target`` (15, n): the reference."""
+    for i in range(n):
+        y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
+        pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
+        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        turn = -2.0 * r4 * v1 / root
+        growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
+
+        drag1 = p[at.FC1] * smooth_sign(v1, width) + p[at.FV1] * v1
+        drag2 = p[at.FC2] * smooth_sign(v2, width) + p[at.FV2] * v2
+        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - drag1
+        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - drag2
+        ax, ay = cartesian(-load1 / (kappa * m), load2 / m, sine, cosine)
+        ay -= gravity
+        vx, vy = cartesian(-kappa * v1, v2, sine, cosine)
+
+        ex, ey = r2 * sine - target[0, i], -r2 * cosine - target[1, i]
+        dx, dy = vx - target[2, i], vy - target[3, i]
+        kxx, kyy, kxy = target[8, i] / m, target[9, i] / m, target[14, i] / m
+        springx, springy = kxx * ex + kxy * ey, kxy * ex + kyy * ey
+        cxx, cyy, cxy = square_root(3.0 * kxx - 2.0, 3.0 * kyy - 2.0, 3.0 * kxy)
+        fx, fy = ax - target[4, i] + springx, ay - target[5, i] + springy
+        drag_t = p[at.FV1] / (kappa * kappa * m) * across(springx, springy, sine, cosine)
+        drag_n = p[at.FV2] / m * along(springx, springy, sine, cosine)
+        jx = target[6, i] - 3.0 * (cxx * fx + cxy * fy) - (9.0 * kxx - 4.0) * dx - 9.0 * kxy * dy
+        jy = target[7, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
+        jerk_t, jerk_n = across(jx, jy, sine, cosine) + drag_t, along(jx, jy, sine, cosine) + drag_n
+
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
+        rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity)
+        rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, m, gravity)
+        pressure_openings(
+            u, i, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p
+        )
+        pressure_openings(
+            u, i, 2, rate2, target[11, i], target[13, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.HALF_L2], y2, v2, p
+        )
+
+
+@kernel
+def command(joints: Array, pressures: Array, reference: Array, p: Array, c4: float, width: float, openings: Array) -> None:
+    """Writes ``openings`` (4, N); arguments as in ``law``, with N lanes and one rig's parameters (PARAMETERS,)."""
+    x, air, r, u = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((REFERENCES, BLOCK)), np.empty((4, BLOCK))
+    for first in range(0, joints.shape[1], BLOCK):
+        n = min(BLOCK, joints.shape[1] - first)
+        load(joints, first, n, x)
+        load(pressures, first, n, air)
+        load(reference, first, n, r)
+        law(x, air, r, p, c4, width, u, n)
+        store(u, first, n, openings)

@@ -1,0 +1,189 @@
+"""The paper's controller as a user calls it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from baselines.backstepping import law as backstepping_law
+from baselines.backstepping.gains import gains_for
+from baselines.controller import lanes_of, told_of
+from baselines.estimation.observers import PistonObserver, measured_joints
+from birthsim_env.parts.actuation import VALVE_LAYOUTS
+from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.physics.geometry import jacobian
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters, load_parameters
+
+PNEUMATIC_GAIN = 30.0
+"""c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
+
+SIGN_WIDTH = 0.002
+"""m/s; assumed: over this speed the law's sign(v) goes from rest to sliding; close to the paper's discontinuous sign."""
+
+
+@dataclass(frozen=True)
+class LawTerms:
+    """What the law knows and wants at one instant in N lanes; the second-last axis counts cylinders 1 and 2. SI units.
+
+    ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated; ``wanted`` (8, N): yd1, yd2 and their three derivatives;
+    ``gains`` (3, 2, N): c1, c2, c3, and ``gain_rates`` their rates at constant setpoints, since they follow the pose;
+    ``wanted_force`` F* (2, N); the rates that the law asks for, ``force_rate`` dF/dt (2, N) and ``pneumatic_stiffness_rate``
+    dK/dt (2, N).
+    """
+
+    joints: Array
+    wanted: Array
+    gains: Array
+    gain_rates: Array
+    wanted_force: Array
+    force_rate: Array
+    pneumatic_stiffness_rate: Array
+
+
+class BacksteppingController:
+    """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
+
+    Arguments:
+        parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
+        weight_compensation: put (14), weight and centrifugal force on cylinder 2, back into the model (the paper's section VI).
+        pneumatic_gain: c4, 1/s, of the pneumatic stiffness.
+        sign_width: speed, m/s, over which the sign of (4) is smoothed.
+        damping_ratio: zeta of the damping B = 2 zeta sqrt(K m_e) that slow pushes meet beside the stiffness K, whatever K is at
+            the time; m_e is the mass that moves, m at the end effector. None: equal gains, the least damped, with a zeta of
+            about 0.8. More takes a larger sum c1 + c2 + c3, and a slow valve bears no more than it must: the law takes
+            c1 = c3 > c2, which makes the sum as small as it can be (``gains.gains_for``). With valves of 4 ms up to 4000 N/m a
+            ratio of 2 is rendered, one of 3 no longer.
+        frozen_friction: leave the part of the Coulomb friction out of dF*/dt. At rest the model's acceleration, which does not
+            know the hand, is not zero and would make that part render a stiffness 25 to 90 % too high.
+        valves: ``two_valves`` per cylinder, or ``one_valve``, a 5/3 valve that gives chamber N minus the opening of chamber P
+            and leaves the pneumatic stiffness to itself (section VI). An environment with one valve per cylinder takes rows
+            0 and 2 of the openings as its action.
+        force_first: where a valve of two saturates, the pneumatic stiffness gives way to the force. In the paper's law both
+            fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
+            valves drain, no force is left to come back, and the episode is lost.
+
+    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds.
+    Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters | str | Path | None = None,
+        weight_compensation: bool = False,
+        pneumatic_gain: float = PNEUMATIC_GAIN,
+        sign_width: float = SIGN_WIDTH,
+        damping_ratio: float | None = None,
+        frozen_friction: bool = False,
+        valves: str = "two_valves",
+        force_first: bool = False,
+    ) -> None:
+        ratio = 1.0 if damping_ratio is None else damping_ratio
+        for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value!r}; allowed: a positive number")
+        if valves not in VALVE_LAYOUTS:
+            raise ValueError(f"valves = {valves!r}; allowed: {', '.join(VALVE_LAYOUTS)}")
+        if force_first and valves == "one_valve":
+            raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
+        self.parameters = load_parameters(parameters)
+        self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
+        self.force_first = bool(force_first)
+        self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
+        self._p = parameter_column(self.parameters)
+        self._options: Array = np.empty(backstepping_law.OPTIONS)
+        self._options[backstepping_law.PNEUMATIC_GAIN] = pneumatic_gain
+        self._options[backstepping_law.SIGN_WIDTH] = sign_width
+        self._options[backstepping_law.WEIGHT] = self.weight_compensation
+        self._options[backstepping_law.COULOMB_RATE] = not frozen_friction
+        self._options[backstepping_law.DAMPING_RATIO] = damping_ratio or 0.0
+        self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
+        self._options[backstepping_law.FORCE_FIRST] = self.force_first
+        self._observer = PistonObserver(self.parameters, self._p)
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True. Only the observer has a memory."""
+        self._observer.reset(lanes)
+
+    def command(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
+    ) -> Array:
+        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
+
+        ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons;
+        ``believed_rate`` (2, N), N/s, is how fast it changes, which the force then follows without the lag of c3.
+        ``damping_factor`` (N,) is the damping in units of the least there is; up to 1.01 it is that, and where a
+        ``damping_ratio`` is given it says nothing.
+        Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that no positive gains render,
+        naming the lane and what is allowed there.
+        """
+        if measurement.position.ndim == 1:
+            given = (believed_force, believed_rate, damping_factor)
+            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+            return self.command(*one_lane(measurement, reference), *told)[:, 0]
+        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
+        openings = np.empty(measurement.pressures.shape)
+        misses = backstepping_law.command(
+            joints, measurement.pressures, reference.rows, believed, self._p, self._options, openings
+        )
+        if misses > 0:
+            self._refuse(joints, reference)
+        return openings
+
+    def inspect(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
+    ) -> LawTerms:
+        """What ``command`` would want with the same signals, over N lanes.
+
+        Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
+        """
+        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
+        lanes = joints.shape[1]
+        wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
+        gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
+        flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
+        backstepping_law.inspect(
+            joints, measurement.pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent
+        )
+        return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
+
+    def _joints(
+        self, measurement: Measurement, reference: Reference, force: Array | None, rate: Array | None, factor: Array | None
+    ) -> tuple[Array, Array]:
+        """y1, y2, v1, v2 (4, N), and what the law is told (TOLD, N), from signals whose shapes are checked."""
+        lanes = lanes_of(measurement, reference)
+        told = told_of(lanes, force, rate, factor)
+        if measurement.sampled:
+            return np.ascontiguousarray(self._observer.update(measurement)), told
+        return measured_joints(measurement, self._p), told
+
+    def _refuse(self, joints: Array, reference: Reference) -> None:
+        """Raises the error of the first lane whose setpoints have no gains."""
+        for lane, setpoints in enumerate(reference.stiffness.T):
+            if not np.isfinite(joints[:, lane]).all():
+                continue
+            squares = jacobian(joints[:2, lane], self.parameters) ** 2
+            for i, cylinder in enumerate((self.parameters.cylinder1, self.parameters.cylinder2)):
+                stiffness = float(setpoints @ squares[:, i])
+                apparent_mass = float(self.parameters.mechanics.mass * squares[:, i].sum())
+                damping = None
+                if self.damping_ratio is not None and stiffness > 0:
+                    damping = 2 * self.damping_ratio * math.sqrt(stiffness * apparent_mass)
+                try:
+                    gains_for(stiffness, apparent_mass, cylinder.viscous_friction, damping)
+                except ValueError as error:
+                    place = f"reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
+                    raise ValueError(f"{place}, cylinder {i + 1}: {error}") from None

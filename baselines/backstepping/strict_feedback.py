@@ -1,0 +1,66 @@
+"""The control model in the paper's state space (11)-(14): what the backstepping law is derived from.
+
+State X, (8, N), in the order of (12): y2, v2, F2, K2, y1, v1, F1, K1; F is the pneumatic force Pp Sp - Pn Sn and K the
+pneumatic stiffness (9). Input U, (4, N): qA2, qT2, qA1, qT1, the active and pressurisation mass flows of (8), kg/s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from birthsim_env.physics import control_model, friction, geometry, mechanics
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import checked
+
+
+@kernel
+def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, neglected: Array) -> None:
+    gas_t, index = p[at.GAS] * p[at.TEMPERATURE], p[at.INDEX]
+    for i in range(x.shape[1]):
+        y2, v2, f2, k2, y1, v1, f1, k1 = x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
+        outside1 = p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1])
+        outside2 = p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2])
+        net1 = f1 - outside1 - friction.coulomb_force(v1, p[at.FC1], p[at.FV1], p[at.SIGN_SPEED])
+        net2 = f2 - outside2 - friction.coulomb_force(v2, p[at.FC2], p[at.FV2], p[at.SIGN_SPEED])
+        neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.MASS], p[at.GRAVITY])
+        lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
+        rates[0, i] = v2
+        rates[1, i] = net2 / p[at.MASS] + neglected_share * neglected[i]
+        rates[2, i] = control_model.force_rate(u[0, i], k2, v2, lp2 + ln2, index, gas_t)
+        rates[3, i] = control_model.stiffness_rate(f2, k2, v2, u[0, i], u[1, i], lp2, ln2, index, gas_t)
+        rates[4, i] = v1
+        rates[5, i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS], p[at.GRAVITY])
+        rates[6, i] = control_model.force_rate(u[2, i], k1, v1, lp1 + ln1, index, gas_t)
+        rates[7, i] = control_model.stiffness_rate(f1, k1, v1, u[2, i], u[3, i], lp1, ln1, index, gas_t)
+
+
+def _evaluate(state: ArrayLike, flows: ArrayLike, parameters: Parameters, share: float) -> tuple[Array, Array]:
+    lanes = np.shape(state)[1] if np.ndim(state) == 2 else 1
+    x, u = checked("state", state, (8, lanes), "SI"), checked("flows", flows, (4, lanes), "kg/s")
+    rates, neglected = np.empty((8, lanes)), np.empty(lanes)
+    _rates(x, u, parameter_column(parameters), share, rates, neglected)
+    return rates, neglected
+
+
+def strict_feedback_rates(state: ArrayLike, flows: ArrayLike, parameters: Parameters, neglected: bool = False) -> Array:
+    """dX/dt of (13), (8, N), for states (8, N) and virtual flows (4, N), SI units.
+
+    Without ``neglected`` the system is in strict feedback form, as the law is derived; with it (14) is added to dv2/dt, as
+    in (5). Raises ``ValueError`` for wrong shapes and numbers that are not finite.
+    """
+    return _evaluate(state, flows, parameters, float(neglected))[0]
+
+
+def neglected_acceleration(state: ArrayLike, parameters: Parameters) -> Array:
+    """The term (14), (N,), m/s2: weight and centrifugal acceleration along cylinder 2, for states (8, N).
+
+    Raises ``ValueError`` for wrong shapes and numbers that are not finite.
+    """
+    return _evaluate(state, np.zeros((4, np.shape(state)[-1])), parameters, 0.0)[1]

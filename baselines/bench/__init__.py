@@ -1,0 +1,1 @@
+"""How controllers are measured and compared."""

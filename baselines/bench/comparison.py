@@ -1,0 +1,174 @@
+"""The bench: controllers x environments x sensors x plants, every controller in the same worlds.
+
+A cell is one controller in one environment, with one sensor model and one plant, over all seeds. The scenario varies from
+episode to episode in every cell; the plant is the rig as its owner describes it, or drawn anew for every episode.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.evaluation import evaluate
+from baselines.bench.metrics import UNITS
+from baselines.bench.statistics import described, judged, paired_ratios
+from baselines.bench.tasks import Result, Task
+from baselines.registry import CONTROLLERS, SLOW, make_controller, split_options
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.physics.parameters import Parameters
+
+ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
+SENSORS = ("ideal", "lab")
+PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
+"""Plant -> the environments' argument ``randomize``."""
+
+MOVING = ("sine", "noise", "guided")
+"""Hands of ``birthsim_env.parts.moving_hands`` that move all the time."""
+
+REFERENCE = "backstepping"
+"""The law that the others are compared with, episode by episode."""
+
+METRICS = {**UNITS, "hunting": "mm"}
+"""Metric -> unit; ``hunting`` is the larger of the two axes."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Where a controller is measured: environment id, sensor model, plant, one of ``PLANTS``, and what moves the hand, one of
+    ``MOVING`` or "" for the environment's own hand."""
+
+    environment: str
+    sensors: str
+    plant: str
+    hand: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.short}, {self.sensors} sensors, {self.plant} plant{f', moving hand: {self.hand}' if self.hand else ''}"
+
+    @property
+    def short(self) -> str:
+        """The environment without prefix and version."""
+        return re.sub(r"^BirthSIM/|-v\d+$", "", self.environment)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A controller's episodes under some conditions: metric -> value per episode, which are lost, and us per lane and call."""
+
+    controller: str
+    conditions: Conditions
+    metrics: dict[str, list[float]]
+    lost: list[bool]
+    cost: float
+
+
+Cells = dict[tuple[str, Conditions], Cell]
+
+CONDITIONAL = ("stiffness_error", "cross_motion", "hunting_x", "hunting_y", "hunting", "restarts")
+"""Metrics of which some environments say nothing: they apply where any episode of any controller says something."""
+
+WITHOUT_RATIO = ("restarts", "saturation")
+"""Metrics that are zero for a good controller: a ratio to zero says nothing."""
+
+
+def default_controllers() -> list[str]:
+    """Every controller of the registry but the slow ones."""
+    return [name for name in CONTROLLERS if name not in SLOW]
+
+
+def all_conditions(
+    environments: Sequence[str] = ENVIRONMENTS, sensors: Sequence[str] = SENSORS, plants: Sequence[str] = tuple(PLANTS)
+) -> list[Conditions]:
+    """Every combination, and the moving hands on rigs drawn at random where the circle is among them."""
+    own = [Conditions(*chosen) for chosen in product(environments, sensors, plants)]
+    where = [name for name in environments if name == ENVIRONMENTS[0]]
+    moving = product(where, sensors, [name for name in plants if name == "randomised"], MOVING)
+    return [*own, *(Conditions(*chosen) for chosen in moving)]
+
+
+def file_stem(name: str) -> str:
+    """A controller's name as that of a file; those that are none get a hash, so that no two share a stem."""
+    stem = re.sub(r"[^\w.-]+", "-", name)
+    return stem if stem == name else f"{stem.strip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
+    """What a result of a controller depends on: its name, a hash of its file if it has one, and the rig as a dictionary.
+
+    Raises ``ValueError`` for a name that is no controller.
+    """
+    make_controller(name, rig)
+    path = Path(split_options(name)[0].rpartition(":")[0])
+    source = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    return {"controller": name, "source": source, "rig": rig.to_dict()}
+
+
+def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, seed: int) -> Task:
+    """The task that computes one cell of the controller with these ``controller_settings``."""
+    name = settings["controller"]
+    where = {
+        "environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant, "hand": conditions.hand
+    }  # fmt: skip
+    stem = f"cells/{file_stem(name)}/{'-'.join(filter(None, (conditions.short, *list(where.values())[1:])))}"
+    return Task(stem, name, run_cell, {**settings, **where, "episodes": episodes, "seed": seed})
+
+
+def run_cell(
+    controller: str, source: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, hand: str, episodes: int,
+    seed: int,
+) -> Result:  # fmt: skip
+    """Values per episode, lost episodes and cost of one cell; ``source`` only tells cells of different files apart."""
+    parameters = Parameters.from_dict(rig)
+    law = make_controller(controller, parameters)
+    setting = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
+    result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
+    if len(result.seeds) < episodes:
+        raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a cell is complete or it is none
+    return {"seeds": result.seeds, "metrics": result.metrics, "lost": result.lost, "cost": result.cost}
+
+
+def gather(named: dict[tuple[str, Conditions], Result]) -> Cells:
+    """Cells from the results of ``run_cell``; what says nothing is NaN."""
+    cells = {}
+    for (controller, conditions), result in named.items():
+        values = {metric: [np.nan if v is None else v for v in column] for metric, column in result["metrics"].items()}
+        values["hunting"] = np.fmax(values["hunting_x"], values["hunting_y"]).tolist()
+        cells[controller, conditions] = Cell(controller, conditions, values, result["lost"], result["cost"])
+    return cells
+
+
+def statistics(cells: Cells) -> list[dict[str, Any]]:
+    """Per cell its figures, for tables and JSON.
+
+    ``metrics`` holds per metric that applies in the environment ``described`` sizes, lost episodes infinitely bad; ``ratios``
+    the same of the paired ratios to ``REFERENCE``, where that law ran and the metric has one.
+    """
+    applicable = {
+        (cell.conditions.environment, metric)
+        for cell in cells.values() for metric, values in cell.metrics.items() if np.isfinite(values).any()
+    }  # fmt: skip
+    found = []
+    for (controller, conditions), cell in cells.items():
+        reference = cells.get((REFERENCE, conditions))
+        figures: dict[str, Any] = {"metrics": {}, "ratios": {}}
+        for metric in METRICS:
+            if metric in CONDITIONAL and (conditions.environment, metric) not in applicable:
+                continue
+            mine = judged(cell.metrics[metric], cell.lost, applies=True)
+            figures["metrics"][metric] = described(mine)
+            if reference is not None and controller != REFERENCE and metric not in WITHOUT_RATIO:
+                theirs = judged(reference.metrics[metric], reference.lost, applies=True)
+                figures["ratios"][metric] = described(paired_ratios(mine, theirs))
+        found.append({
+            "controller": controller, "environment": conditions.environment, "sensors": conditions.sensors,
+            "plant": conditions.plant, "hand": conditions.hand, "episodes": len(cell.lost), "lost": int(sum(cell.lost)),
+            "cost_us_per_lane_and_call": cell.cost, **figures,
+        })  # fmt: skip
+    return found

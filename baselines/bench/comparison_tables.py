@@ -1,0 +1,124 @@
+"""The bench in Markdown: an overview, one row per controller, and the figures of every environment, sensor model and plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.comparison import METRICS, REFERENCE
+from baselines.bench.statistics import number
+
+Figures = Sequence[dict[str, Any]]
+"""What ``baselines.bench.comparison.statistics`` returns."""
+
+IN_FULL = ("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "cross_motion", "hunting", "air", "saturation")
+"""Metrics of the full tables; the JSON file holds all."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the overview: a metric under some conditions; with ``worst`` beside its median, or the ratio instead."""
+
+    title: str
+    environment: str
+    sensors: str
+    plant: str
+    metric: str
+    kind: str = "metrics"
+    worst: bool = False
+
+    def text(self, figures: dict[str, Any]) -> str:
+        """The entry of one cell."""
+        found = figures[self.kind].get(self.metric)
+        if found is None:
+            return "1" if self.kind == "ratios" else "-"
+        return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
+
+
+CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
+COLUMNS = (
+    Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
+    Column(f"over {REFERENCE}", CIRCLE, "ideal", "randomised", "settled_rms", "ratios"),
+    Column("the same, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms"),
+    Column("rendered stiffness off by, % (median; worst)", PROBE, "ideal", "nominal", "stiffness_error", worst=True),
+    Column("the same, lab sensors", PROBE, "lab", "nominal", "stiffness_error", worst=True),
+    Column("hunting, mm (median; worst)", PROBE, "ideal", "nominal", "hunting", worst=True),
+    Column("the same, lab sensors", PROBE, "lab", "nominal", "hunting", worst=True),
+    Column("air, l/min", CIRCLE, "ideal", "nominal", "air"),
+)
+
+
+def interval(found: dict[str, Any]) -> str:
+    """A median with its 95 % interval."""
+    return f"{number(found['median'])} [{number(found['low'])}, {number(found['high'])}]"
+
+
+def controllers_of(figures: Figures) -> list[str]:
+    """The controllers, in the order in which they were asked for."""
+    return list(dict.fromkeys(cell["controller"] for cell in figures))
+
+
+def overview(figures: Figures) -> str:
+    """One row per controller; columns whose environment did not run are left out."""
+    found = {
+        (cell["controller"], cell["environment"], cell["sensors"], cell["plant"]): cell
+        for cell in figures if not cell.get("hand")
+    }  # fmt: skip
+    columns = [c for c in COLUMNS if any(key[1:] == (c.environment, c.sensors, c.plant) for key in found)]
+    rows = [["controller", *(column.title for column in columns), "lost episodes", "cost per call, us"]]
+    for name in controllers_of(figures):
+        row = [name]
+        for column in columns:
+            cell = found.get((name, column.environment, column.sensors, column.plant))
+            row.append("-" if cell is None else column.text(cell))
+        own = [cell for cell in figures if cell["controller"] == name]
+        cost = float(np.median([cell["cost_us_per_lane_and_call"] for cell in own]))
+        rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}", number(cost)])
+    return markdown(rows)
+
+
+def losses(figures: Figures) -> str:
+    """Lost episodes: one row per controller, one column per environment, over all sensor models and plants."""
+    environments = list(dict.fromkeys(cell["environment"] for cell in figures))
+    rows = [["lost episodes", *environments]]
+    for name in controllers_of(figures):
+        row = [name]
+        for environment in environments:
+            own = [cell for cell in figures if (cell["controller"], cell["environment"]) == (name, environment)]
+            row.append(f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}" if own else "-")
+        rows.append(row)
+    return markdown(rows)
+
+
+def full(figures: Figures) -> str:
+    """A section per environment, sensor model, plant and moving hand, with a row per metric and controller."""
+    sections = []
+
+    def place(cell: dict[str, Any]) -> tuple[str, ...]:
+        return (cell["environment"], cell["sensors"], cell["plant"], cell.get("hand", ""))
+
+    for where in dict.fromkeys(map(place, figures)):
+        here = [cell for cell in figures if place(cell) == where]
+        rows = [["metric", "controller", "median [95 % interval]", "95 %", "worst", f"over {REFERENCE} [95 % interval]"]]
+        for metric in IN_FULL:
+            for cell in here:
+                mine, ratio = cell["metrics"].get(metric), cell["ratios"].get(metric)
+                if mine is not None:
+                    tail = [number(mine["q95"]), number(mine["worst"]), "" if ratio is None else interval(ratio)]
+                    rows.append([f"{metric}, {METRICS[metric]}", cell["controller"], interval(mine), *tail])
+        for cell in here:
+            rows.append(["lost episodes", cell["controller"], f"{cell['lost']} of {cell['episodes']}", "", "", ""])
+        for cell in here:
+            rows.append(["cost per call, us", cell["controller"], number(cell["cost_us_per_lane_and_call"]), "", "", ""])
+        hand = f", moving hand: {where[3]}" if where[3] else ""
+        sections.append("## {}, {} sensors, {} plant".format(*where) + f"{hand}\n\n{markdown(rows)}")
+    return "\n\n".join(sections)
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """A table whose first row is its head."""
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join([lines[0], "|" + "---|" * len(rows[0]), *lines[1:]])

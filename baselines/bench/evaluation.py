@@ -1,0 +1,199 @@
+"""Runs a controller over seeded episodes of an environment and measures it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+import birthsim_env
+from baselines.bench.feasibility import demand
+from baselines.bench.metrics import UNITS, EpisodeMetrics
+from baselines.bench.statistics import in_words, judged, number, summarize
+from baselines.controller import Controller, checked_command
+from birthsim_env.physics.lanes import Array
+
+LANES = 128
+"""Episodes that run side by side."""
+
+TRACE = 0.01
+"""s between the samples of the error kept for the figure."""
+
+DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
+"""Per 10 ms, the default policy period: returns are summed with each of them."""
+
+
+@dataclass
+class Evaluation:
+    """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
+
+    ``demand`` is the share of the rig's strength that each episode asks for, whatever controls it. ``returns`` are the sums of
+    rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
+    """
+
+    controller: str
+    seeds: list[int] = field(default_factory=list)
+    metrics: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in UNITS})
+    lost: list[bool] = field(default_factory=list)
+    demand: list[float] = field(default_factory=list)
+    returns: dict[float, list[float]] = field(default_factory=lambda: {discount: [] for discount in DISCOUNTS})
+    success: list[bool] = field(default_factory=list)
+    cost: float = float("nan")
+    traces: list[Array] = field(default_factory=list)
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Metric -> median, mean, 95 % and maximum over the episodes, of which a lost one is infinitely bad."""
+        return {name: summarize(judged(values, self.lost)) for name, values in self.metrics.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """What goes into the JSON file; ``summary`` says "lost" where a figure is infinite."""
+        return {
+            "controller": self.controller,
+            "seeds": self.seeds,
+            "units": UNITS,
+            "summary": in_words(self.summary()),
+            "lost_episodes": int(sum(self.lost)),
+            "cost_us_per_lane_and_call": self.cost,
+            "episodes": self.metrics,
+            "lost": self.lost,
+            "demand": self.demand,
+            "returns": self.returns,
+            "success": self.success,
+        }
+
+
+def evaluate(
+    environment: str,
+    controller: Controller,
+    name: str,
+    episodes: int,
+    seed: int,
+    progress: bool = True,
+    **arguments: Any,
+) -> Evaluation:
+    """Run ``episodes`` episodes, seeded seed, seed + 1, ..., of a registered id under a controller at the control rate.
+
+    ``arguments`` go to the environment. An episode that terminates is lost: ``metrics`` holds its figures up to that moment,
+    ``summary`` counts them as infinite.
+    After an interrupt (Ctrl-C) the episodes that are complete are returned.
+    """
+    if episodes < 1:
+        raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
+    result = Evaluation(name)
+    spent: list[float] = []
+    try:
+        for first in range(0, episodes, LANES):
+            seeds = [seed + k for k in range(first, min(first + LANES, episodes))]
+            _run_batch(environment, controller, seeds, arguments, result, spent, progress)
+    except KeyboardInterrupt:
+        if not result.seeds:
+            raise
+        print(f"interrupted: {len(result.seeds)} of {episodes} episodes are complete and kept")
+    result.cost = float(np.median(spent))
+    return result
+
+
+def _run_batch(
+    environment: str,
+    controller: Controller,
+    seeds: list[int],
+    arguments: dict[str, Any],
+    result: Evaluation,
+    spent: list[float],
+    progress: bool,
+) -> None:
+    period = birthsim_env.physics.parameters.load_parameters(arguments.get("parameters")).electronics.control_period
+    env: Any = gymnasium.make_vec(
+        environment, num_envs=len(seeds), policy_period=period, autoreset_mode=AutoresetMode.SAME_STEP, **arguments
+    )
+    _, info = env.reset(seed=list(seeds))
+    controller.reset()
+    asked = demand(env)
+    metrics = EpisodeMetrics(len(seeds), period)
+    alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
+    lost, success = np.zeros_like(alive), np.zeros_like(alive)
+    discounts = np.power(DISCOUNTS, period / 0.01)[:, None]
+    returns, weights = np.zeros((len(DISCOUNTS), len(seeds))), np.ones((len(DISCOUNTS), 1))
+    every = max(1, round(TRACE / period))
+    trace: Array = np.full((-(-env.steps // every), len(seeds), 2), np.nan)
+    bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
+    for step in range(env.steps):
+        started = time.perf_counter()
+        command = controller.command(env.measurement, env.reference)
+        spent.append((time.perf_counter() - started) * 1e6 / len(seeds))
+        command = checked_command(result.controller, command, len(seeds))
+        metrics.add(info, command, alive)
+        if step % every == 0:
+            trace[step // every, alive] = info["tracking_error"][alive]
+        _, rewards, terminated, truncated, info = env.step(command.T)
+        returns += weights * np.where(alive, rewards, 0.0)
+        weights = weights * discounts
+        if truncated.any():
+            success |= alive & truncated & info["final_info"]["is_success"]
+        lost |= alive & terminated
+        alive &= ~terminated
+        if not alive.any():
+            break
+        if terminated.any():
+            controller.reset(terminated)
+        if step % 250 == 249:
+            bar.update(250)
+    bar.close()
+    env.close()
+    for name, values in metrics.result().items():
+        result.metrics[name] += [float(value) for value in values]
+    result.seeds += seeds
+    result.demand += [float(value) for value in asked]
+    result.lost += [bool(value) for value in lost]
+    result.success += [bool(value) for value in success]
+    for discount, sums in zip(DISCOUNTS, returns, strict=True):
+        result.returns[discount] += [float(value) for value in sums]
+    result.traces.append(trace)
+
+
+def overview(evaluations: list[Evaluation]) -> str:
+    """A short table for the screen: settled error over the episodes, mm, and how many were lost."""
+    width = max(24, *(len(one.controller) for one in evaluations))
+    lines = [f"{'settled error, mm':{width}}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
+    for one in evaluations:
+        summary = summarize(judged(one.metrics["settled_rms"], one.lost, applies=True))
+        figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
+        lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
+        unsaid = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())
+        if unsaid:
+            # A hand that jumps all the time leaves nothing settled.
+            lines.append(f"{'':{width}}{unsaid} of {len(one.lost)} episodes were never settled and are left out above")
+    return "\n".join(lines)
+
+
+def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
+    """A Markdown table: a row per metric that says something; per controller its ``statistic``, 95 % and largest value.
+
+    "lost" stands where a lost episode makes a figure infinite.
+    """
+    head = ["metric", "unit"]
+    for evaluation in evaluations:
+        head += [f"{evaluation.controller}: {statistic}", "95 %", "max"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    summaries = [evaluation.summary() for evaluation in evaluations]
+    for name, unit in UNITS.items():
+        if all(np.isnan(summary[name]["max"]) for summary in summaries):
+            continue
+        row = [name, unit]
+        for summary in summaries:
+            row += [number(summary[name][key]) for key in (statistic, "q95", "max")]
+        lines.append("| " + " | ".join(row) + " |")
+    lost, success, paid = ["lost episodes", ""], ["successful episodes", ""], ["return, mean", ""]
+    cost = ["control cost per lane and call", "us"]
+    for evaluation in evaluations:
+        lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
+        success += [f"{sum(evaluation.success)} of {len(evaluation.success)}", "", ""]
+        paid += [f"{np.mean(evaluation.returns[1.0] or [np.nan]):.4g}", "", ""]
+        cost += [number(evaluation.cost), "", ""]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid, cost))])

@@ -1,0 +1,223 @@
+"""Where a controller is stable: maps over what it does not know of its rig, and over the hand that holds the end effector.
+
+A hand is a spring to the point where the end effector rests, without mass or damping: what damps it is the rig. From rest it
+is pushed with 40 N, more than stiction, for 0.3 s. Five seconds later, for one second, the motion that remains is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.probes import Window, board_limit
+from baselines.controller import Controller
+from baselines.registry import make_controller
+from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.physics.dynamics import INTEGRATION_STEP
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+
+PLACE = (0.5, 0.0)
+"""m, the target: the middle of the workspace."""
+
+PNEUMATIC = (4400.0, 2200.0)
+"""N/m, what is asked for of the pneumatic stiffness."""
+
+PUSH = (32.0, 24.0)
+"""N, assumed: 40 N askew, so that both pistons slip."""
+
+PUSHED, RELEASED, JUDGED, END = 0.5, 0.8, 5.0, 6.0
+"""s, assumed: the push begins and ends, judgement begins and ends."""
+
+MOST_MOTION, MOST_FORCE = 5e-4, 5.0
+"""m and N, assumed: peak to peak, more is an oscillation; the force is that of the hand, a stiff one feels small motions."""
+
+SETPOINT = 2000.0
+"""N/m, of the closed-loop stiffness where it does not vary."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What varies along one side of a map: values from ``low`` to ``high``, evenly or by equal factors."""
+
+    label: str
+    low: float
+    high: float
+    count: int
+    logarithmic: bool = False
+
+    def values(self, points: int | None = None) -> Array:
+        """``points`` of them, or ``count``."""
+        spread = np.geomspace if self.logarithmic else np.linspace
+        return np.asarray(spread(self.low, self.high, points or self.count))
+
+
+MASS = Axis("mass at the end effector (kg)", 1.5, 6.0, 10)
+LAG = Axis("time constant of the valves (ms)", 1.0, 12.0, 12)
+HAND = Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 16, logarithmic=True)
+ASKED = Axis("closed-loop stiffness asked for (N/m)", 1000.0, 4000.0, 7)
+FRICTION = Axis("dry friction, share of the believed one", 0.0, 1.5, 13)
+
+
+@dataclass(frozen=True)
+class Cases:
+    """N cases: their rigs, the stiffness of the hand (N,) and that asked for (N,), N/m."""
+
+    rigs: Sequence[Parameters]
+    hand: Array
+    asked: Array
+
+
+def _rig_cases(rig: Parameters, lag: Array, mass: Array) -> Cases:
+    changed = [rig.replace({"mechanics.mass": m, "valves.time_constant": t / 1e3}) for m, t in zip(mass, lag, strict=True)]
+    return Cases(changed, np.zeros(len(lag)), np.full(len(lag), SETPOINT))
+
+
+def _hand_cases(rig: Parameters, hand: Array, asked: Array) -> Cases:
+    return Cases([rig] * len(hand), hand, asked)
+
+
+def _mass_cases(rig: Parameters, hand: Array, mass: Array) -> Cases:
+    return Cases([rig.replace({"mechanics.mass": m}) for m in mass], hand, np.full(len(hand), SETPOINT))
+
+
+def _friction_cases(rig: Parameters, hand: Array, scale: Array) -> Cases:
+    changed = []
+    for share in scale:
+        levels = share * rig.cylinder1.coulomb_friction, share * rig.cylinder2.coulomb_friction
+        changed.append(rig.replace({f"cylinder{i}.coulomb_friction": level for i, level in enumerate(levels, 1)}))
+    return Cases(changed, hand, np.full(len(hand), SETPOINT))
+
+
+@dataclass(frozen=True)
+class Map:
+    """Two axes; ``cases`` of a rig for values (N,) along both, and where on them its controller believes to be."""
+
+    title: str
+    x: Axis
+    y: Axis
+    cases: Callable[[Parameters, Array, Array], Cases]
+    believed: Callable[[Parameters], tuple[float | None, float | None]]
+
+
+MAPS: dict[str, Map] = {
+    "rig": Map(
+        "A rig that is not as believed, free",
+        LAG, MASS, _rig_cases, lambda rig: (1e3 * rig.valves.time_constant, rig.mechanics.mass),
+    ),
+    "hand": Map("The rig as believed, held by a hand", HAND, ASKED, _hand_cases, lambda rig: (None, None)),
+    "hand_friction": Map(
+        "Other friction than believed, held by a hand", HAND, FRICTION, _friction_cases, lambda rig: (None, 1.0)
+    ),
+    "hand_mass": Map(
+        "Another mass than believed, held by a hand", HAND, MASS, _mass_cases, lambda rig: (None, rig.mechanics.mass)
+    ),
+}  # fmt: skip
+"""Name -> map."""
+
+VARIANTS: dict[str, dict[str, dict[str, float]]] = {
+    "admittance-backstepping": {
+        "as it is": {},
+        "gains that never yield": {"yielding": 1.0},
+        "half the friction fed forward": {"friction_share": 0.5},
+    }
+}
+"""Controller -> label -> options, for a figure that compares them; other controllers are as they are."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Peak to peak motion of the larger axis in the second that is judged, m, (N,); ``stable`` and ``lost`` (N,)."""
+
+    motion: Array
+    stable: Mask
+    lost: Mask
+
+
+def judge(
+    cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0, tick: Callable[[], object] = lambda: None
+) -> Verdict:
+    """Hold, push and release every lane, a case each. ``tick`` is called once per control period."""
+    rigs, lanes = cases.rigs, len(cases.hand)
+    board, plant = rigs[0].electronics, Plant(rigs, lanes)
+    rows = np.zeros((REFERENCES, lanes))
+    rows[:2], rows[8:10], rows[10:12] = np.transpose([PLACE]), cases.asked, np.transpose([PNEUMATIC])
+    reference, held = Reference(rows), rows[:2].copy()
+    piston = inverse_geometry(held, rigs[0])
+    plant.state = balanced_state(plant.lane_parameters, piston, np.zeros((2, lanes)), reference.pneumatic_stiffness)
+    model = SENSORS[sensors](board, lanes)
+    for lane in range(lanes):
+        model.begin(lane, stream(seed + lane, 0, "sensors"))
+    controller.reset()
+    impacts, window = np.zeros(lanes), Window(lanes)
+    # The hand answers at the integrator's steps, not at those of the control board.
+    answers = max(1, round(board.control_period / INTEGRATION_STEP))
+    step = board.control_period / answers
+    for period in range(round(END / board.control_period)):
+        now = period * board.control_period
+        push = np.transpose([PUSH]) * float(PUSHED <= now < RELEASED)
+        motion = plant.end_effector()
+        if now >= JUDGED:
+            window.add(motion[:2])
+        force = push - cases.hand * (motion[:2] - held)
+        clock, ticks = np.full(lanes, now), np.full(lanes, period)
+        seen: Measurement = model.measure(ticks, clock, motion, plant.pressures, force)
+        openings = controller.command(seen, reference)
+        for answer in range(answers):
+            motion = plant.end_effector() if answer else motion
+            # Half a step ahead, or a force that is held for a step would feed the spring with energy.
+            force = push - cases.hand * (motion[:2] + 0.5 * step * motion[2:] - held)
+            plant.advance_unchecked(openings, np.ascontiguousarray(force[None]), step)
+            np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
+        tick()
+    span = window.span().max(axis=0)
+    lost = ~np.isfinite(span) | (impacts > board_limit(rigs))
+    with np.errstate(divide="ignore"):
+        return Verdict(span, ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / cases.hand)), lost)
+
+
+def periods(rig: Parameters) -> int:
+    """Control periods, and calls of ``tick``, of one ``judge``."""
+    return round(END / rig.electronics.control_period)
+
+
+def variants_of(controller: str) -> dict[str, dict[str, float]]:
+    """Label -> options."""
+    return VARIANTS.get(controller, {controller: {}})
+
+
+def draw_map(
+    chart: Map, controller: str, rig: Parameters, sensors: str = "ideal", points: int | None = None, seed: int = 0,
+    tick: Callable[[], object] = lambda: None,
+) -> dict[str, Any]:  # fmt: skip
+    """One map as JSON: the values along ``x`` and ``y``, where the controller believes itself, and per variant rows over y of
+    ``motion_mm`` (NaN where lost) and ``stable``. ``points`` is the number of values along each axis."""
+    x, y = chart.x.values(points), chart.y.values(points)
+    across, up = (side.ravel() for side in np.meshgrid(x, y))
+    cases, shape, found = chart.cases(rig, across, up), (len(y), len(x)), {}
+    for label, options in variants_of(controller).items():
+        verdict = judge(cases, make_controller(controller, rig, **options), sensors, seed, tick)
+        motion = np.where(verdict.lost, np.nan, 1e3 * verdict.motion).reshape(shape)
+        found[label] = {"motion_mm": motion.tolist(), "stable": verdict.stable.reshape(shape).tolist()}
+    return {
+        "title": chart.title, "x": {"label": chart.x.label, "values": x.tolist(), "logarithmic": chart.x.logarithmic},
+        "y": {"label": chart.y.label, "values": y.tolist(), "logarithmic": chart.y.logarithmic},
+        "believed": list(chart.believed(rig)), "variants": found,
+    }  # fmt: skip
+
+
+def stable_up_to(chart: dict[str, Any], label: str) -> list[float | None]:
+    """Per value of y: the largest x at which, and below which, all is stable; None where not even the least is."""
+    limits: list[float | None] = []
+    for row in chart["variants"][label]["stable"]:
+        count = row.index(False) if False in row else len(row)
+        limits.append(chart["x"]["values"][count - 1] if count else None)
+    return limits

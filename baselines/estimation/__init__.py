@@ -1,0 +1,1 @@
+"""What controllers work out from sensors: pistons, disturbances, chambers, friction ahead."""

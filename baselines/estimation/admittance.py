@@ -1,0 +1,159 @@
+"""The motion that a hand should find: a Cartesian mass, damper and spring about the target, driven by the measured force.
+
+    m (xr'' - xt'') + B (xr' - xt') + K (xr - xt) = Fu,   B = 2 zeta (m K)^(1/2)
+
+with the full symmetric stiffness matrix K. At rest it stands on the compliant target (19); a controller that follows it renders
+K, whatever its own stiffness. The mass is the rig's own, so that the hand feels no other inertia than what it moves anyway.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.controller import require_stiffness, told_of
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+
+DAMPING_RATIO = 0.9
+"""assumed: hardly any overshoot, and no slower than the rig needs to be."""
+
+
+@helper
+def square_root(xx: float, yy: float, xy: float) -> tuple[float, float, float]:
+    """Square root of the symmetric positive definite matrix [[xx, xy], [xy, yy]]: its entries xx, yy, xy."""
+    root = math.sqrt(xx * yy - xy * xy)
+    trace = math.sqrt(xx + yy + 2.0 * root)
+    return (xx + root) / trace, (yy + root) / trace, xy / trace
+
+
+@helper
+def damping(kxx: float, kyy: float, kxy: float, ratio: float) -> tuple[float, float, float]:
+    """B/m, 1/s, of the spring K/m (1/s2): entries xx, yy, xy."""
+    bxx, byy, bxy = square_root(kxx, kyy, kxy)
+    return 2.0 * ratio * bxx, 2.0 * ratio * byy, 2.0 * ratio * bxy
+
+
+@helper
+def derivatives(
+    offset: Array, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
+) -> tuple[float, float, float, float]:
+    """Acceleration and jerk of the offset (4, N) of lane ``i`` under a held force; all over the mass."""
+    # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
+    x, y, vx, vy = offset[0, i], offset[1, i], offset[2, i], offset[3, i]
+    ax, ay = fx - bxx * vx - bxy * vy - kxx * x - kxy * y, fy - bxy * vx - byy * vy - kxy * x - kyy * y
+    jx, jy = -bxx * ax - bxy * ay - kxx * vx - kxy * vy, -bxy * ax - byy * ay - kxy * vx - kyy * vy
+    return ax, ay, jx, jy
+
+
+@helper
+def advance(
+    offset: Array, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
+    kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float,
+) -> None:  # fmt: skip
+    """Carries the offset (4, N) of lane ``i`` on by one period."""
+    vx, vy = offset[2, i], offset[3, i]
+    sx, sy = -bxx * jx - bxy * jy - kxx * ax - kxy * ay, -bxy * jx - byy * jy - kxy * ax - kyy * ay
+    # Taylor's series to the third order: the system is linear and w x period is below 0.06.
+    offset[0, i] += period * (vx + period * (ax / 2.0 + period * jx / 6.0))
+    offset[1, i] += period * (vy + period * (ay / 2.0 + period * jy / 6.0))
+    offset[2, i] += period * (ax + period * (jx / 2.0 + period * sx / 6.0))
+    offset[3, i] += period * (ay + period * (jy / 2.0 + period * sy / 6.0))
+
+
+@kernel
+def _update(
+    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, fresh: Array,
+    motion: Array,
+) -> None:  # fmt: skip
+    """``offset`` (4, N): xr - xt and its rate, carried on by one period where ``fresh`` (N,) is 0; ``factor`` (N,) of the
+    damping, at least 1. ``motion`` (8, N)."""
+    for i in range(offset.shape[1]):
+        kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio * max(1.0, factor[i]))
+        if fresh[i] > 0.0:
+            offset[0, i], offset[1, i], offset[2, i], offset[3, i] = 0.0, 0.0, 0.0, 0.0
+        ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
+        motion[0, i], motion[1, i] = reference[0, i] + offset[0, i], reference[1, i] + offset[1, i]
+        motion[2, i], motion[3, i] = reference[2, i] + offset[2, i], reference[3, i] + offset[3, i]
+        motion[4, i], motion[5, i] = reference[4, i] + ax, reference[5, i] + ay
+        motion[6, i], motion[7, i] = reference[6, i] + jx, reference[7, i] + jy
+        advance(offset, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+
+
+@kernel
+def _forecast(
+    offset: Array,
+    reference: Array,
+    force: Array,
+    mass: float,
+    ratio: float,
+    period: float,
+    ticks: NDArray[np.int64],
+    ahead: Array,
+) -> None:
+    """``offset`` (4, N) one period from now; ``ticks`` (M,) increasing; writes ``ahead`` (M, 4, N): x, y, vx, vy."""
+    z = offset.copy()
+    for i in range(offset.shape[1]):
+        kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
+        tick = 1
+        for k in range(len(ticks)):
+            while tick < ticks[k]:
+                ax, ay, jx, jy = derivatives(z, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
+                advance(z, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+                tick += 1
+            t = tick * period
+            for axis in range(2):
+                v, a, j = reference[2 + axis, i], reference[4 + axis, i], reference[6 + axis, i]
+                ahead[k, axis, i] = reference[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0)) + z[axis, i]
+                ahead[k, 2 + axis, i] = v + t * (a + t * j / 2.0) + z[2 + axis, i]
+
+
+class Admittance:
+    """The reference motion of N lanes, one control period at a time.
+
+    Arguments: ``parameters``, the rig as believed (its mass and control period); ``damping_ratio``, zeta, more than 0.
+    """
+
+    def __init__(self, parameters: Parameters, damping_ratio: float = DAMPING_RATIO) -> None:
+        if not (math.isfinite(damping_ratio) and damping_ratio > 0):
+            raise ValueError(f"damping_ratio = {damping_ratio!r}; allowed: a positive number")
+        self._numbers = (parameters.mechanics.mass, float(damping_ratio), parameters.electronics.control_period)
+        self._offset: Array = np.empty((4, 0))
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Start anew on the target: all lanes, or those where ``lanes`` (N,) is True."""
+        if lanes is None:
+            self._offset = np.empty((4, 0))
+        elif self._offset.shape[1]:
+            self._fresh[lanes] = 1.0
+
+    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
+        """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
+
+        Called once per control period, with signals over N lanes. ``damping_factor`` (N,) multiplies B; below 1 it is 1. Raises
+        ``ValueError`` for a stiffness that is not positive definite, and for a factor of another shape.
+        """
+        require_stiffness(reference, 0.0)
+        lanes = reference.rows.shape[1]
+        if self._offset.shape[1] != lanes:
+            self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)
+        motion, factor = np.empty((8, lanes)), told_of(lanes, None, None, damping_factor)[4]
+        _update(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
+        self._fresh[:] = 0.0
+        return motion
+
+    def forecast(self, reference: Reference, force: Array, ticks: NDArray[np.int64]) -> Array:
+        """x, y (m), vx, vy (m/s) of the motion so many periods after the last ``update``, (M, 4, N), if nothing new happens:
+        the force (2, N), N, and the stiffness stay, and the target goes on with the jerk that it has.
+
+        ``ticks`` (M,) are increasing whole numbers from 1 on.
+        """
+        ahead = np.empty((len(ticks), 4, reference.rows.shape[1]))
+        _forecast(self._offset, reference.rows, force, *self._numbers, ticks, ahead)
+        return ahead

@@ -1,0 +1,134 @@
+"""What a controller with a force sensor knows at one instant: the motion that the hand should find, and the state of the rig.
+
+A Cartesian ``Admittance`` turns the measured force into the motion. What is not known of the rig, friction above all, is fed
+forward along it and observed for the rest: by ``DisturbanceObserver`` where speeds are measured, and by ``PistonObserver`` and
+``ChamberObserver`` from sampled positions and noisy pressures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.controller import lanes_of
+from baselines.estimation.admittance import Admittance
+from baselines.estimation.chamber_observer import ChamberObserver
+from baselines.estimation.disturbance_observer import DisturbanceObserver
+from baselines.estimation.observers import PistonObserver
+from baselines.estimation.reference_friction import ReferenceFriction
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics import geometry
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+
+MOVING_SPEED = 1e-3
+"""m/s; assumed: a slower reference lets the pistons rest."""
+
+
+BELIEVED_LIMIT = 120.0
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
+
+
+@kernel
+def _unseen(joints: Array, believed: Array, disturbance: Array, p: Array, unseen: Array) -> None:
+    for i in range(joints.shape[1]):
+        kappa = geometry.pose(
+            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )[5]
+        for cylinder in range(2):
+            mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
+            observed = max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, mass * disturbance[cylinder, i]))
+            unseen[cylinder, i] = believed[cylinder, i] + observed
+
+
+@dataclass(frozen=True)
+class Situation:
+    """N lanes at one instant. ``motion`` (8, N): x and y that are wanted and three derivatives, SI; ``force`` (2, N), N, the
+    user's; ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
+    ``believed`` (2, N), N, what acts along the pistons besides, ``disturbance`` (2, N), m/s2, what still accelerates them
+    unexplained, and ``unseen`` (2, N), N, both together; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N) how far each
+    piston is taken to rest, 0 to 1. The arrays are good until the next ``update``."""
+
+    motion: Array
+    force: Array
+    joints: Array
+    pressures: Array
+    spools: Array
+    believed: Array
+    disturbance: Array
+    unseen: Array
+    moving: Array
+    rest: Array
+
+
+def is_moving(motion: Array) -> Array:
+    """1 where a motion's velocity, rows 2 and 3 of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0; (N,)."""
+    square = motion[2] * motion[2] + motion[3] * motion[3]
+    return np.asarray(square > MOVING_SPEED * MOVING_SPEED, dtype=np.float64)
+
+
+class Awareness:
+    """The ``Situation`` of N lanes, one control period at a time, for one kind of sensors.
+
+    Arguments: the rig as believed; ``sampled``, whether positions are samples; ``gains`` with bandwidth, 1/s, of the observer
+    of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_share, how much of the
+    believed friction is fed forward along the motion.
+    """
+
+    def __init__(self, parameters: Parameters, sampled: bool, gains: Mapping[str, float]) -> None:
+        self._p = p = parameter_column(parameters)
+        period = parameters.electronics.control_period
+        self._admittance = Admittance(parameters)
+        self._friction, self._friction_share = ReferenceFriction(period, p), gains["friction_share"]
+        self._chambers = ChamberObserver(period, p, gains["pressure_bandwidth"] if sampled else math.inf)
+        self._pistons = (
+            PistonObserver(parameters, p, gains["bandwidth"]) if sampled else DisturbanceObserver(period, p, gains["bandwidth"])
+        )
+        self._joints: Array = np.empty((4, 0))
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        for part in (self._admittance, self._friction, self._chambers, self._pistons):
+            part.reset(lanes)
+
+    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Situation:
+        """Take one control period's signals over N lanes. ``damping_factor`` (N,) multiplies the damping of the motion.
+
+        Raises ``ValueError`` for signals over different numbers of lanes, and a stiffness that is not positive definite.
+        """
+        lanes = lanes_of(measurement, reference)
+        if self._joints.shape[1] != lanes:
+            self._joints = np.zeros((4, lanes))
+        motion = self._admittance.update(measurement, reference, damping_factor)
+        pressures = self._chambers.update(measurement.pressures, self._joints)
+        measurement = replace(measurement, pressures=pressures)
+        force = np.ascontiguousarray(measurement.user_force)
+        believed = -self._friction_share * self._friction.update(motion)
+        moving = is_moving(motion)
+        pistons = self._pistons
+        if isinstance(pistons, PistonObserver):
+            self._joints, rest = np.ascontiguousarray(pistons.update(measurement, force, believed, moving)), pistons.rest
+        else:
+            self._joints, rest = pistons.update(measurement, force, believed), np.zeros((2, lanes))
+        disturbance = np.ascontiguousarray(pistons.disturbance)
+        unseen = np.empty((2, lanes))
+        _unseen(self._joints, believed, disturbance, self._p, unseen)
+        spools = self._chambers.spools
+        return Situation(motion, force, self._joints, pressures, spools, believed, disturbance, unseen, moving, rest)
+
+    def forecast(self, now: Situation, reference: Reference, ticks: NDArray[np.int64]) -> tuple[Array, Array]:
+        """The motion's x, y (m), vx, vy (m/s), (M, 4, N), and the forces unseen along it, N, (M, 2, N), so many periods after
+        ``now``, the last situation: friction follows the motion, what was observed besides stays."""
+        ahead = self._admittance.forecast(reference, now.force, ticks)
+        friction = self._friction.forecast(ahead, ticks)
+        return ahead, now.unseen - now.believed - self._friction_share * friction
+
+    def commanded(self, openings: Array) -> None:
+        """What the valves are told until the next ``update``: openings (4, N)."""
+        self._chambers.openings[:] = openings

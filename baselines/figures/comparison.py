@@ -1,0 +1,110 @@
+"""Figures of the bench: error in every environment, and what it costs in air."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from baselines.bench.comparison_tables import CIRCLE, Figures, controllers_of
+from baselines.figures.runs import DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
+
+CONDITIONS = {
+    ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},
+    ("ideal", "randomised"): {"marker": "o", "color": DARK, "mfc": "white"},
+    ("lab", "nominal"): {"marker": "^", "color": MIDDLE, "mfc": MIDDLE},
+    ("lab", "randomised"): {"marker": "^", "color": MIDDLE, "mfc": "white"},
+}
+"""Sensors and plant -> how they look."""
+
+
+def draw_comparison(figures: Figures, folder: Path) -> list[Path]:
+    """Both figures; returns the files written."""
+    figures = [cell for cell in figures if not cell.get("hand")]
+    if not figures:
+        return []
+    with plt.rc_context(STYLE):
+        return [*settled_figure(figures, folder), *air_figure(figures, folder)]
+
+
+def settled_figure(figures: Figures, folder: Path) -> list[Path]:
+    """Settled RMS error, median with its interval: a panel per environment, a row per controller."""
+    names = controllers_of(figures)
+    environments = list(dict.fromkeys(cell["environment"] for cell in figures))
+    size = (1.8 + 2.0 * len(environments), 1.4 + 0.42 * len(names))
+    figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
+    shown: dict[str, Any] = {}
+    for axes, environment in zip(panels[0], environments, strict=True):
+        here = [cell for cell in figures if cell["environment"] == environment]
+        low, high = _limits(here, "settled_rms")
+        for cell in here:
+            key = cell["sensors"], cell["plant"]
+            style, found = CONDITIONS[key], cell["metrics"]["settled_rms"]
+            row = names.index(cell["controller"]) + 0.17 * (list(CONDITIONS).index(key) - 1.5)
+            if np.isfinite(found["median"]):
+                axes.hlines(row, found["low"], min(found["high"], high), color=style["color"], lw=0.9)
+                shown["{} sensors, {} plant".format(*key)] = axes.plot(found["median"], row, ls="", ms=4, **style)[0]
+            elif np.isinf(found["median"]):
+                axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=6, color=style["color"])
+        axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
+        axes.set_xlabel("settled RMS error (mm)", fontsize=8)
+        log_ticks(axes.xaxis)
+        axes.tick_params(axis="x", labelsize=7.5)
+        axes.grid(axis="y", visible=False)
+        for row in range(1, len(names)):
+            axes.axhline(row - 0.5, color="black", alpha=0.15, lw=0.6)
+    panels[0, 0].set_yticks(range(len(names)), [label_of(name) for name in names])
+    panels[0, 0].set_ylim(len(names) - 0.5, -0.5)
+    figure.suptitle("Settled error: medians with 95 % intervals", fontsize=9.5)
+    legend_below(figure, list(shown.values()), list(shown))
+    return save(figure, folder, "settled_error")
+
+
+def _limits(figures: Figures, metric: str) -> tuple[float, float]:
+    """Ends of a logarithmic axis that holds every finite figure."""
+    said = [v for cell in figures for k in ("low", "median", "high") if np.isfinite(v := cell["metrics"][metric][k])]
+    return (min(said) / 1.5, max(said) * 1.5) if said else (0.1, 10.0)
+
+
+def air_figure(figures: Figures, folder: Path) -> list[Path]:
+    """Air used against settled error, a marker per controller, on the nominal plant: medians with their intervals."""
+    environments = [cell["environment"] for cell in figures]
+    environment = CIRCLE if CIRCLE in environments else environments[0]
+    plants = [cell["plant"] for cell in figures]
+    plant = "nominal" if "nominal" in plants else plants[0]
+    here = [cell for cell in figures if (cell["environment"], cell["plant"]) == (environment, plant)]
+    names = controllers_of(figures)
+    sensors = list(dict.fromkeys(cell["sensors"] for cell in here))
+    figure, panels = plt.subplots(
+        1, len(sensors), figsize=(1 + 4 * len(sensors), 4.8), layout="constrained", sharey=True, squeeze=False
+    )
+    handles: dict[str, Any] = {}
+    top = _limits(here, "air")[1]
+    for axes, kind in zip(panels[0], sensors, strict=True):
+        shown = [cell for cell in here if cell["sensors"] == kind]
+        left, right = _limits(shown, "settled_rms")
+        for cell in shown:
+            error, air = cell["metrics"]["settled_rms"], cell["metrics"]["air"]
+            style = look(names.index(cell["controller"]))
+            if np.isfinite([error["median"], air["median"]]).all():
+                axes.hlines(air["median"], error["low"], min(error["high"], right), color=style["color"], lw=0.9)
+                axes.vlines(error["median"], air["low"], min(air["high"], top), color=style["color"], lw=0.9)
+                handles[cell["controller"]] = axes.plot(
+                    error["median"], air["median"], ls="", ms=7, marker=style["marker"], color=style["color"]
+                )[0]
+        lost = [cell["controller"] for cell in shown if np.isinf(cell["metrics"]["settled_rms"]["median"])]
+        title = f"{kind} sensors" + (
+            fill(f"; not shown, for they lose episodes: {', '.join(map(label_of, lost))}", 60) if lost else ""
+        )
+        axes.set(xscale="log", xlim=(left, right), ylim=(0, top), xlabel="settled RMS error (mm)")
+        axes.set_title(title, loc="left", fontsize=8.5)
+        log_ticks(axes.xaxis)
+    panels[0, 0].set_ylabel("air used (normal l/min)")
+    short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
+    figure.suptitle(f"{short}, {plant} plant: medians with 95 % intervals", fontsize=9.5)
+    legend_below(figure, list(handles.values()), [label_of(name) for name in handles])
+    return save(figure, folder, "air_against_error")

@@ -1,0 +1,218 @@
+"""Figures of the studies: what the stiffness that a hand feels depends on, controller by controller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, label_of, legend_below, look, save
+from birthsim_env.physics.lanes import Array
+
+Study = Mapping[str, dict[str, Any]]
+"""Label of a controller -> its result, as ``baselines.bench.studies`` returns it."""
+
+ELLIPSE_SCALE = 9e-6
+"""m of the picture's workspace per N/m of a stiffness ellipse."""
+
+LEAST_HUNTING = 1e-4
+"""mm; less is drawn as that, since nobody could measure it."""
+
+
+def draw_studies(studies: Mapping[str, Study], folder: Path) -> list[Path]:
+    """The figures of what ``studies`` (name -> label -> result) holds; returns the files written."""
+    drawings: dict[str, Sequence[Callable[[Study, Path], list[Path]]]] = {
+        "stiffness": (stiffness_figure, hunting_figure),
+        "disturbance": (disturbance_figure,),
+        "polar": (polar_figure,),
+        "ellipses": (ellipse_figure,),
+    }
+    with plt.rc_context(STYLE):
+        return [path for name, study in studies.items() for draw in drawings[name] for path in draw(study, folder)]
+
+
+def _numbers(values: Any) -> Array:
+    """JSON's nested lists as an array, NaN where a case was lost."""
+    return np.array(values, dtype=np.float64)
+
+
+def _spread(values: Array) -> tuple[Array, Array, Array]:
+    """Least, median and largest of every row (rows, cases); NaN in rows that are lost altogether."""
+    ordered = np.full((3, len(values)), np.nan)
+    for row, cases in enumerate(values):
+        said = cases[~np.isnan(cases)]
+        if said.size:
+            ordered[:, row] = said.min(), np.median(said), said.max()
+    return ordered[0], ordered[1], ordered[2]
+
+
+def _label(name: str, values: Array) -> str:
+    lost = int(np.isnan(values).sum())
+    return f"{label_of(name)} ({lost} of {values.size} lost)" if lost else label_of(name)
+
+
+def _percent_axis(axes: Axes, linear: float) -> None:
+    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("-", "−") if value else "0")
+    axes.axhline(0, color="black", lw=0.8)
+
+
+def stiffness_figure(study: Study, folder: Path) -> list[Path]:
+    """Rendered against asked-for stiffness: median and range over poses, axes and forces, one line per controller."""
+    figure, axes = plt.subplots(figsize=(9, 6), layout="constrained")
+    for k, (name, result) in enumerate(study.items()):
+        errors = _numbers(result["error_percent"])
+        low, middle, high = _spread(errors)
+        # Beside each other, or the ranges would hide one another.
+        place = np.array(result["setpoints"]) * 1.022 ** (k - (len(study) - 1) / 2)
+        axes.plot(place, middle, **look(k), ms=5, lw=1, label=_label(name, errors))
+        axes.vlines(place, low, high, color=look(k)["color"], lw=1)
+    _percent_axis(axes, 1.0)
+    axes.set(
+        xscale="log",
+        xlabel="closed-loop stiffness setpoint $K_{clx} = K_{cly}$ (N/m)",
+        ylabel="error of the rendered stiffness (%)",
+    )
+    ticks = next(iter(study.values()))["setpoints"]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.set_title("Rendered stiffness: median and range over poses, axes and forces", loc="left", fontsize=9.5)
+    legend_below(figure, *axes.get_legend_handles_labels())
+    return save(figure, folder, "rendered_stiffness")
+
+
+def hunting_figure(study: Study, folder: Path) -> list[Path]:
+    """Peak-to-peak motion at rest and in the hold: a box per controller over the cases of the stiffness study."""
+    figure, axes = plt.subplots(figsize=(9, 1.3 + 0.36 * len(study)), layout="constrained")
+    labels, cases = [], []
+    for name, result in study.items():
+        hunting = _numbers(result["hunting_mm"]).ravel()
+        labels.append(_label(name, hunting))
+        cases.append(np.maximum(hunting[~np.isnan(hunting)], LEAST_HUNTING))
+    axes.boxplot(
+        cases, orientation="horizontal", whis=(0, 100), widths=0.6, patch_artist=True, tick_labels=labels,
+        boxprops={"facecolor": LIGHT, "edgecolor": DARK}, medianprops={"color": MIDDLE, "lw": 2},
+    )  # fmt: skip
+    axes.set(xscale="log")
+    axes.set_xlabel(f"hunting: peak to peak over 1 s of rest or hold, larger axis; at least {LEAST_HUNTING:g} (mm)")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.invert_yaxis()
+    figure.suptitle("Hunting: quartiles and range over setpoints, poses, axes and forces", fontsize=9.5)
+    return save(figure, folder, "hunting")
+
+
+def disturbance_figure(study: Study, folder: Path) -> list[Path]:
+    """Error in % of the displacement asked for, over the size of the push: the law with and without weight compensation."""
+    frictions = list(dict.fromkeys(label.rpartition(", ")[2] for label in study))
+    figure, panels = plt.subplots(1, len(frictions), figsize=(9, 4), layout="constrained", sharey=True, squeeze=False)
+    for axes, friction in zip(panels[0], sorted(frictions), strict=True):
+        lost = 0
+        for k, (label, result) in enumerate(item for item in study.items() if item[0].endswith(friction)):
+            errors = _numbers(result["error_percent"])
+            low, middle, high = (np.maximum(line, 1e-3) for line in _spread(errors))
+            axes.plot(result["amplitudes"], middle, **look(k), ms=4, label=label.rpartition(", ")[0])
+            axes.fill_between(result["amplitudes"], low, high, color=look(k)["color"], alpha=0.15, lw=0)
+            lost += int(np.isnan(errors).sum())
+        ticks = result["amplitudes"]
+        axes.set(xscale="log", yscale="log", xlabel="size of the push (N)")
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.set_xticks([], minor=True)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_title(
+            f"{friction[0].upper()}{friction[1:]}" + (f", {lost} cases lost" if lost else ""), loc="left", fontsize=9.5
+        )
+    panels[0, 0].set_ylabel("distance from the compliant target,\n% of the displacement asked for")
+    legend_below(figure, *axes.get_legend_handles_labels())
+    figure.suptitle("Error over the size of the disturbance: median and range over poses and axes", fontsize=9.5)
+    return save(figure, folder, "disturbances")
+
+
+def _panels(count: int, width: float, height: float, **options: Any) -> tuple[Figure, Iterator[Axes]]:
+    """A figure of at least ``count`` panels, at most four beside each other, and these panels; as few as can be are blank."""
+    columns = min(count, 4) if count < 5 else min((4, 3), key=lambda across: -count % across)
+    rows = math.ceil(count / columns)
+    size = (width * columns, height * rows + 0.5)
+    figure, panels = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)
+    for axes in panels.flat[count:]:
+        axes.set_visible(False)
+    if "sharex" in options:
+        # Numbers below the lowest panel of every column, which need not stand in the last row.
+        for k, axes in enumerate(panels.flat[:count]):
+            axes.tick_params(labelbottom=k + columns >= count)
+    return figure, iter(panels.flat[:count])
+
+
+def polar_figure(study: Study, folder: Path) -> list[Path]:
+    """Rendered stiffness over the direction of the push, a panel per controller: median and range over poses."""
+    figure, panels = _panels(len(study), 2.6, 3.0, subplot_kw={"projection": "polar"})
+    setpoint = next(iter(study.values()))["setpoint"]
+    for axes, (name, result) in zip(panels, study.items(), strict=True):
+        rendered = _numbers(result["stiffness"])
+        closed = [np.append(line, line[0]) for line in (np.array(result["angles"]), *_spread(rendered))]
+        angles, low, middle, high = closed
+        axes.fill_between(angles, low, high, color=LIGHT, alpha=0.5, lw=0, label="range")
+        axes.plot(angles, middle, color=DARK, lw=1.2, label="median over poses")
+        axes.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, setpoint), color=MIDDLE, ls="--", lw=1, label="setpoint")
+        axes.set_ylim(0, 2 * setpoint)
+        axes.set_yticks([setpoint / 2, setpoint, 1.5 * setpoint], [])
+        axes.set_xticks(np.arange(4) * np.pi / 2, ["$x$", "$y$", "$-x$", "$-y$"])
+        axes.tick_params(pad=-2)
+        axes.set_title(f"{label_of(name)}\n{_range(rendered)}", fontsize=8)
+    legend_below(figure, *axes.get_legend_handles_labels())
+    figure.suptitle(f"Rendered stiffness over the direction of the push (N/m); rings {setpoint / 2:g} N/m apart", fontsize=9.5)
+    return save(figure, folder, "stiffness_by_direction")
+
+
+def _percent(share: float) -> str:
+    """Three digits; less than a hundredth of a percent cannot be seen."""
+    return f"{100 * share:.3g} %" if share >= 1e-4 else "< 0.01 %"
+
+
+def _range(rendered: Array) -> str:
+    lost = int(np.isnan(rendered).sum())
+    if lost == rendered.size:
+        return "all lost"
+    text = f"{np.nanmedian(rendered):.0f}, {np.nanmin(rendered):.0f} to {np.nanmax(rendered):.0f} N/m"
+    return text + (f"; {lost} of {rendered.size} lost" if lost else "")
+
+
+def ellipse_figure(study: Study, folder: Path) -> list[Path]:
+    """Ellipses of rendered stiffness (the force that a unit displacement costs) at poses over the workspace."""
+    figure, panels = _panels(len(study), 2.9, 2.6, sharex=True, sharey=True)
+    turn = np.linspace(0, 2 * np.pi, 100)
+    circle = np.stack([np.cos(turn), np.sin(turn)])
+    for k, (axes, (name, result)) in enumerate(zip(panels, study.items(), strict=True)):
+        wanted = _numbers(result["setpoint"])
+        for pose, matrix in zip(result["poses"], result["stiffness"], strict=True):
+            centre = 1e3 * np.array(pose)[:, None]
+            if matrix is None:
+                axes.plot(*centre, color=DARK, marker="x", ls="")
+            else:
+                # A spring's matrix is symmetric; what is not is no stiffness, and is left out of the ellipse.
+                given = (_numbers(matrix) + _numbers(matrix).T) / 2
+                axes.plot(*(centre + 1e3 * ELLIPSE_SCALE * given @ circle), color=LIGHT, lw=2.5)
+            axes.plot(*(centre + 1e3 * ELLIPSE_SCALE * wanted @ circle), color=DARK, ls="--", lw=1)
+        off = [np.linalg.norm(_numbers(m) - wanted) / np.linalg.norm(wanted) for m in result["stiffness"] if m is not None]
+        worst = f"off by {_percent(float(np.median(off)))}, worst {_percent(float(max(off)))}" if off else "all lost"
+        axes.set_title(f"{label_of(name)}\n{worst}", fontsize=8)
+        axes.set_aspect("equal")
+        axes.set(xlim=(355, 645), ylim=(-130, 95))
+        if k == 0:
+            axes.plot([365, 365 + 1e6 * ELLIPSE_SCALE], [-124, -124], color="black", lw=2)
+            axes.text(370 + 1e6 * ELLIPSE_SCALE, -125, "1000 N/m", fontsize=7, va="center")
+    figure.supxlabel("$x$ (mm)", fontsize=9)
+    figure.supylabel("$y$ (mm)", fontsize=9)
+    (kx, kxy), (_, ky) = wanted
+    figure.suptitle(
+        f"Rendered stiffness (wide) and setpoint [[{kx:g}, {kxy:g}], [{kxy:g}, {ky:g}]] N/m (dashed); cross: lost.\n"
+        "Off by: norm of the difference over that of the setpoint, median and worst over the poses", fontsize=9.5
+    )  # fmt: skip
+    return save(figure, folder, "stiffness_ellipses")

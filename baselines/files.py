@@ -1,0 +1,35 @@
+"""Folders and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+
+def make_folder(path: Path) -> Path:
+    """The folder ``path``, made if it is missing; ``ValueError`` where that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
+    except OSError as error:
+        raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
+    return path
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write JSON as a whole or not at all; a number that is not finite becomes null, for which JSON has no other word."""
+    partial = path.with_suffix(path.suffix + ".partial")
+    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
+    partial.replace(path)
+
+
+def finite(content: Any) -> Any:
+    """``content`` with None for every number that is not finite, at any depth."""
+    if isinstance(content, dict):
+        return {name: finite(value) for name, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content

@@ -1,0 +1,138 @@
+"""From a policy's action to spool openings: directly, or as mass flows through the inverse valve characteristic.
+
+An actuation is asked once per policy step where ``every_period`` is False, else at every control period. Layout
+``two_valves`` has one valve per chamber, ``one_valve`` one 5/3 valve per cylinder (its chambers get opposite openings).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics import valves
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.plant import Plant
+
+VALVE_LAYOUTS = ("two_valves", "one_valve")
+
+
+class Actuation(Protocol):
+    """What stands between a policy and the valves.
+
+    ``size`` is the length of an action and ``names`` describes its entries. ``begin(lanes)`` starts new episodes in the
+    lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
+    ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on. ``memory()`` (M, N) is
+    what a policy should see of its state, in units that make it roughly [-1, 1], and ``memory_names`` describes its rows.
+    """
+
+    size: int
+    names: tuple[str, ...]
+    memory_names: tuple[str, ...]
+    every_period: bool
+
+    def begin(self, lanes: Mask) -> None: ...
+
+    def accept(self, actions: Array) -> None: ...
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array: ...
+
+    def memory(self) -> Array: ...
+
+
+class Forgetful:
+    """An actuation without a memory."""
+
+    memory_names: tuple[str, ...] = ()
+
+    def memory(self) -> Array:
+        """Nothing."""
+        return np.empty((0, 0))
+
+
+class ValveActuation(Forgetful):
+    """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
+
+    every_period = False
+
+    def __init__(self, layout: str) -> None:
+        self._one_valve = layout == "one_valve"
+        chambers = ("cylinder 1", "cylinder 2") if self._one_valve else ("P1", "N1", "P2", "N2")
+        self.names = tuple(f"opening of the valve of {chamber}, 1" for chamber in chambers)
+        self.size = len(self.names)
+
+    def begin(self, lanes: Mask) -> None:
+        pass
+
+    def accept(self, actions: Array) -> None:
+        self._openings = np.stack([actions[0], -actions[0], actions[1], -actions[1]]) if self._one_valve else actions
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        return self._openings
+
+
+@kernel
+def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
+    for i in range(state.shape[1]):
+        source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+        full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * source
+        for cylinder in range(2):
+            pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
+            dp = valves.density_factor(state[tp, i], p[at.RHO0, i], p[at.T0, i])
+            dn = valves.density_factor(state[tn, i], p[at.RHO0, i], p[at.T0, i])
+            fill_p = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pp, i], dp, p[at.CRITICAL, i])
+            drain_p = valves.orifice_flow(1.0, state[pp, i], dp, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
+            fill_n = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pn, i], dn, p[at.CRITICAL, i])
+            drain_n = valves.orifice_flow(1.0, state[pn, i], dn, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
+            row = 2 * cylinder
+            if one_valve:
+                half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
+                y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))
+                opened = valves.opening_for_active_flow(
+                    full * wanted[cylinder, i], fill_p, drain_p, fill_n, drain_n, half / (half + y), half / (half - y),
+                    p[at.CONDUCTANCE, i], p[at.LEAKAGE, i],
+                )  # fmt: skip
+                openings[row, i], openings[row + 1, i] = opened, -opened
+            else:
+                flow_p, flow_n = full * wanted[row, i], full * wanted[row + 1, i]
+                openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+                openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+
+
+class FlowActuation(Forgetful):
+    """The action is a net mass flow in units of the choked flow C rho0 Ps sqrt(T0/T) (3.2 g/s by default).
+
+    The inverse of the valve characteristic, at the true pressures and with the rig that was drawn, turns it into openings at
+    every control period. With
+    ``two_valves`` there is a flow per chamber (into it is positive), with ``one_valve`` the active flow qA (8) per cylinder.
+    """
+
+    every_period = True
+
+    def __init__(self, layout: str) -> None:
+        self._one_valve = layout == "one_valve"
+        unit = "unit of the choked flow"
+        self.names = (
+            (f"active flow qA of cylinder 1, {unit}", f"active flow qA of cylinder 2, {unit}")
+            if self._one_valve
+            else tuple(f"flow into chamber {chamber}, {unit}" for chamber in ("P1", "N1", "P2", "N2"))
+        )
+        self.size = len(self.names)
+
+    def begin(self, lanes: Mask) -> None:
+        pass
+
+    def accept(self, actions: Array) -> None:
+        self._wanted = actions
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        openings = np.empty((4, plant.num_envs))
+        _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
+        return openings
+
+
+ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

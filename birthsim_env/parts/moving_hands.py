@@ -1,0 +1,183 @@
+"""Hands that keep moving: a sine, noise, and a hand with mass, damper and spring that holds the end effector and guides it.
+
+None of them jumps: whatever they do, the rig can be asked to give way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from birthsim_env.parts.references import minimum_jerk
+from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.user_forces import AlternatingSteps, UserForce
+from birthsim_env.physics import exact
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
+
+FADE = 0.5
+"""s over which a sine and noise begin, at minimum jerk."""
+
+WAVES = 16
+"""Sines that noise is made of, per axis."""
+
+
+@kernel
+def _waves(time: Array, own: Array, forces: Array) -> None:
+    """``own`` (2, W, 3, N): of axis and wave the amplitude (N), angular frequency (rad/s) and phase (rad)."""
+    for i in range(time.shape[1]):
+        for k in range(time.shape[0]):
+            share = minimum_jerk(time[k, i] / FADE, 0)
+            for axis in range(2):
+                total = 0.0
+                for w in range(own.shape[1]):
+                    total += own[axis, w, 0, i] * exact.sine(own[axis, w, 1, i] * time[k, i] + own[axis, w, 2, i])
+                forces[k, axis, i] = share * total
+
+
+class _Waves(UserForce):
+    """Sums of sines."""
+
+    jump_rate = math.inf
+    waves = 1
+
+    def prepare(self, num_envs: int) -> None:
+        self._own: Array = np.zeros((2, self.waves, 3, num_envs))
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces = np.empty((time.shape[0], 2, time.shape[1]))
+        _waves(time, self._own, forces)
+        return forces
+
+
+class Sine(_Waves):
+    """``amplitude`` N at ``frequency`` Hz along ``angle`` (rad from x)."""
+
+    def __init__(self, amplitude: Range = 20.0, frequency: Range = 1.0, angle: Range = 0.0) -> None:
+        self.amplitude, self.frequency, self.angle = amplitude, frequency, angle
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        size, rate, angle = draw(self.amplitude, rng), 2 * math.pi * draw(self.frequency, rng), draw(self.angle, rng)
+        self._own[:, 0, 0, lane] = size * exact.cosine(angle), size * exact.sine(angle)
+        self._own[:, 0, 1, lane] = rate
+
+
+class Noise(_Waves):
+    """Random force of ``rms`` N, the root mean square of its size, with all frequencies of ``band`` (low, high), Hz, alike."""
+
+    waves = WAVES
+
+    def __init__(self, rms: Range = 15.0, band: tuple[float, float] = (0.1, 3.0)) -> None:
+        if not 0 < band[0] < band[1]:
+            raise ValueError(f"band = {band!r}; allowed: 0 < low < high (Hz)")
+        self.rms, self.band = rms, band
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        low, high = self.band
+        # One frequency in each of equal parts of the band: none is missing, and no two lanes repeat each other.
+        parts = low + (high - low) * (np.arange(self.waves) + rng.uniform(size=(2, self.waves))) / self.waves
+        self._own[:, :, 0, lane] = draw(self.rms, rng) / math.sqrt(self.waves)
+        self._own[:, :, 1, lane] = 2 * math.pi * parts
+        self._own[:, :, 2, lane] = rng.uniform(0, 2 * math.pi, (2, self.waves))
+
+
+CALM = 1.0
+"""s for which the guiding hand holds still at first."""
+
+POINTS = 12
+"""Places that it goes to, one after the other and again."""
+
+STEP = 0.001
+"""s, steps in which the hand's own motion is integrated."""
+
+
+@kernel
+def _guide(
+    time: Array, position: Array, velocity: Array, own: Array, points: Array, state: Array, grip: Array, forces: Array
+) -> None:
+    """``own`` (4, N): mass, stiffness and damping of the arm, s from place to place; ``points`` (POINTS, 2, N), m from where
+    it began; ``state`` (7, N): hand's position and velocity, place of the beginning, time; ``grip``: stiffness, damping."""
+    for i in range(time.shape[1]):
+        mass, spring, damper, lasts = own[0, i], own[1, i], own[2, i], own[3, i]
+        if not (state[6, i] <= time[0, i]):
+            for axis in range(2):
+                state[axis, i], state[2 + axis, i], state[4 + axis, i] = position[axis, i], velocity[axis, i], position[axis, i]
+            state[6, i] = time[0, i]
+        passed = time[0, i] - state[6, i]
+        steps = math.ceil(passed / STEP - 1e-6)
+        for step in range(steps):
+            h = passed / steps
+            now = state[6, i] + h * (step + 1)
+            leg = max(0.0, now - CALM) / lasts
+            place = int(leg)
+            u = 2.0 * (leg - place)
+            for axis in range(2):
+                before = points[(place - 1) % POINTS, axis, i] if place > 0 else 0.0
+                way = points[place % POINTS, axis, i] - before
+                wanted = state[4 + axis, i] + before + way * minimum_jerk(u, 0)
+                pace = way * minimum_jerk(u, 1) * 2.0 / lasts if now > CALM and u < 1.0 else 0.0
+                held = grip[0] * (state[axis, i] - position[axis, i]) + grip[1] * (state[2 + axis, i] - velocity[axis, i])
+                push = spring * (wanted - state[axis, i]) + damper * (pace - state[2 + axis, i]) - held
+                state[2 + axis, i] += h * push / mass
+                state[axis, i] += h * state[2 + axis, i]
+        state[6, i] = time[0, i]
+        for axis in range(2):
+            forces[0, axis, i] = grip[0] * (state[axis, i] - position[axis, i]) + grip[1] * (
+                state[2 + axis, i] - velocity[axis, i]
+            )
+
+
+class Guided(UserForce):
+    """A hand that holds the end effector and leads it from place to place.
+
+    The arm is a mass (kg) on a spring (N/m) and damper to where it wants to be; the grip between hand and end effector is
+    springy too. It holds still for ``CALM`` s, then goes to a place within ``reach`` (m) of the beginning, at minimum jerk in
+    half of ``lasts`` (s), stays for the other half, and goes to the next. All values are assumed: arms have 100 to 600 N/m
+    and about 1 kg at the hand (Tsuji et al. 1995).
+    """
+
+    closed_loop = True
+    jump_rate = math.inf
+
+    GRIP = (3000.0, 40.0)
+    """N/m and N s/m of skin and fingers; assumed."""
+
+    DAMPING = 0.7
+    """Damping ratio of the arm; assumed."""
+
+    def __init__(
+        self, mass: Range = 1.0, stiffness: Range = 400.0, reach: tuple[float, float] = (0.02, 0.05), lasts: Range = 2.0
+    ) -> None:
+        self.mass, self.stiffness, self.reach, self.lasts = mass, stiffness, reach, lasts
+
+    def prepare(self, num_envs: int) -> None:
+        self._own: Array = np.ones((4, num_envs))
+        self._points: Array = np.zeros((POINTS, 2, num_envs))
+        self._state: Array = np.full((7, num_envs), np.inf)
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        mass, spring = draw(self.mass, rng), draw(self.stiffness, rng)
+        self._own[:, lane] = mass, spring, 2 * self.DAMPING * math.sqrt(mass * spring), draw(self.lasts, rng)
+        for point in self._points:
+            size, angle = draw(self.reach, rng), rng.uniform(0, 2 * math.pi)
+            point[:, lane] = size * exact.cosine(angle), size * exact.sine(angle)
+        self._state[6, lane] = np.inf  # it takes hold of the end effector wherever that is
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces = np.empty((1, 2, time.shape[1]))
+        moving = (np.ascontiguousarray(position), np.ascontiguousarray(velocity))
+        _guide(time, *moving, self._own, self._points, self._state, np.array(self.GRIP), forces)
+        return forces
+
+
+_ANYWHERE = (0.0, 2 * math.pi)
+
+HANDS: dict[str, tuple[Callable[[], UserForce], Callable[[], UserForce]]] = {
+    "steps": (AlternatingSteps, lambda: AlternatingSteps(amplitude=(10.0, 40.0), repeats=3)),
+    "sine": (Sine, lambda: Sine(amplitude=(10.0, 30.0), frequency=(0.3, 2.0), angle=_ANYWHERE)),
+    "noise": (Noise, lambda: Noise(rms=(8.0, 20.0))),
+    "guided": (Guided, lambda: Guided(mass=(0.6, 1.6), stiffness=(150.0, 600.0), lasts=(1.5, 3.0))),
+}
+"""Name -> makers of a hand: as it is, and varied from episode to episode."""

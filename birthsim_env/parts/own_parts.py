@@ -1,0 +1,208 @@
+"""Parts of a user's own: classes and functions in Python files, plain functions of time, and CSV files."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import inspect
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from traceback import extract_tb
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from birthsim_env.parts.moving_hands import HANDS
+from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.user_forces import ForceProfile, UserForce
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
+
+GRID = 0.01
+"""s between the instants at which a function of time is taken; a spline of degree 5 runs through them."""
+
+
+def from_file(kind: str, text: str) -> Any:
+    """What ``path/to/file.py:Name`` names; ``kind`` ("controller", ...) is for the errors.
+
+    Raises ``ValueError`` in one line for a file that is missing, that Python does not import or that has no such name.
+    """
+    place, _, attribute = text.rpartition(":")
+    path = Path(place)
+    # No package has a path for a name, whatever the file is called.
+    spec = importlib.util.spec_from_file_location(str(path.resolve()), path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        raise ValueError(f"{kind} file {str(path)!r} does not exist; allowed: path/to/file.py:Name")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where dataclasses look their annotations up
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[spec.name]
+        line = next((frame.lineno for frame in reversed(extract_tb(error.__traceback__)) if frame.filename == str(path)), None)
+        where = "" if line is None else f", line {line}"
+        problem = f"{type(error).__name__}: {error}"
+        raise ValueError(f"{kind} file {str(path)!r}{where}: {problem}; allowed: a file that Python imports") from error
+    if not hasattr(module, attribute):
+        names = [name for name in vars(module) if not name.startswith("_")]
+        raise ValueError(f"{kind} file {str(path)!r} has no {attribute!r}; allowed: a name that it defines: {', '.join(names)}")
+    return getattr(module, attribute)
+
+
+def _numbers(kind: str, path: Path, columns: str) -> Array:
+    """The lines (M, 3) of a CSV file, less a heading."""
+    rows: list[list[float]] = []
+    expected = f"allowed: lines of {columns}, with increasing times"
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            for number, line in enumerate(csv.reader(file), start=1):
+                if not line or not "".join(line).strip() or line[0].lstrip().startswith("#"):
+                    continue
+                try:
+                    row = [float(value) for value in line]
+                except ValueError:
+                    if not rows and number == 1:
+                        continue  # the heading
+                    raise ValueError(f"{kind} {str(path)!r}, line {number}: {','.join(line)!r}; {expected}") from None
+                if len(row) != 3 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
+                    raise ValueError(f"{kind} {str(path)!r}, line {number}: {','.join(line)!r}; {expected}")
+                rows.append(row)
+    except OSError as error:
+        raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}; allowed: a CSV file") from error
+    if len(rows) < 2:
+        raise ValueError(f"{kind} {str(path)!r} has {len(rows)} lines of numbers; {expected}, at least 2")
+    return np.array(rows)
+
+
+@kernel
+def _spline(time: Array, breaks: Array, pieces: Array, rows: Array) -> None:
+    """``breaks`` (M + 1,), ``pieces`` (6, M, 2): coefficients, highest power first; at rest before and after."""
+    last = breaks.shape[0] - 1
+    for i in range(time.shape[0]):
+        t = max(breaks[0], min(breaks[last], time[i]))
+        low, high = 0, last
+        while high - low > 1:
+            middle = (low + high) // 2
+            if breaks[middle] <= t:
+                low = middle
+            else:
+                high = middle
+        s = t - breaks[low]
+        for axis in range(2):
+            value, slope, bend, jerk = 0.0, 0.0, 0.0, 0.0
+            for k in range(6):
+                jerk = jerk * s + 3.0 * bend
+                bend = bend * s + 2.0 * slope
+                slope = slope * s + value
+                value = value * s + pieces[k, low, axis]
+            inside = breaks[0] <= time[i] <= breaks[last]
+            rows[axis, i] = value
+            rows[2 + axis, i], rows[4 + axis, i] = (slope, bend) if inside else (0.0, 0.0)
+            rows[6 + axis, i] = jerk if inside else 0.0
+
+
+class Through(Trajectory):
+    """Through positions (M, 2), m, at ``times`` (M,), s: a spline of degree 5, or as high as the points allow."""
+
+    def __init__(self, times: Array, positions: Array) -> None:
+        degree = min(5, (len(times) - 2) // 2 * 2 + 1)  # an odd one
+        spline = make_interp_spline(times, positions, k=degree)
+        self._breaks: Array = np.unique(spline.t)
+        self._pieces: Array = np.zeros((6, len(self._breaks) - 1, 2))
+        for order in range(degree + 1):
+            self._pieces[5 - order] = spline(self._breaks[:-1], nu=order) / math.factorial(order)
+
+    def sample(self, time: Array) -> Array:
+        rows = np.empty((8, time.shape[0]))
+        _spline(time, self._breaks, self._pieces, rows)
+        return rows
+
+
+def _pair(kind: str, call: str, value: Any, expected: str) -> Array:
+    """Two finite numbers that a user's function returned."""
+    try:
+        pair: Array = np.asarray(value, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        pair = np.empty(0)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise ValueError(f"{kind}: {call} = {value!r}; allowed: {expected}")
+    return pair
+
+
+def _called(kind: str, call: str, function: Callable[..., Any], arguments: tuple[Any, ...], expected: str) -> Array:
+    try:
+        value = function(*arguments)
+    except Exception as error:
+        raise ValueError(f"{kind}: {call} fails ({type(error).__name__}: {error}); allowed: {expected}") from error
+    return _pair(kind, call, value, expected)
+
+
+class PlainHand(UserForce):
+    """A user's function as a hand: of time, or of time, position and velocity, of one lane."""
+
+    EXPECTED = "a function of time (s), or of time, position (2,) and velocity (2,), that returns (Fx, Fy) in N"
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self.closed_loop = len(inspect.signature(function).parameters) > 1
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces = np.empty((time.shape[0], 2, time.shape[1]))
+        for k, i in np.ndindex(*time.shape):
+            t = float(time[k, i])
+            given = (t, position[:, i].copy(), velocity[:, i].copy()) if self.closed_loop else (t,)
+            forces[k, :, i] = _called("user_force", f"function({t:g}, ...)", self._function, given, self.EXPECTED)
+        return forces
+
+
+def _made(kind: str, part: Any, expected: str) -> Any:
+    """An instance of a class that a user named; anything else is itself."""
+    if not inspect.isclass(part):
+        return part
+    try:
+        return part()
+    except Exception as error:
+        raise ValueError(f"{kind}: {part.__name__}() fails ({type(error).__name__}: {error}); allowed: {expected}") from error
+
+
+def trajectory_of(reference: Any, duration: float) -> Trajectory | None:
+    """What the argument ``reference`` says, as a ``Trajectory``; a function of time is asked for ``duration`` s."""
+    expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
+    if isinstance(reference, (str, Path)):
+        if Path(reference).suffix.lower() == ".csv":
+            rows = _numbers("reference", Path(reference), "time, x, y (s, m, m)")
+            return Through(rows[:, 0], rows[:, 1:])
+        if ".py:" not in str(reference):
+            raise ValueError(f"reference = {str(reference)!r}; allowed: {expected}")
+        reference = from_file("reference", str(reference))
+    reference = _made("reference", reference, expected)
+    if reference is None or isinstance(reference, Trajectory):
+        return reference
+    if not callable(reference):
+        raise ValueError(f"reference = {reference!r}; allowed: None, {expected}")
+    times = np.linspace(0.0, duration, max(7, round(duration / GRID) + 1))
+    wanted = "a function of time (s) that returns (x, y) in m"
+    return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
+
+
+def hand_of(user_force: Any, varied: bool) -> UserForce | None:
+    """What the argument ``user_force`` says, as a ``UserForce``; a named one is ``varied`` from episode to episode or not."""
+    expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
+    if isinstance(user_force, (str, Path)):
+        if str(user_force) in HANDS:
+            return HANDS[str(user_force)][varied]()
+        if Path(user_force).suffix.lower() == ".csv":
+            rows = _numbers("user_force", Path(user_force), "time, Fx, Fy (s, N, N)")
+            return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
+        if ".py:" not in str(user_force):
+            raise ValueError(f"user_force = {str(user_force)!r}; allowed: {expected}")
+        user_force = from_file("user_force", str(user_force))
+    user_force = _made("user_force", user_force, expected)
+    if user_force is None or isinstance(user_force, UserForce):
+        return user_force
+    if not callable(user_force):
+        raise ValueError(f"user_force = {user_force!r}; allowed: None, {expected}")
+    return PlainHand(user_force)

@@ -1,0 +1,156 @@
+"""Reference trajectories of the end effector, evaluated for all lanes at once.
+
+A user's own trajectory derives from ``Trajectory`` and implements ``sample``. Numbers given as (low, high) are drawn at the
+start of every episode.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.physics import exact
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
+
+
+class Trajectory:
+    """Where the end effector should be.
+
+    ``prepare(num_envs)`` is called once, ``begin(lane, rng)`` at the start of every episode of a lane with that lane's own
+    random stream; both may stay as they are. ``sample(time)`` gets the time of every lane since its episode began, s, (N,),
+    and returns (8, N): x, y (m), vx, vy, ax, ay and jerks jx, jy, consistent with each other.
+    """
+
+    def prepare(self, num_envs: int) -> None:
+        """Make room for ``num_envs`` lanes."""
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+
+    def sample(self, time: Array) -> Array:
+        """Target motion, (8, N), at ``time`` (N,), s."""
+        raise NotImplementedError(
+            f"{type(self).__name__}.sample(time) is missing; it returns x, y and three derivatives, (8, N)"
+        )
+
+
+@kernel
+def _circle(time: Array, own: Array, rows: Array) -> None:
+    """``own`` (4, N): centre x, y (m), radius (m), angular speed (rad/s)."""
+    for i in range(time.shape[0]):
+        w = own[3, i]
+        cosine, sine = own[2, i] * exact.cosine(w * time[i]), own[2, i] * exact.sine(w * time[i])
+        rows[0, i], rows[1, i] = own[0, i] + cosine, own[1, i] + sine
+        rows[2, i], rows[3, i] = -w * sine, w * cosine
+        rows[4, i], rows[5, i] = -w * w * cosine, -w * w * sine
+        rows[6, i], rows[7, i] = w * w * w * sine, -w * w * w * cosine
+
+
+class Circle(Trajectory):
+    """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
+
+    def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
+        if period == 0:
+            raise ValueError("period = 0; allowed: a number other than zero (s)")
+        self.centre, self.radius, self.period = centre, radius, period
+
+    def prepare(self, num_envs: int) -> None:
+        self._own: Array = np.zeros((4, num_envs))
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        self._own[:, lane] = (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng))
+
+    def sample(self, time: Array) -> Array:
+        rows = np.empty((8, time.shape[0]))
+        _circle(time, self._own, rows)
+        return rows
+
+
+@helper
+def minimum_jerk(u: float, order: int) -> float:
+    """10 u^3 - 15 u^4 + 6 u^5 on [0, 1] (Flash and Hogan 1985), or its first to third derivative; constant outside."""
+    u = max(0.0, min(1.0, u))
+    value = u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    slope = 30.0 * u * u * (1.0 - u) * (1.0 - u)
+    bend = 60.0 * u * (1.0 + u * (2.0 * u - 3.0))
+    jerk = 60.0 + 360.0 * u * (u - 1.0) if 0.0 < u < 1.0 else 0.0
+    return value if order == 0 else slope if order == 1 else bend if order == 2 else jerk
+
+
+@kernel
+def _path(time: Array, own: Array, rows: Array) -> None:
+    """``own`` (8, N): start x, y, heading (rad), straight length, arc radius (m), arc angle (rad), first and last time (s)."""
+    for i in range(time.shape[0]):
+        heading, straight, radius, angle = own[2, i], own[3, i], own[4, i], own[5, i]
+        lasts = own[7, i] - own[6, i]
+        total = straight + radius * abs(angle)
+        u = (time[i] - own[6, i]) / lasts
+        s = total * minimum_jerk(u, 0)
+        ds = total * minimum_jerk(u, 1) / lasts
+        dds = total * minimum_jerk(u, 2) / lasts**2
+        ddds = total * minimum_jerk(u, 3) / lasts**3
+        on_arc = max(s - straight, 0.0)
+        curvature = (1.0 / radius if angle > 0.0 else -1.0 / radius) if on_arc > 0.0 else 0.0
+        turned = curvature * on_arc
+        along, across = min(s, straight), 0.0
+        if on_arc > 0.0:
+            along += exact.sine(turned) / curvature
+            across = (1.0 - exact.cosine(turned)) / curvature
+        cosine, sine = exact.cosine(heading), exact.sine(heading)
+        rows[0, i] = own[0, i] + cosine * along - sine * across
+        rows[1, i] = own[1, i] + sine * along + cosine * across
+        tx, ty = exact.cosine(heading + turned), exact.sine(heading + turned)
+        normal = curvature * ds * ds
+        jerk_t, jerk_n = ddds - curvature * curvature * ds * ds * ds, 3.0 * curvature * ds * dds
+        rows[2, i], rows[3, i] = tx * ds, ty * ds
+        rows[4, i], rows[5, i] = tx * dds - ty * normal, ty * dds + tx * normal
+        rows[6, i], rows[7, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
+
+
+class Path(Trajectory):
+    """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
+
+    ``start`` (x, y) in m, ``heading`` in rad from x, ``length`` of the line and ``radius`` of the arc in m, ``angle`` of the
+    arc in rad (positive turns left), times in s. Where the line meets the arc the acceleration steps by speed^2 / radius.
+    """
+
+    def __init__(
+        self,
+        start: tuple[Range, Range] = (0.5, 0.0),
+        heading: Range = 0.0,
+        length: Range = 0.0,
+        radius: Range = 0.07,
+        angle: Range = 0.0,
+        begins: float = 0.0,
+        ends: float = 1.0,
+    ) -> None:
+        if not ends > begins:
+            raise ValueError(f"ends = {ends!r}; allowed: later than begins = {begins!r} (s)")
+        if not np.min(length) >= 0:
+            raise ValueError(f"length = {length!r}; allowed: >= 0 (m)")
+        if not np.min(radius) > 0:
+            raise ValueError(f"radius = {radius!r}; allowed: > 0 (m)")
+        self.start, self.heading, self.length, self.radius, self.angle = start, heading, length, radius, angle
+        self.begins, self.ends = begins, ends
+
+    def prepare(self, num_envs: int) -> None:
+        self._own: Array = np.zeros((8, num_envs))
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        numbers = (*self.start, self.heading, self.length, self.radius, self.angle)
+        self._own[:, lane] = (*(draw(number, rng) for number in numbers), self.begins, self.ends)
+
+    def sample(self, time: Array) -> Array:
+        rows = np.empty((8, time.shape[0]))
+        _path(time, self._own, rows)
+        return rows
+
+
+class Hold(Path):
+    """Stay at a point (x, y), m."""
+
+    def __init__(self, position: tuple[Range, Range] = (0.5, 0.0)) -> None:
+        super().__init__(start=position)

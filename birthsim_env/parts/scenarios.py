@@ -1,0 +1,102 @@
+"""The five experiments, as a table: what the end effector should do, what the hand does, what stiffness is asked for.
+
+``nominal`` is the fixed experiment, ``varied`` the one that ``randomize`` draws around it. All figures are assumed unless a
+source stands beside them; (0.5, 0) m is the centre of the workspace.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.user_forces import AlternatingSteps, Contractions, Pulls, Ramp, UserForce
+
+Parts = tuple[Trajectory, UserForce, StiffnessSchedule]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One experiment: its duration in s and the makers of its parts."""
+
+    title: str
+    duration: float
+    nominal: Callable[[], Parts]
+    varied: Callable[[], Parts]
+
+
+def _degrees(low: float, high: float) -> tuple[float, float]:
+    return math.radians(low), math.radians(high)
+
+
+def _circle() -> Parts:
+    # Fig. 4: the stiffness doubles while the pneumatic stiffness falls. 2000 and 4000 N/m are the paper's.
+    stiffness = StiffnessSchedule((0.0, 8.0), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
+    return Circle(), AlternatingSteps(), stiffness
+
+
+def _circle_varied() -> Parts:
+    setpoints = (1000.0, 5000.0)
+    stiffness = StiffnessSchedule((0.0, 8.0), (setpoints, setpoints), ((3000.0, 4800.0),) * 2, ((1500.0, 2400.0),) * 2)
+    return Circle(radius=(0.03, 0.1), period=(3.0, 6.0)), AlternatingSteps(amplitude=(10.0, 40.0)), stiffness
+
+
+def _probe() -> Parts:
+    return Hold(), Ramp(), StiffnessSchedule()
+
+
+def _probe_varied() -> Parts:
+    reference = Hold(((0.4, 0.6), (-0.1, 0.06)))
+    stiffness = StiffnessSchedule((0.0,), ((1000.0, 4000.0),), ((3000.0, 4800.0),), ((1500.0, 2400.0),))
+    return reference, Ramp(amplitude=(5.0, 40.0), angle="axes"), stiffness
+
+
+def _descent() -> Parts:
+    # Station -5 to +5 cm is 100 mm of straight descent; the arc is the curve of Carus.
+    reference = Path((0.42, -0.04), 0.0, 0.10, 0.07, math.radians(80), begins=1.0, ends=23.0)
+    stiffness = StiffnessSchedule((0.0, 8.0, 16.0), (2000.0, 4000.0, 3000.0), (4200.0,) * 3, (2100.0,) * 3)
+    return reference, Contractions(pushes=(5, 5)), stiffness
+
+
+def _descent_varied() -> Parts:
+    reference = Path(((0.41, 0.43), (-0.05, -0.02)), 0.0, 0.10, (0.06, 0.08), _degrees(70, 90), begins=1.0, ends=23.0)
+    setpoints = (2000.0, 4000.0)
+    stiffness = StiffnessSchedule((0.0, 8.0, 16.0), (setpoints,) * 3, ((3800.0, 4400.0),) * 3, ((1800.0, 2200.0),) * 3)
+    return reference, Contractions(amplitude=(40.0, 125.0), push=(0.15, 0.35)), stiffness
+
+
+def _forceps() -> Parts:
+    # 133-200 N are recommended clinically; 4000 N/m and ramps of 45-100 N/s are the design's.
+    stiffness = StiffnessSchedule((0.0,), (4000.0,), (4200.0,), (2000.0,))
+    return Hold((0.45, 0.0)), Pulls((175.0, 175.0), rate=70.0, angle=math.radians(-10)), stiffness
+
+
+def _forceps_varied() -> Parts:
+    stiffness = StiffnessSchedule((0.0,), (4000.0,), ((3800.0, 4400.0),), ((1800.0, 2200.0),))
+    pulls = Pulls(((150.0, 200.0), (150.0, 200.0)), rate=(45.0, 100.0), angle=_degrees(-20, 20))
+    return Hold(((0.43, 0.47), (-0.03, 0.03))), pulls, stiffness
+
+
+def _dystocia() -> Parts:
+    # Clinicians pulled 84, 122 and 163 N in routine, difficult and dystocia deliveries; the head draws back at once.
+    reference = Path((0.5, 0.0), math.pi, 0.012, begins=1.0, ends=1.5)
+    stiffness = StiffnessSchedule((0.0, 1.0), (2000.0, 4000.0), (4200.0,) * 2, (2000.0,) * 2)
+    return reference, Pulls((84.0, 122.0, 163.0), 100.0, math.radians(-5), begins=2.5, hold=1.5), stiffness
+
+
+def _dystocia_varied() -> Parts:
+    reference = Path(((0.48, 0.52), (-0.03, 0.03)), math.pi, (0.010, 0.015), begins=1.0, ends=1.5)
+    stiffness = StiffnessSchedule((0.0, 1.0), (2000.0, 4000.0), ((3800.0, 4400.0),) * 2, ((1800.0, 2200.0),) * 2)
+    pulls = Pulls(((75.0, 163.0),) * 3, (80.0, 120.0), _degrees(-15, 15), begins=2.5, hold=1.5)
+    return reference, pulls, stiffness
+
+
+SCENARIOS = {
+    "circle": Scenario("Circle under pushes (Fig. 4)", 16.0, _circle, _circle_varied),
+    "probe": Scenario("Stiffness test: hold and be pushed", 5.0, _probe, _probe_varied),
+    "descent": Scenario("Fetal descent under contractions", 24.0, _descent, _descent_varied),
+    "forceps": Scenario("Forceps traction", 15.0, _forceps, _forceps_varied),
+    "dystocia": Scenario("Dystocia: the head draws back and stiffens", 16.0, _dystocia, _dystocia_varied),
+}

@@ -1,0 +1,142 @@
+"""Sensor models: ``ideal`` sees everything at every control period, ``lab`` is a magnetic tracker and pressure cells.
+
+A sensor model's ``measure`` is called at every control instant at which somebody looks: at each one where ``sampled`` is
+True, at policy instants otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.parts.signals import Measurement
+from birthsim_env.physics import exact
+from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Electronics
+
+RATE_TIME = 0.02
+"""s; assumed: time constant of the low-pass on the position differences that ``lab`` shows as velocity."""
+
+
+class IdealSensors:
+    """Position, velocity, pressures and the user's force, exact and at once."""
+
+    sampled = False
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        pass
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
+        return Measurement(time, motion[:2], time, motion[2:], pressures, force, sampled=False)
+
+
+@helper
+def _uniform(key: np.uint64, counter: np.uint64) -> float:
+    """A number in (0, 1) from a key and a counter: SplitMix64 (Steele et al. 2014) without a state to carry along."""
+    x = key + counter * np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    x = x ^ (x >> np.uint64(31))
+    return ((x >> np.uint64(11)) + 0.5) / 9007199254740992.0
+
+
+@helper
+def _normal(key: np.uint64, tick: int, channel: int) -> float:
+    """A standard normal number for one channel at one tick (Box and Muller)."""
+    counter = np.uint64(tick * 32 + 2 * channel)
+    radius = math.sqrt(-2.0 * exact.log(_uniform(key, counter)))
+    return radius * exact.cosine(2.0 * math.pi * _uniform(key, counter + np.uint64(1)))
+
+
+@kernel
+def _lab(
+    ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
+    rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
+    seen: Array,
+) -> None:  # fmt: skip
+    """One control instant. ``queue`` (Q, 3, N): x, y and time of the last samples taken; ``shown`` (3, N): the newest that
+    has arrived; ``velocity`` (2, N): low-passed differences; ``seen`` (4, N): noisy pressures."""
+    depth = queue.shape[0]
+    for i in range(time.shape[0]):
+        tick, key = ticks[i], keys[i]
+        index = math.floor(time[i] * rate + 1e-9)
+        if tick == 0 or index > math.floor((time[i] - period) * rate + 1e-9):
+            slot = int(index) % depth
+            queue[slot, 0, i] = motion[0, i] + position_noise * _normal(key, tick, 4)
+            queue[slot, 1, i] = motion[1, i] + position_noise * _normal(key, tick, 5)
+            queue[slot, 2, i] = time[i]
+            if tick == 0:
+                # The tracker has run before the episode: its first sample is there at once.
+                for k in range(depth):
+                    queue[k, 2, i] = 0.0
+                    queue[k, 0, i], queue[k, 1, i] = queue[slot, 0, i], queue[slot, 1, i]
+                shown[0, i], shown[1, i], shown[2, i] = queue[slot, 0, i], queue[slot, 1, i], 0.0
+                velocity[0, i], velocity[1, i] = motion[2, i], motion[3, i]
+        for k in range(depth):
+            if queue[k, 2, i] > shown[2, i] and queue[k, 2, i] + latency <= time[i] + 1e-9:
+                step = queue[k, 2, i] - shown[2, i]
+                share = step / (RATE_TIME + step)
+                for axis in range(2):
+                    velocity[axis, i] += share * ((queue[k, axis, i] - shown[axis, i]) / step - velocity[axis, i])
+                    shown[axis, i] = queue[k, axis, i]
+                shown[2, i] = queue[k, 2, i]
+        for chamber in range(4):
+            seen[chamber, i] = pressures[chamber, i] + pressure_noise * _normal(key, tick, chamber)
+
+
+class LabSensors:
+    """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period.
+
+    No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal
+    force sensor.
+    """
+
+    sampled = True
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        board = electronics
+        # A tracker faster than the control board is read once a period; the queue's slots count samples, one a period at most.
+        rate = min(board.position_rate, 1 / board.control_period)
+        self._numbers = (
+            board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
+        )  # fmt: skip
+        # Two samples can be under way beyond those that the latency holds back.
+        depth = int(board.position_latency * rate) + 3
+        self._queue: Array = np.zeros((depth, 3, num_envs))
+        self._shown: Array = np.zeros((3, num_envs))
+        self._keys = np.zeros(num_envs, dtype=np.uint64)
+        self._velocity: Array = np.zeros((2, num_envs))
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+        self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
+        seen = np.empty_like(pressures)
+        _lab(ticks, time, motion, pressures, self._keys, *self._numbers, self._queue, self._shown, self._velocity, seen)
+        shown = self._shown.copy()
+        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen, force, sampled=True)
+
+
+class SensorModel(Protocol):
+    """What measures; ``sampled`` is True where it must look at every control instant."""
+
+    sampled: bool
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None: ...
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None: ...
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement: ...
+
+
+SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors}

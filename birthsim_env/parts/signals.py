@@ -1,0 +1,126 @@
+"""What crosses the line between rig and controller: measurements one way, references the other.
+
+Arrays are (rows, N) over N lanes. Everything also works for one rig without the lane axis, (rows,).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.lanes import Array
+
+REFERENCE_NAMES = (
+    *("x", "y", "vx", "vy", "ax", "ay", "jx", "jy"),
+    *("Kclx", "Kcly", "Kpneu1", "Kpneu2", "dKpneu1", "dKpneu2", "Kclxy"),
+)
+"""Rows of a reference: the target's position, velocity, acceleration and jerk; the setpoints of closed-loop stiffness;
+those of pneumatic stiffness and their rates; the coupling of the closed-loop stiffness [[Kclx, Kclxy], [Kclxy, Kcly]]."""
+REFERENCES = len(REFERENCE_NAMES)
+
+
+def displacement(force_x: Any, force_y: Any, kx: Any, ky: Any, kxy: Any) -> tuple[Any, Any]:
+    """Displacement (m) of a spring [[kx, kxy], [kxy, ky]] (N/m) under a force (N)."""
+    determinant = kx * ky - kxy * kxy
+    return (ky * force_x - kxy * force_y) / determinant, (kx * force_y - kxy * force_x) / determinant
+
+
+compliance = helper(displacement)
+"""``displacement`` for kernels."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,) in the order of ``REFERENCE_NAMES``."""
+
+    rows: Array
+
+    @property
+    def position(self) -> Array:
+        """Target of the end effector, m, (2, N)."""
+        return self.rows[0:2]
+
+    @property
+    def velocity(self) -> Array:
+        """m/s, (2, N)."""
+        return self.rows[2:4]
+
+    @property
+    def acceleration(self) -> Array:
+        """m/s2, (2, N)."""
+        return self.rows[4:6]
+
+    @property
+    def jerk(self) -> Array:
+        """m/s3, (2, N)."""
+        return self.rows[6:8]
+
+    @property
+    def stiffness(self) -> Array:
+        """Setpoints of closed-loop stiffness Kclx, Kcly, N/m, (2, N)."""
+        return self.rows[8:10]
+
+    @property
+    def pneumatic_stiffness(self) -> Array:
+        """Setpoints of the pneumatic stiffness (9) of cylinders 1 and 2, N/m, (2, N)."""
+        return self.rows[10:12]
+
+    @property
+    def pneumatic_stiffness_rate(self) -> Array:
+        """Rates of those setpoints, N/(m s), (2, N)."""
+        return self.rows[12:14]
+
+    @property
+    def stiffness_coupling(self) -> Array:
+        """Setpoint Kclxy of what couples x and y, N/m, (N,); zero in the paper."""
+        return np.asarray(self.rows[14])
+
+    def compliant_target(self, user_force: Array) -> Array:
+        """Where a hand that pushes with ``user_force`` (2, N), N, should find the end effector (19), m, (2, N)."""
+        (kx, ky), kxy = self.stiffness, self.stiffness_coupling
+        x, y = displacement(user_force[0], user_force[1], kx, ky, kxy)
+        return np.asarray(self.position + np.stack([x, y]))
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What the sensors say at one instant, SI units.
+
+    ``position`` (2, N) of the end effector was taken at ``position_time`` (N,), at or before ``time`` (N,). ``velocity``
+    (2, N) is measured, or, where ``sampled`` is True, only the low-passed difference of rare and late position samples, which
+    a controller will want to replace by an observer of its own. ``pressures`` (4, N) are those of chambers P1, N1, P2, N2,
+    absolute. ``user_force`` (2, N) is that of a force sensor at the end effector.
+    """
+
+    time: Array
+    position: Array
+    position_time: Array
+    velocity: Array
+    pressures: Array
+    user_force: Array
+    sampled: bool
+
+
+Mask = NDArray[np.bool_]
+
+
+def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
+    """Signals of one rig, which have no lane axis, as signals over one lane."""
+
+    def column(values: Array) -> Array:
+        return np.asarray(values, dtype=np.float64)[..., None]
+
+    seen = Measurement(
+        column(measurement.time),
+        column(measurement.position),
+        column(measurement.position_time),
+        column(measurement.velocity),
+        column(measurement.pressures),
+        column(measurement.user_force),
+        measurement.sampled,
+    )
+    return seen, Reference(column(reference.rows))

@@ -1,0 +1,91 @@
+"""Setpoints over time: closed-loop stiffness (steps, as a user may change it at any control period) and pneumatic
+stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from birthsim_env.parts.references import minimum_jerk
+from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.lanes import Array
+
+
+class StiffnessSchedule:
+    """What stiffness is asked for. A user's own schedule derives from this class.
+
+    ``sample(time)`` gets the time of every lane, s, (N,), and returns (7, N): Kclx, Kcly (N/m), the pneumatic stiffness
+    setpoints of cylinders 1 and 2 (N/m), their rates (N/(m s)), and Kclxy (N/m), which couples x and y.
+
+    Arguments, one entry per phase, numbers or ranges (low, high): ``times`` (s) at which the phases start, the first 0;
+    ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given; ``closed_loop_xy`` (N/m), what
+    couples them, whose square must be below the product of the two; ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
+    ``transition`` (s) of the pneumatic stiffness.
+    """
+
+    def __init__(
+        self,
+        times: Sequence[float] = (0.0,),
+        closed_loop: Sequence[Range] = (2000.0,),
+        pneumatic1: Sequence[Range] = (4600.0,),
+        pneumatic2: Sequence[Range] = (2300.0,),
+        closed_loop_y: Sequence[Range] | None = None,
+        closed_loop_xy: Sequence[Range] | None = None,
+        transition: float = 0.5,
+    ) -> None:
+        columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
+        coupled = [] if closed_loop_xy is None else [closed_loop_xy]
+        if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns + coupled):
+            raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
+        if not all(sooner < later for sooner, later in pairwise(times)):
+            raise ValueError(f"times = {times!r}; allowed: increasing (s)")
+        for setpoint in (number for column in columns for number in column):
+            if not np.min(setpoint) > 0:
+                raise ValueError(f"stiffness setpoint {setpoint!r}; allowed: more than 0 (N/m)")
+        if not transition > 0:
+            raise ValueError(f"transition = {transition!r}; allowed: more than 0 (s)")
+        self.times, self.transition = times, transition
+        self.closed_loop, self.closed_loop_y, self.closed_loop_xy = closed_loop, closed_loop_y, closed_loop_xy
+        for across, x, y in zip(closed_loop_xy or (), closed_loop, closed_loop_y or closed_loop, strict=False):
+            if not np.max(np.abs(across)) ** 2 < np.min(x) * np.min(y):
+                raise ValueError(f"closed_loop_xy {across!r}; allowed: below sqrt(Kclx Kcly), here of {x!r} and {y!r} (N/m)")
+        self.pneumatic1, self.pneumatic2 = pneumatic1, pneumatic2
+
+    def prepare(self, num_envs: int) -> None:
+        """Make room for ``num_envs`` lanes."""
+        self._starts: Array = np.array(self.times, dtype=np.float64)
+        self._values: Array = np.zeros((len(self.times), 5, num_envs))
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+        for phase in range(len(self.times)):
+            x = draw(self.closed_loop[phase], rng)
+            y = x if self.closed_loop_y is None else draw(self.closed_loop_y[phase], rng)
+            pneumatic = draw(self.pneumatic1[phase], rng), draw(self.pneumatic2[phase], rng)
+            across = 0.0 if self.closed_loop_xy is None else draw(self.closed_loop_xy[phase], rng)
+            self._values[phase, :, lane] = (x, y, *pneumatic, across)
+
+    def sample(self, time: Array) -> Array:
+        """Setpoints (7, N) at ``time`` (N,), s."""
+        rows = np.empty((7, time.shape[0]))
+        _sample(time, self._starts, self._values, self.transition, rows)
+        return rows
+
+
+@kernel
+def _sample(time: Array, starts: Array, values: Array, transition: float, rows: Array) -> None:
+    for i in range(time.shape[0]):
+        phase = 0
+        # Half a microsecond of grace: a phase that starts on a control instant starts there, whatever the rounding.
+        while phase + 1 < starts.shape[0] and time[i] >= starts[phase + 1] - 5e-7:
+            phase += 1
+        rows[0, i], rows[1, i], rows[6, i] = values[phase, 0, i], values[phase, 1, i], values[phase, 4, i]
+        u = (time[i] - starts[phase]) / transition
+        for k in range(2):
+            now = values[phase, 2 + k, i]
+            before = values[max(phase - 1, 0), 2 + k, i]
+            rows[2 + k, i] = before + (now - before) * minimum_jerk(u, 0)
+            rows[4 + k, i] = (now - before) * minimum_jerk(u, 1) / transition

@@ -1,0 +1,167 @@
+"""How kernels are compiled: two Numba decorators, machine code kept on disk, and a word while a user waits.
+
+Kernels run over lanes (environments). They are written so that LLVM vectorises the innermost loop: quantities are rows of
+scratch arrays whose shape is a compile-time constant, helpers are always inlined, conditions are max, min or a ternary, and
+only + - * / sqrt occur inside. Without ``fastmath`` every operation is IEEE-exact, so a lane computes the same bits
+whether it runs in a vector register or alone.
+
+Numba's own cache looks at the file of the outermost function only. Ours names a file by everything that the machine code
+depends on: all source files that the kernel's module imports, directly or not, the signature, the processor and the versions.
+A file that is missing, damaged or cannot be written costs a compilation, never the command.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import hashlib
+import os
+import pickle
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import llvmlite
+import numba
+from numba.core import event, serialize
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+BLOCK = 32
+"""Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise."""
+
+_ROOT = Path(__file__).resolve().parent.parent.parent
+_PACKAGES = ("birthsim_env", "baselines", "agents")
+_DIGEST = hashlib.sha256().digest_size
+
+
+def _file_of(module: str) -> Path | None:
+    """The source file of one of this project's modules, or None."""
+    place = _ROOT.joinpath(*module.split("."))
+    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
+    return next(found, None) if module.split(".")[0] in _PACKAGES else None
+
+
+@cache
+def _imports(path: Path) -> frozenset[Path]:
+    """The project's own files that a source file imports anywhere in it."""
+    files: set[Path | None] = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            files.update(_file_of(alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            # What is no module of its own stands in the one that it is imported from.
+            files.update(_file_of(f"{node.module}.{alias.name}") or _file_of(node.module) for alias in node.names)
+    return frozenset(file for file in files if file)
+
+
+@cache
+def source_stamp(path: Path) -> str:
+    """SHA-256 of a source file and of every file of this project that it imports, directly or not."""
+    seen, waiting = {path}, [path]
+    while waiting:
+        found = _imports(waiting.pop()) - seen
+        seen |= found
+        waiting += found
+    digest = hashlib.sha256()
+    for file in sorted(seen):
+        digest.update(str(file.relative_to(_ROOT)).encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _cache_folder() -> Path | None:
+    """The first writable folder: $NUMBA_CACHE_DIR, beside the sources, the user's cache; None when there is none."""
+    chosen, home = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
+    folders = [Path(chosen)] if chosen else []
+    folders.append(_ROOT / "birthsim_env" / "__pycache__")
+    with contextlib.suppress(RuntimeError):  # of a user without a home directory
+        folders.append(Path(home or Path.home() / ".cache") / "birthsim")
+    for folder in folders:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+class _DiskCache(NullCache):
+    """Machine code of one function: a file per signature and processor, which begins with the SHA-256 of the rest."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._folder = folder
+        path = Path(function.__code__.co_filename).resolve()
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._stamp = source_stamp(path)[:16]
+
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
+        kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions)).encode()).hexdigest()
+        return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        try:
+            content = self._path(sig, target_context.codegen()).read_bytes()
+            if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
+                return CompileResult._rebuild(target_context, *pickle.loads(content[_DIGEST:]))  # type: ignore[no-untyped-call]
+        except OSError:
+            pass
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        path = self._path(sig, data.codegen)
+        content = serialize.dumps(data._reduce())  # type: ignore[no-untyped-call]
+        partial = path.with_suffix(f".{os.getpid()}.partial")
+        try:
+            partial.write_bytes(hashlib.sha256(content).digest() + content)
+            partial.replace(path)
+            for other in self._folder.glob(f"{path.stem.rpartition('-')[0]}-*.nbc"):
+                if other != path:
+                    other.unlink(missing_ok=True)  # of older sources
+        except OSError:
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
+
+
+class _Announcer(event.Listener):
+    """Says once per process that kernels are being compiled, since the first step of a new installation waits for it."""
+
+    def __init__(self) -> None:
+        self._said = False
+
+    def on_start(self, event: Any) -> None:
+        module = getattr(event.data["dispatcher"].py_func, "__module__", "") or ""
+        if not self._said and module.split(".")[0] in _PACKAGES:
+            self._said = True
+            kept = "the result is cached" if _cache_folder() else "no folder is writable, so every process compiles anew"
+            print(f"BirthSIM: compiling numerical kernels, usually 10 to 40 s; {kept}.", file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+
+
+def kernel(function: F) -> F:
+    """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
+    compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    folder = _cache_folder()
+    # With the compiler off there is nothing to keep; what a closure holds, no hash of sources knows.
+    if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None:
+        compiled._cache = _DiskCache(function, folder)
+    return compiled  # type: ignore[no-any-return]
+
+
+def helper(function: F) -> F:
+    """Compile a scalar helper that is always inlined into the kernels that call it."""
+    compiled: Any = numba.njit(error_model="numpy", forceinline=True)(function)
+    return compiled  # type: ignore[no-any-return]

@@ -1,0 +1,215 @@
+"""The right-hand side of the whole rig, written once, and its integrator: kernels over lanes.
+
+State rows are those of ``lanes.STATE_NAMES``. A kernel copies one block of lanes at a time into scratch arrays of constant
+shape, works there, and copies back; the right-hand side is inlined where it is used.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
+from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.lanes import Array
+
+INTEGRATION_STEP = 0.25e-3
+"""s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""
+
+
+@helper
+def outer_factor(p: Array, i: int) -> float:
+    """Density factor of supply and surroundings, which are equally warm, kg/m3."""
+    return valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+
+
+@helper
+def orifice_flows(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int, outer: float) -> tuple[float, float]:
+    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s."""
+    inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
+    supply = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    exhaust = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+    supplied = valves.orifice_flow(supply, p[at.SUPPLY, i], outer, x[pressure, i], inside, p[at.CRITICAL, i])
+    return supplied, valves.orifice_flow(exhaust, x[pressure, i], inside, p[at.ATMOSPHERE, i], outer, p[at.CRITICAL, i])
+
+
+@helper
+def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
+    """Mass flow from the supply into a chamber given by its state rows, kg/s."""
+    return orifice_flows(x, p, i, pressure, temperature, spool, outer_factor(p, i))[0]
+
+
+@helper
+def chamber_rates(
+    x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, spool: int, area: int, perimeter: int,
+    length: float, length_rate: float, outer: float,
+) -> None:  # fmt: skip
+    """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
+    supplied, exhausted = orifice_flows(x, p, i, pressure, temperature, spool, outer)
+    t, wall = x[temperature, i], p[at.TEMPERATURE, i]
+    carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
+    heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
+    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
+    volume_rate = p[area, i] * length_rate
+    rate = chambers.pressure_rate(x[pressure, i], volume, volume_rate, carried, heat, p[at.GAS, i], p[at.GAMMA, i])
+    dx[pressure, i] = rate
+    dx[temperature, i] = chambers.temperature_rate(
+        x[pressure, i], t, rate, volume, volume_rate, supplied - exhausted, p[at.GAS, i]
+    )
+
+
+@helper
+def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -> None:
+    """dx/dt of ``n`` lanes: state (18, n), opening commands (4, n), user force (2, n), parameters (PARAMETERS, n)."""
+    for i in range(n):
+        y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
+        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p[at.K1, i], p[at.K2, i], p[at.D_SQUARES, i], p[at.D_PRODUCT, i], p[at.SIN_GAMMA3, i], p[at.COS_GAMMA3, i]
+        )
+
+        s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
+        level1 = friction.stribeck_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
+        level2 = friction.stribeck_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
+        is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
+        breakaway, steepness = p[at.BREAKAWAY, i], p[at.STEEPNESS, i]
+        dz1 = friction.bristle_rate_by_law(v1, x[at.Z1, i], level1, s0, is_lugre, breakaway, steepness)
+        dz2 = friction.bristle_rate_by_law(v2, x[at.Z2, i], level2, s0, is_lugre, breakaway, steepness)
+        bristle1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
+        bristle2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
+        coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SPEED, i])
+        coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SPEED, i])
+        friction1 = bristle1 if is_bristle else coulomb1
+        friction2 = bristle2 if is_bristle else coulomb2
+
+        force1 = (
+            mechanics.piston_force(x[at.PP1, i], x[at.PN1, i], p[at.AREA_P1, i], p[at.AREA_N1, i], p[at.ATMOSPHERE, i])
+            - friction1
+            - mechanics.stop_force(y1, v1, p[at.HALF_L1, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
+            + mechanics.user_force1(f[0, i], f[1, i], kappa, sine, cosine)
+        )
+        force2 = (
+            mechanics.piston_force(x[at.PP2, i], x[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], p[at.ATMOSPHERE, i])
+            - friction2
+            - mechanics.stop_force(y2, v2, p[at.HALF_L2, i], p[at.STOP_STIFFNESS, i], p[at.STOP_DAMPING, i])
+            + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
+        )
+        dx[at.Y1, i] = v1
+        dx[at.V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.Y2, i] = v2
+        dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.Z1, i] = dz1 if is_bristle else 0.0
+        dx[at.Z2, i] = dz2 if is_bristle else 0.0
+
+        outer = outer_factor(p, i)
+        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1, outer)
+        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1, outer)
+        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2, outer)
+        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2, outer)
+        dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) / p[at.TAU, i]
+        dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) / p[at.TAU, i]
+        dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) / p[at.TAU, i]
+        dx[at.S2N, i] = (u[3, i] - x[at.S2N, i]) / p[at.TAU, i]
+
+
+@helper
+def load(source: Array, first: int, n: int, scratch: Array) -> None:
+    """Copy ``n`` lanes, starting at lane ``first``, into the rows of a scratch array."""
+    for row in range(source.shape[0]):
+        for i in range(n):
+            scratch[row, i] = source[row, first + i]
+
+
+@helper
+def store(scratch: Array, first: int, n: int, target: Array) -> None:
+    """Copy ``n`` lanes of a scratch array back."""
+    for row in range(target.shape[0]):
+        for i in range(n):
+            target[row, first + i] = scratch[row, i]
+
+
+@helper
+def settle(x: Array, n: int) -> None:
+    """Set what has decayed below 1e-30 to zero: arithmetic on denormal numbers is many times slower."""
+    for row in range(at.STATES):
+        for i in range(n):
+            x[row, i] = x[row, i] if abs(x[row, i]) > 1e-30 else 0.0
+
+
+@kernel
+def derivatives(state: Array, command: Array, force: Array, parameters: Array, rates: Array) -> None:
+    """Writes d(state)/dt into ``rates`` (18, N)."""
+    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        load(state, first, n, x)
+        load(command, first, n, u)
+        load(force, first, n, f)
+        load(parameters, first, n, p)
+        right_hand_side(x, u, f, p, dx, n)
+        store(dx, first, n, rates)
+
+
+@kernel
+def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
+    """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
+    for i in range(state.shape[1]):
+        outer = outer_factor(parameters, i)
+        flows[0, i], flows[4, i] = orifice_flows(state, parameters, i, at.PP1, at.TP1, at.S1P, outer)
+        flows[1, i], flows[5, i] = orifice_flows(state, parameters, i, at.PN1, at.TN1, at.S1N, outer)
+        flows[2, i], flows[6, i] = orifice_flows(state, parameters, i, at.PP2, at.TP2, at.S2P, outer)
+        flows[3, i], flows[7, i] = orifice_flows(state, parameters, i, at.PN2, at.TN2, at.S2N, outer)
+
+
+@helper
+def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+    """Adds ``weight`` dx to the running sum and puts the next trial state at x + ``ahead`` dx."""
+    for row in range(at.STATES):
+        for i in range(n):
+            total[row, i] += weight * dx[row, i]
+            trial[row, i] = x[row, i] + ahead * dx[row, i]
+
+
+@helper
+def record_impacts(x: Array, p: Array, impacts: Array, n: int) -> None:
+    """Keeps the largest speed at which a piston runs into an end stop, m/s."""
+    for i in range(n):
+        outward1 = x[at.V1, i] if x[at.Y1, i] > 0.0 else -x[at.V1, i]
+        outward2 = x[at.V2, i] if x[at.Y2, i] > 0.0 else -x[at.V2, i]
+        impacts[0, i] = max(impacts[0, i], outward1 if abs(x[at.Y1, i]) > p[at.HALF_L1, i] else 0.0)
+        impacts[1, i] = max(impacts[1, i], outward2 if abs(x[at.Y2, i]) > p[at.HALF_L2, i] else 0.0)
+
+
+@kernel
+def advance(state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array) -> None:
+    """Integrates ``state`` in place by classical Runge-Kutta.
+
+    ``forces`` (K, 2, N): each of the K samples is held for ``steps`` steps of ``step`` seconds. ``impacts`` (2, N) gets
+    the largest speed at which each piston ran into an end stop.
+    """
+    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
+    total, trial, hit = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((2, BLOCK))
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        load(state, first, n, x)
+        load(command, first, n, u)
+        load(parameters, first, n, p)
+        hit[:] = 0.0
+        for sample in range(forces.shape[0]):
+            load(forces[sample], first, n, f)
+            for _ in range(steps):
+                total[:] = x
+                right_hand_side(x, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 6.0, step / 2.0)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 3.0, step / 2.0)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 3.0, step)
+                right_hand_side(trial, u, f, p, dx, n)
+                stage(x, dx, total, trial, n, step / 6.0, 0.0)
+                x[:] = total
+                record_impacts(x, p, hit, n)
+        settle(x, n)
+        store(x, first, n, state)
+        store(hit, first, n, impacts)

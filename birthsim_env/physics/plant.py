@@ -1,0 +1,138 @@
+"""The plant alone: N rigs side by side, without Gymnasium."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from birthsim_env.physics import dynamics, geometry
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
+from birthsim_env.physics.parameters import Parameters, load_parameters
+
+
+def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> Array:
+    """``value`` as a contiguous float64 array of ``shape``, or a ``ValueError`` that names what is wrong with it."""
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} = {value!r}; allowed: numbers of shape {shape} ({unit})") from error
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}; allowed: {shape} ({unit})")
+    if not np.isfinite(array).all():
+        where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name}{list(where)} = {array[where]}; allowed: finite numbers ({unit})")
+    return array
+
+
+class Plant:
+    """``num_envs`` rigs, integrated by Runge-Kutta steps of 0.25 ms; one lane is one rig.
+
+    ``parameters`` is one rig for all lanes (a ``Parameters`` or the path of a TOML file) or a sequence with one per lane.
+    ``state`` is an array (18, num_envs) with the rows of ``STATE_NAMES``, SI units; it may be read and written. It starts at
+    mid stroke, at rest, with pressures that balance the weight.
+    """
+
+    def __init__(self, parameters: Parameters | str | Path | Sequence[Parameters] | None = None, num_envs: int = 1) -> None:
+        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
+        several = isinstance(parameters, Sequence) and not isinstance(parameters, str)
+        rigs = parameters if several else load_parameters(parameters)  # type: ignore[arg-type]
+        self.num_envs = int(num_envs)
+        self.lane_parameters: Array = parameter_array(rigs, self.num_envs)  # type: ignore[arg-type]
+        self._state = balanced_state(self.lane_parameters, np.zeros((2, self.num_envs)))
+        self.impacts: Array = np.zeros((2, self.num_envs))
+        """Largest speed at which each piston ran into an end stop during the last ``advance``, m/s, (2, num_envs)."""
+
+    @property
+    def state(self) -> Array:
+        """The state, (18, num_envs), with the rows of ``STATE_NAMES``, SI units; assigning to it checks and copies."""
+        return self._state
+
+    @state.setter
+    def state(self, state: ArrayLike) -> None:
+        self._state[:] = checked("state", state, (STATES, self.num_envs), "SI")
+
+    def derivatives(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> Array:
+        """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N."""
+        rates = np.empty((STATES, self.num_envs))
+        dynamics.derivatives(*self._arguments(state, opening_command, user_force), self.lane_parameters, rates)
+        return rates
+
+    def advance(self, opening_command: ArrayLike, user_force: ArrayLike, duration: float) -> Array:
+        """Integrate ``state`` over ``duration`` seconds and return it.
+
+        ``opening_command`` (4, num_envs), in [-1, 1], for the valves of chambers P1, N1, P2, N2. ``user_force`` in N is
+        (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal share of the duration.
+        Raises ``ValueError`` for wrong shapes, values that are not finite or not allowed, and a duration that is not positive.
+        """
+        if not (isinstance(duration, Real) and math.isfinite(duration) and duration > 0):
+            raise ValueError(f"duration = {duration!r}; allowed: a positive number (s)")
+        command, forces = self._openings(opening_command), self._force_samples(user_force)
+        self.advance_unchecked(command, forces, float(duration))
+        return self.state
+
+    def advance_unchecked(self, command: Array, forces: Array, duration: float) -> None:
+        """``advance`` for arrays known to be right: command (4, num_envs), forces (K, 2, num_envs), contiguous float64."""
+        held = duration / forces.shape[0]
+        steps = max(1, math.ceil(held / dynamics.INTEGRATION_STEP - 1e-9))
+        dynamics.advance(self.state, command, forces, self.lane_parameters, steps, held / steps, self.impacts)
+
+    def mass_flows(self) -> Array:
+        """Flows of chambers P1, N1, P2, N2 now, kg/s, (8, num_envs): rows 0-3 from the supply, 4-7 to the atmosphere."""
+        flows = np.empty((8, self.num_envs))
+        dynamics.mass_flows(self.state, self.lane_parameters, flows)
+        return flows
+
+    @property
+    def piston(self) -> Array:
+        """Piston positions (y1, y2), m, (2, num_envs)."""
+        return self.state[[Y1, Y2]]
+
+    @property
+    def piston_speed(self) -> Array:
+        """Piston speeds (v1, v2), m/s, (2, num_envs)."""
+        return self.state[[V1, V2]]
+
+    @property
+    def pressures(self) -> Array:
+        """Pressures of chambers P1, N1, P2, N2, Pa absolute, (4, num_envs)."""
+        return self._state.take(PRESSURES, axis=0)
+
+    @property
+    def temperatures(self) -> Array:
+        """Temperatures of chambers P1, N1, P2, N2, K, (4, num_envs)."""
+        return self._state.take(TEMPERATURES, axis=0)
+
+    def end_effector(self) -> Array:
+        """Position and velocity of the end effector, (4, num_envs): x, y (m), vx, vy (m/s)."""
+        motion = np.empty((4, self.num_envs))
+        geometry.end_effector_motion(self.state, self.lane_parameters, motion)
+        return motion
+
+    def _openings(self, opening_command: ArrayLike) -> Array:
+        command = checked("opening_command", opening_command, (4, self.num_envs), "1")
+        if np.abs(command).max() > 1:
+            raise ValueError(f"opening_command reaches {np.abs(command).max():g}; allowed: -1 to 1")
+        return command
+
+    def _force_samples(self, user_force: ArrayLike) -> Array:
+        """The user's force as (K, 2, num_envs), from that shape with K >= 1 or from (2, num_envs)."""
+        try:
+            samples = np.shape(user_force)[:-2]
+        except ValueError:  # a ragged list, which ``checked`` refuses by name
+            samples = ()
+        several = samples if len(samples) == 1 and samples[0] > 0 else ()
+        return checked("user_force", user_force, (*several, 2, self.num_envs), "N").reshape(-1, 2, self.num_envs)
+
+    def _arguments(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> tuple[Array, Array, Array]:
+        return (
+            checked("state", state, (STATES, self.num_envs), "SI"),
+            self._openings(opening_command),
+            checked("user_force", user_force, (2, self.num_envs), "N"),
+        )
