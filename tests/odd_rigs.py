@@ -48,7 +48,7 @@ def written(seed: int) -> str:
 
 
 def _live(path: Path) -> None:
-    from birthsim_live.session import Session
+    from birthsim_live.rig.session import Session
 
     session = Session(load_parameters(path))
     session.reset()

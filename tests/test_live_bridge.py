@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from birthsim_env.parts.references import Circle, Hold, Trajectory
-from birthsim_live.bridge import Bridge, Course, Fade
+from birthsim_live.rig.bridge import Bridge, Course, Fade
 
 
 def differences(samples: np.ndarray, step: float) -> np.ndarray:

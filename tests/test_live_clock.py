@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from birthsim_live.clock import MOST_LAG, Clock, Pace
+from birthsim_live.rig.clock import MOST_LAG, Clock, Pace
 from tests.console import PATIENCE
 
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live import protocol
-from birthsim_live.protocol import parse
-from birthsim_live.settings import STIFFNESSES, Choices, combined, default_settings, merged
+from birthsim_live.rig.settings import STIFFNESSES, Choices, combined, default_settings, merged
+from birthsim_live.server import protocol
+from birthsim_live.server.protocol import parse
 
 CHOICES = Choices(Parameters())
 SETPOINTS = dict(zip(STIFFNESSES, (1500.0, 2500.0, 4000.0, 2000.0), strict=True))

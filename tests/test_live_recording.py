@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live import recording
-from birthsim_live.frames import COLUMNS, FIELDS, SLICES
-from birthsim_live.hand import Hold
-from birthsim_live.player import Player
-from birthsim_live.recording import EVERY, Recorder, Recording, load_recording
-from birthsim_live.session import Session
+from birthsim_live.rig import recording
+from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES
+from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.player import Player
+from birthsim_live.rig.recording import EVERY, Recorder, Recording, load_recording
+from birthsim_live.rig.session import Session
 
 RIG = Parameters().replace({"mechanics.mass": 2.5})
 

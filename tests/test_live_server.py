@@ -17,15 +17,15 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live import protocol
-from birthsim_live.addresses import is_loopback, listen
-from birthsim_live.frames import FIELDS, SLICES
-from birthsim_live.live_desk import LiveDesk
-from birthsim_live.player import Player
-from birthsim_live.recording import load_recording
-from birthsim_live.replay_desk import ReplayDesk
-from birthsim_live.server import create_app
-from birthsim_live.session import Session
+from birthsim_live.rig.frames import FIELDS, SLICES
+from birthsim_live.rig.player import Player
+from birthsim_live.rig.recording import load_recording
+from birthsim_live.rig.session import Session
+from birthsim_live.server import protocol
+from birthsim_live.server.addresses import is_loopback, listen
+from birthsim_live.server.app import create_app
+from birthsim_live.server.live_desk import LiveDesk
+from birthsim_live.server.replay_desk import ReplayDesk
 from tests.console import PATIENCE, call, run
 
 HERE = "http://127.0.0.1:8000"

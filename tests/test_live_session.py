@@ -16,12 +16,12 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live.bridge import Course
-from birthsim_live.frames import SLICES, frame_of
-from birthsim_live.hand import DRAG_DAMPING, DRAG_LIMIT, Hold, drag_force
-from birthsim_live.protocol import encode
-from birthsim_live.session import Session
-from birthsim_live.settings import default_settings
+from birthsim_live.rig.bridge import Course
+from birthsim_live.rig.frames import SLICES, frame_of
+from birthsim_live.rig.hand import DRAG_DAMPING, DRAG_LIMIT, Hold, drag_force
+from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import default_settings
+from birthsim_live.server.protocol import encode
 
 RIG = Parameters()
 

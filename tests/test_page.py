@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from birthsim_live.frames import SLICES
-from birthsim_live.recording import load_recording
+from birthsim_live.rig.frames import SLICES
+from birthsim_live.rig.recording import load_recording
 from tests import browser
 from tests.browser import NARROW, WIDE, Server, Window, displacement, rendered
 

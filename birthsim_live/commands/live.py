@@ -7,10 +7,10 @@ from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_env.physics.parameters import load_parameters
-from birthsim_live.addresses import listen
 from birthsim_live.commands.serving import add_address, need_server, serve
-from birthsim_live.live_desk import LiveDesk
-from birthsim_live.session import Session
+from birthsim_live.rig.session import Session
+from birthsim_live.server.addresses import listen
+from birthsim_live.server.live_desk import LiveDesk
 
 
 def main() -> None:

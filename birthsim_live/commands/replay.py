@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_live.addresses import listen
 from birthsim_live.commands.serving import add_address, need_server, serve
-from birthsim_live.player import Player
-from birthsim_live.recording import load_recording
-from birthsim_live.replay_desk import ReplayDesk
+from birthsim_live.rig.player import Player
+from birthsim_live.rig.recording import load_recording
+from birthsim_live.server.addresses import listen
+from birthsim_live.server.replay_desk import ReplayDesk
 
 
 def main() -> None:

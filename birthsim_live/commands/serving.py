@@ -7,8 +7,8 @@ import contextlib
 import socket
 from pathlib import Path
 
-from birthsim_live.addresses import LOOPBACK, is_loopback
-from birthsim_live.desk import Desk
+from birthsim_live.server.addresses import LOOPBACK, is_loopback
+from birthsim_live.server.desk import Desk
 
 LARGEST = 1 << 20
 """Bytes of a message that is still answered by an error; a larger one closes the socket."""
@@ -37,7 +37,7 @@ def need_server() -> None:
         import uvicorn  # noqa: F401
         import websockets  # noqa: F401  uvicorn's own import would name no extra
 
-        import birthsim_live.server  # noqa: F401
+        import birthsim_live.server.app  # noqa: F401
     except ImportError as error:
         raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
 
@@ -46,7 +46,7 @@ def serve(desk: Desk, listening: socket.socket, host: str, title: str, recording
     """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
     import uvicorn
 
-    from birthsim_live.server import create_app
+    from birthsim_live.server.app import create_app
 
     loopback = is_loopback(host)
     shown = f"[{host}]" if ":" in host else host

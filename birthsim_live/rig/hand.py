@@ -9,7 +9,7 @@ import numpy as np
 
 from birthsim_env.parts.user_forces import UserForce
 from birthsim_env.physics.lanes import Array
-from birthsim_live.bridge import Fade
+from birthsim_live.rig.bridge import Fade
 
 DRAG_LIMIT = 100.0
 """N, assumed: the person's hand pulls no harder, however far the pointer is. At 120 N downwards, more than cylinder 1 can

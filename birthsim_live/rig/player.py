@@ -6,8 +6,8 @@ from bisect import bisect_right
 from typing import Any
 
 from birthsim_env.physics.lanes import Array
-from birthsim_live.frames import SLICES, frame_of
-from birthsim_live.recording import EVENTS, Recording
+from birthsim_live.rig.frames import SLICES, frame_of
+from birthsim_live.rig.recording import EVENTS, Recording
 
 ROUNDING = 1e-6
 """Of the time between two rows: nearer to a row than that is at it."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.files import finite
-from birthsim_live.clock import SLOWEST
-from birthsim_live.settings import shown
+from birthsim_live.rig.clock import SLOWEST
+from birthsim_live.rig.settings import shown
 
 VERSION = 1
 

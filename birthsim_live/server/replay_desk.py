@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from birthsim_live import protocol
-from birthsim_live.desk import Desk
-from birthsim_live.player import Player
-from birthsim_live.settings import Choices
-from birthsim_live.windows import Window
+from birthsim_live.rig.player import Player
+from birthsim_live.rig.settings import Choices
+from birthsim_live.server import protocol
+from birthsim_live.server.desk import Desk
+from birthsim_live.server.windows import Window
 
 
 class ReplayDesk(Desk):

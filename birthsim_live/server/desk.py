@@ -13,12 +13,12 @@ import numpy as np
 
 from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live import protocol
-from birthsim_live.clock import Clock, Source
-from birthsim_live.hand import DRAG_LIMIT
-from birthsim_live.settings import Choices
-from birthsim_live.shapes import shapes
-from birthsim_live.windows import Window
+from birthsim_live.rig.clock import Clock, Source
+from birthsim_live.rig.hand import DRAG_LIMIT
+from birthsim_live.rig.settings import Choices
+from birthsim_live.server import protocol
+from birthsim_live.server.shapes import shapes
+from birthsim_live.server.windows import Window
 
 T = TypeVar("T")
 

@@ -16,11 +16,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from birthsim_live.addresses import LOOPBACK
-from birthsim_live.desk import Desk
-from birthsim_live.windows import Window
+from birthsim_live.server.addresses import LOOPBACK
+from birthsim_live.server.desk import Desk
+from birthsim_live.server.windows import Window
 
-PAGE = Path(__file__).resolve().parent / "page"
+PAGE = Path(__file__).resolve().parent.parent / "page"
 
 HEADERS = {
     "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",

@@ -8,7 +8,7 @@ import numpy as np
 
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.lanes import Array
-from birthsim_live.bridge import Fade
+from birthsim_live.rig.bridge import Fade
 
 TRANSITION = 0.05
 """s, assumed: setpoints that a person changes pass over in this time, with the rates that laws need."""

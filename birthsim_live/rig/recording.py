@@ -18,10 +18,10 @@ import numpy as np
 import birthsim_env
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live.frames import COLUMNS, FIELDS
+from birthsim_live.rig.frames import COLUMNS, FIELDS
 
 if TYPE_CHECKING:
-    from birthsim_live.session import Session
+    from birthsim_live.rig.session import Session
 
 FORMAT = "birthsim-recording-1"
 

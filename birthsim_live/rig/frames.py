@@ -14,7 +14,7 @@ from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.simulation import Simulation
-from birthsim_live.hand import Hands
+from birthsim_live.rig.hand import Hands
 
 FIELDS = {
     "time": 1,

@@ -12,7 +12,7 @@ from baselines.rivals.follower import Follower
 from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live.settings import RESIDUAL
+from birthsim_live.rig.settings import RESIDUAL
 
 DAMPED = (BacksteppingController, AdmittanceBackstepping, Follower)
 """Laws that can be told to damp more."""

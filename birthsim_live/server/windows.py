@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
-from birthsim_live.protocol import encode
+from birthsim_live.server.protocol import encode
 
 ANSWERS = 32
 """Answers (errors, pongs) that wait for a window; a window that floods loses its oldest."""

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_live import protocol
-from birthsim_live.clock import LOG
-from birthsim_live.controllers import build_controller
-from birthsim_live.desk import Desk
-from birthsim_live.hand import Hold
-from birthsim_live.recording import Recorder
-from birthsim_live.session import Session
-from birthsim_live.settings import combined
-from birthsim_live.windows import Window
+from birthsim_live.rig.clock import LOG
+from birthsim_live.rig.controllers import build_controller
+from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.recording import Recorder
+from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import combined
+from birthsim_live.server import protocol
+from birthsim_live.server.desk import Desk
+from birthsim_live.server.windows import Window
 
 
 class LiveDesk(Desk):

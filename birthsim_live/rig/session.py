@@ -17,14 +17,14 @@ from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, Array, p
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_env.simulation import Simulation
-from birthsim_live.bridge import Course
-from birthsim_live.controllers import as_action, build_controller, has_damping, openings
-from birthsim_live.frames import frame_of, row_of
-from birthsim_live.hand import Hands
-from birthsim_live.recording import Recorder
-from birthsim_live.sensing import ExchangeableSensors
-from birthsim_live.setpoints import Setpoints
-from birthsim_live.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
+from birthsim_live.rig.bridge import Course
+from birthsim_live.rig.controllers import as_action, build_controller, has_damping, openings
+from birthsim_live.rig.frames import frame_of, row_of
+from birthsim_live.rig.hand import Hands
+from birthsim_live.rig.recording import Recorder
+from birthsim_live.rig.sensing import ExchangeableSensors
+from birthsim_live.rig.setpoints import Setpoints
+from birthsim_live.rig.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
 
 PATH_POINTS = 400
 
