@@ -5,7 +5,8 @@
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
-# make scores measures what every environment pays, to laws and policies (some minutes)
+# make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
+# make moving compares the laws under hands that move
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -23,7 +24,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch golden clean
+.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -111,8 +112,12 @@ scores: $(READY)
 	cp $(OUT)/scores/scores.md docs/
 
 scratch: $(READY)
-	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
+	$(BIN)/python examples/learning_curves.py --env BirthSIM/Circle-v1 BirthSIM/Probe-v1 --out $(OUT)/scratch
 	cp $(OUT)/scratch/scratch.png docs/
+
+moving: $(READY)
+	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
+	cp $(OUT)/moving/comparison.md docs/moving.md
 
 golden: $(READY)
 	$(BIN)/python -m tests.golden.make
