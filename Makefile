@@ -15,7 +15,7 @@ OUT := out
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 WEEKLY := torchrl tensordict pyvers orjson importlib_metadata zipp "ray>=2.60,<3" dm-tree lz4 ormsgpack pyarrow pandas \
   filelock jsonschema jsonschema-specifications referencing rpds-py msgpack requests urllib3 idna certifi charset-normalizer \
-  pyyaml tensorboardX wrapt absl-py
+  click attrs packaging protobuf python-dateutil pytz tzdata six tensorboardX wrapt absl-py
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
