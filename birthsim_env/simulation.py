@@ -18,7 +18,7 @@ from birthsim_env.parts.seeding import STREAMS, stream
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import UserForce
+from birthsim_env.parts.user_forces import UserForce, forces_of
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
@@ -146,11 +146,8 @@ class Simulation:
         end_effector_motion(plant.state, plant.lane_parameters, motion)
         self.motion = motion
         times = self.time + self.period * np.arange(self._stride)[:, None]
-        force = self.user_force.force(times, motion[:2], motion[2:])
-        if self._stride == 1 and np.shape(force) == motion[:2].shape:
-            force = np.asarray(force)[None]
         # A copy: the hand may fill one array anew each time, and jumps are told from the old samples and the new.
-        self._forces = checked("user_force.force(...)", force, self._forces.shape, "N").copy()
+        self._forces = forces_of(self.user_force, times, motion[:2], motion[2:]).copy()
         self.reference = self.reference_at(self.time)
         self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
 

@@ -135,3 +135,35 @@ def test_looking_ahead_changes_nothing() -> None:
     demand(one)
     for _ in range(5):
         np.testing.assert_array_equal(one.step(np.zeros((3, 4)))[0], other.step(np.zeros((3, 4)))[0])
+
+
+class PerLane(UserForce):
+    """One force per lane, as a hand that depends on the position may return it."""
+
+    closed_loop = True
+
+    def force(self, time, position, velocity):
+        return np.stack([5.0 + 100.0 * (0.55 - position[0]), np.zeros(len(position[0]))])
+
+
+def test_a_force_per_lane_is_a_force():
+    env, own = (gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, user_force=hand) for hand in (PerLane(), held))
+    env.reset(seed=0), own.reset(seed=0)
+    np.testing.assert_allclose(demand(env), demand(own), rtol=1e-12)
+
+
+def held(time, position, velocity):
+    return 5.0 + 100.0 * (0.55 - position[0]), 0.0
+
+
+def test_looking_ahead_leaves_a_hand_with_a_memory_as_it_was():
+    observations = []
+    for looks in (True, False):
+        env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force="guided", duration=2.0)
+        env.reset(seed=1)
+        if looks:
+            demand(env)
+        for _ in range(150):
+            seen = env.step(np.zeros((2, 4)))[0]
+        observations.append(seen)
+    np.testing.assert_array_equal(*observations)

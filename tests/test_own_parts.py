@@ -210,3 +210,18 @@ def test_set_goes_to_those_that_have_it():
         with_options(["pid", "shut-valves"], ["gain=3"])
     with pytest.raises(ValueError, match=r"--set 'gain'; allowed: GAIN=VALUE"):
         with_options(["pid"], ["gain"])
+
+
+def with_a_default(time, size=4.0):
+    return size, 0.0
+
+
+def of_two(time, position):
+    return 0.0, 0.0
+
+
+def test_what_a_function_needs_says_how_it_is_asked():
+    assert hand_of(with_a_default, varied=False).closed_loop is False
+    assert hand_of(spring, varied=False).closed_loop is True
+    with pytest.raises(ValueError, match=r"user_force: a function of 2 arguments; allowed: a function of time"):
+        hand_of(of_two, varied=False)

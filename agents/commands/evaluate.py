@@ -12,7 +12,7 @@ from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import Evaluation, evaluate, overview, table
 from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number, whole
+from baselines.commands.shared import RANDOMIZE, check_world, policy_of, run, seed_number, whole
 from baselines.files import make_folder, write_json
 from baselines.registry import controller_names, make_controller
 from birthsim_env.parts.randomization import described
@@ -106,8 +106,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         "parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize],
         **environment_parts(arguments),
     }  # fmt: skip
-    # What cannot be is said before the folder is made and anything runs.
-    gymnasium.make_vec(arguments.env, **setting).reset(seed=arguments.seed)
+    check_world(arguments.env, **setting)
     folder, drawn = make_folder(arguments.out), described(rig, setting["randomize"])
     print(drawn)
     evaluations: list[Evaluation] = []

@@ -111,7 +111,8 @@ def _digest(folder: Path) -> str:
 def score_cell(
     controller: str, policy: str, environment: str, sensors: str, randomize: bool, episodes: int, seed: int, network: str
 ) -> Result:
-    """Figures of one controller in one environment under one condition."""
+    """Figures of one controller in one environment under one condition; ``policy`` is a shipped policy's folder or "", and its
+    ``network``'s hash only tells results of different policies apart."""
     rig = Parameters()
     law = make_controller("residual", rig, policy=SHIPPED / policy) if policy else make_controller(controller, rig)
     result = evaluate(environment, law, controller, episodes, seed, progress=False, sensors=sensors, randomize=randomize)

@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
-from baselines.commands.shared import RANDOMIZE, run, seed_number, whole
+from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
 from baselines.files import make_folder, write_json
 from birthsim_env.parts.randomization import described
 from birthsim_env.physics.parameters import Parameters, load_parameters
@@ -61,8 +61,7 @@ def _train(arguments: argparse.Namespace) -> None:
     if training.environment not in known:
         raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
     rig = load_parameters(arguments.parameters)
-    # What cannot be is said before a folder is made and anything runs.
-    gymnasium.make(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors).reset(seed=0)
+    check_world(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors)
     first = training.seed if arguments.seed is None else arguments.seed
     seeds = range(first, first + arguments.seeds)
     folders = [arguments.out / f"seed_{seed}" for seed in seeds]

@@ -7,10 +7,12 @@ controller stays on the target.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
 
+from birthsim_env.parts.user_forces import forces_of
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.lanes import Array
@@ -36,9 +38,10 @@ def demand(env: Any) -> Array:
     strength = spare * np.stack([[p[at.AREA_P1], p[at.AREA_P2]], [p[at.AREA_N1], p[at.AREA_N2]]])
     friction, viscous = np.stack([p[at.FC1], p[at.FC2]]), np.stack([p[at.FV1], p[at.FV2]])
     duration = env.steps * simulation.period * simulation.periods
+    hand = deepcopy(simulation.user_force)  # one with a memory must not remember this
     for instant in np.arange(0.0, duration, STEP):
         reference = simulation.reference_at(np.full(lanes, instant))
-        force = simulation.user_force.force(np.full((1, lanes), instant), reference.position, reference.velocity)[0]
+        force = forces_of(hand, np.full((1, lanes), instant), reference.position, reference.velocity)[0]
         place = reference.compliant_target(force)
         try:
             piston = inverse_geometry(place, rig)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from typing import Any
+
+import gymnasium
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
@@ -35,6 +38,15 @@ def seed_number(text: str) -> int:
     if not text.isdecimal() or int(text) >= 2**32:
         raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to {2**32 - 1}")
     return int(text)
+
+
+def check_world(environment: str, **arguments: Any) -> None:
+    """Raises ``ValueError`` for arguments with which no episode of an environment begins, before anything else is done."""
+    env: Any = gymnasium.make(environment, **arguments)
+    try:
+        env.reset(seed=0)
+    finally:
+        env.close()
 
 
 def policy_of(environment: str) -> str:

@@ -22,14 +22,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, Probes, run_probes
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import run, seed_number, whole
+from baselines.commands.shared import check_world, run, seed_number, whole
 from baselines.controller import Controller
 from baselines.files import make_folder, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
@@ -218,7 +217,7 @@ def _tune(arguments: argparse.Namespace) -> None:
         "controller": controller, **own, "seed": arguments.seed, "sensors": list(sensors), "lanes": arguments.lanes,
         "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start, "rig": rig.to_dict(),
     }  # fmt: skip
-    gymnasium.make("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own).reset(seed=WORLDS)  # says what cannot be
+    check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
     print(described(rig, True))
     path = arguments.out / "trials.json"
     trials = _stored(path, setting)[: arguments.trials]

@@ -105,7 +105,10 @@ def _spline(time: Array, breaks: Array, pieces: Array, rows: Array) -> None:
 
 
 class Through(Trajectory):
-    """Through positions (M, 2), m, at ``times`` (M,), s: a spline of degree 5, or as high as the points allow."""
+    """Through positions (M, 2), m, at ``times`` (M,), s, which increase: a spline of degree 5, or as high as M points allow.
+
+    At rest before the first and after the last. SciPy's spline: what another processor makes of it may differ by rounding.
+    """
 
     def __init__(self, times: Array, positions: Array) -> None:
         degree = min(5, (len(times) - 2) // 2 * 2 + 1)  # an odd one
@@ -146,8 +149,13 @@ class PlainHand(UserForce):
     EXPECTED = "a function of time (s), or of time, position (2,) and velocity (2,), that returns (Fx, Fy) in N"
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-        self.closed_loop = len(inspect.signature(function).parameters) > 1
+        takes = inspect.signature(function).parameters.values()
+        needed = [
+            one for one in takes if one.default is one.empty and one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
+        ]
+        if len(needed) not in (1, 3):
+            raise ValueError(f"user_force: a function of {len(needed)} arguments; allowed: {self.EXPECTED}")
+        self._function, self.closed_loop = function, len(needed) == 3
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
@@ -168,8 +176,11 @@ def _made(kind: str, part: Any, expected: str) -> Any:
         raise ValueError(f"{kind}: {part.__name__}() fails ({type(error).__name__}: {error}); allowed: {expected}") from error
 
 
-def trajectory_of(reference: Any, duration: float) -> Trajectory | None:
-    """What the argument ``reference`` says, as a ``Trajectory``; a function of time is asked for ``duration`` s."""
+def trajectory_of(reference: Any, duration: float) -> Trajectory:
+    """What the environments' argument ``reference`` says, as a ``Trajectory``; a function of time is asked for ``duration`` s.
+
+    Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
+    """
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
     if isinstance(reference, (str, Path)):
         if Path(reference).suffix.lower() == ".csv":
@@ -179,7 +190,7 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory | None:
             raise ValueError(f"reference = {str(reference)!r}; allowed: {expected}")
         reference = from_file("reference", str(reference))
     reference = _made("reference", reference, expected)
-    if reference is None or isinstance(reference, Trajectory):
+    if isinstance(reference, Trajectory):
         return reference
     if not callable(reference):
         raise ValueError(f"reference = {reference!r}; allowed: None, {expected}")
@@ -188,8 +199,12 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory | None:
     return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
 
 
-def hand_of(user_force: Any, varied: bool) -> UserForce | None:
-    """What the argument ``user_force`` says, as a ``UserForce``; a named one is ``varied`` from episode to episode or not."""
+def hand_of(user_force: Any, varied: bool) -> UserForce:
+    """What the environments' argument ``user_force`` says, as a ``UserForce``; a named one is ``varied`` from episode to
+    episode or not.
+
+    Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
+    """
     expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
     if isinstance(user_force, (str, Path)):
         if str(user_force) in HANDS:
@@ -201,7 +216,7 @@ def hand_of(user_force: Any, varied: bool) -> UserForce | None:
             raise ValueError(f"user_force = {str(user_force)!r}; allowed: {expected}")
         user_force = from_file("user_force", str(user_force))
     user_force = _made("user_force", user_force, expected)
-    if user_force is None or isinstance(user_force, UserForce):
+    if isinstance(user_force, UserForce):
         return user_force
     if not callable(user_force):
         raise ValueError(f"user_force = {user_force!r}; allowed: None, {expected}")

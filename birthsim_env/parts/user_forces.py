@@ -13,6 +13,7 @@ from birthsim_env.parts.seeding import Range, draw
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.plant import checked
 
 
 class UserForce:
@@ -40,6 +41,18 @@ class UserForce:
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         """Force on the end effector, N, (K, 2, N)."""
         raise NotImplementedError(f"{type(self).__name__}.force(time, position, velocity) is missing; it returns N, (K, 2, N)")
+
+
+def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
+    """What a hand pushes with, N, (K, 2, N), at ``time`` (K, N), s; ``position`` and ``velocity`` (2, N) in m and m/s.
+
+    A hand may return one force per lane, (2, N), for one instant. Raises ``ValueError`` for anything but finite numbers.
+    """
+    force = hand.force(time, position, velocity)
+    instants, lanes = time.shape
+    if instants == 1 and np.shape(force) == (2, lanes):
+        force = np.asarray(force)[None]
+    return checked("user_force.force(...)", force, (instants, 2, lanes), "N")
 
 
 @kernel
