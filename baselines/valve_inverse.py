@@ -11,6 +11,22 @@ from birthsim_env.physics.lanes import Array
 
 
 @helper
+def driving_flows(pressure: float, p: Array) -> tuple[float, float]:
+    """Flows per unit of conductance from the supply into a chamber, and from it to the atmosphere, Pa kg/m3, as believed.
+
+    No temperature is measured: all air counts as ambient. ``p`` (PARAMETERS,).
+    """
+    inverse, air, rho0 = 1.0 / pressure, p[at.COLDNESS], p[at.RHO0]
+    critical, knee, slope = p[at.CRITICAL], p[at.KNEE], p[at.LAMINAR]
+    return (
+        valves.driving_flow(p[at.SUPPLY], p[at.INVERSE_SUPPLY], air, pressure, inverse, air, rho0, critical, knee, slope),
+        valves.driving_flow(
+            pressure, inverse, air, p[at.ATMOSPHERE], p[at.INVERSE_ATMOSPHERE], air, rho0, critical, knee, slope
+        ),
+    )
+
+
+@helper
 def two_valve_openings(
     u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
     length_p: float, length_n: float, v: float, p: Array,
@@ -28,12 +44,8 @@ def two_valve_openings(
     )
     flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
     flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
-    # The controller measures no temperatures: all air counts as ambient.
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
-    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
-    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
-    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_p, drain_p = driving_flows(pp, p)
+    fill_n, drain_n = driving_flows(pn, p)
     u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
     u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
 
@@ -51,11 +63,8 @@ def one_valve_openings(
     stroke = length_p + length_n
     stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
     active = control_model.active_flow_for(rate, stiffness, v, stroke, index, gas_t)
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
-    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
-    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
-    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_p, drain_p = driving_flows(pp, p)
+    fill_n, drain_n = driving_flows(pn, p)
     opened = valves.opening_for_active_flow(
         active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / length_p, 0.5 * stroke / length_n, p[at.CONDUCTANCE],
         p[at.LEAKAGE],
@@ -80,11 +89,8 @@ def force_first_openings(
     pressurization = control_model.pressurization_flow_for(
         stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
     )
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
-    fill_p = valves.orifice_flow(1.0, p[at.SUPPLY], d, pp, d, p[at.CRITICAL])
-    drain_p = valves.orifice_flow(1.0, pp, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
-    fill_n = valves.orifice_flow(1.0, p[at.SUPPLY], d, pn, d, p[at.CRITICAL])
-    drain_n = valves.orifice_flow(1.0, pn, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill_p, drain_p = driving_flows(pp, p)
+    fill_n, drain_n = driving_flows(pn, p)
     c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
     to_p, to_n = (length_p + length_n) / length_p, (length_p + length_n) / length_n
     # Bounds of qT + qA and of qT - qA from what each chamber can get; a valve without driving pressure stays shut.
@@ -102,12 +108,10 @@ def force_first_openings(
 
 @kernel
 def _flow_ranges(pressures: Array, spools: Array, p: Array, least: Array, most: Array, present: Array) -> None:
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
     c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
     for chamber in range(4):
         for i in range(pressures.shape[1]):
-            fill = valves.orifice_flow(1.0, p[at.SUPPLY], d, pressures[chamber, i], d, p[at.CRITICAL])
-            drain = valves.orifice_flow(1.0, pressures[chamber, i], d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+            fill, drain = driving_flows(pressures[chamber, i], p)
             shut, spool = leak * (fill - drain), spools[chamber, i]
             least[chamber, i], most[chamber, i] = shut - c * max(drain, 0.0), shut + c * max(fill, 0.0)
             present[chamber, i] = shut + c * (max(spool, 0.0) * fill - max(-spool, 0.0) * drain)
@@ -125,11 +129,9 @@ def flow_ranges(pressures: Array, spools: Array, lane_parameters: Array) -> tupl
 
 @kernel
 def _openings_for_flows(flows: Array, pressures: Array, p: Array, openings: Array) -> None:
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
     for chamber in range(4):
         for i in range(pressures.shape[1]):
-            fill = valves.orifice_flow(1.0, p[at.SUPPLY], d, pressures[chamber, i], d, p[at.CRITICAL])
-            drain = valves.orifice_flow(1.0, pressures[chamber, i], d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+            fill, drain = driving_flows(pressures[chamber, i], p)
             openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p[at.CONDUCTANCE], p[at.LEAKAGE])
 
 

@@ -78,10 +78,10 @@ def _describe(
             state[at.PP2, i], state[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], half2 + y2, half2 - y2, p[at.INDEX, i]
         )
         rows[38, i] = (
-            max(dynamics.supplied_flow(state, p, i, at.PP1, at.TP1, at.S1P), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, at.PN1, at.TN1, at.S1N), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, at.PP2, at.TP2, at.S2P), 0.0)
-            + max(dynamics.supplied_flow(state, p, i, at.PN2, at.TN2, at.S2N), 0.0)
+            max(dynamics.flows_of(state, p, i, at.PP1, at.TP1, at.S1P)[0], 0.0)
+            + max(dynamics.flows_of(state, p, i, at.PN1, at.TN1, at.S1N)[0], 0.0)
+            + max(dynamics.flows_of(state, p, i, at.PP2, at.TP2, at.S2P)[0], 0.0)
+            + max(dynamics.flows_of(state, p, i, at.PN2, at.TN2, at.S2N)[0], 0.0)
         )
 
 

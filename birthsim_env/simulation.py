@@ -1,16 +1,40 @@
 """N lanes of a scenario: plant, sensors, reference, hand and stiffness setpoints on one clock.
 
-The environments are thin faces of this class. Time counts in control periods; the state is integrated between control
-instants, and at each of them reference, user force and measurement belong to the same instant.
+The environments are thin faces of this class. A control period is a fixed order of stages: the actuation opens the valves, the
+plant moves, and then reference, hand and sensors are brought to the new instant. What comes with the package is compiled, and
+all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import (
+    ACTION,
+    ASKED,
+    FORCE,
+    IMPACT,
+    MOTION,
+    OPENING,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    REFERENCE,
+    SHOWN,
+    SINCE_JUMP,
+    STATE,
+    TICK,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+)
+from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.world import jump_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.randomization import Ranges, draw_parameters
 from birthsim_env.parts.references import Trajectory
@@ -19,7 +43,6 @@ from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.user_forces import UserForce, forces_of
-from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
@@ -36,10 +59,11 @@ class Simulation:
     """``num_envs`` lanes under one actuation, ``periods`` control periods per policy step.
 
     After ``begin`` and after every ``step`` the attributes describe the present instant: ``time`` (N,) s since each lane's
-    episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``reference`` and ``measurement``; ``since_jump``
-    (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded; ``impacts`` (2, N) m/s, the fastest
-    collision of each piston with an end stop during the last step. ``period`` is that of control, s, and ``periods`` how many
-    of them make a policy step.
+    episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``force`` (2, N) the hand's, N; ``reference`` and
+    ``measurement``; ``since_jump`` (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded;
+    ``impacts`` (2, N) m/s, the fastest collision of each piston with an end stop during the last step. ``period`` is that of
+    control, s, and ``periods`` how many of them make a policy step. ``closing`` stages run at the end of a policy step.
+    ``threads`` share the lanes.
     """
 
     def __init__(
@@ -53,6 +77,7 @@ class Simulation:
         sensors: str,
         actuation: Actuation,
         periods: int,
+        threads: int = 1,
     ) -> None:
         self.parameters = parameters
         self.plant = Plant(parameters, num_envs)
@@ -63,24 +88,68 @@ class Simulation:
         for part in (trajectory, user_force, stiffness):
             part.prepare(num_envs)
         self.period = parameters.electronics.control_period
-        self.ticks: NDArray[np.int64] = np.zeros(num_envs, dtype=np.int64)
-        self.time: Array = np.zeros(num_envs)
-        self.motion: Array = np.zeros((4, num_envs))
-        self.since_jump: Array = np.zeros(num_envs)
+        self.periods, self.threads = periods, threads
+        self.closing: list[Stage] = []
+        self.action: Array = np.zeros((actuation.size, num_envs))
+        self._tick, self._since = np.zeros((1, num_envs)), np.zeros((1, num_envs))
+        self._motion, self._force, self._jumps = np.zeros((4, num_envs)), np.zeros((2, num_envs)), np.zeros((5, num_envs))
         self.impacts: Array = np.zeros((2, num_envs))
-        self.openings: Array = np.zeros((4, num_envs))
-        self.periods = periods
-        self.reference = Reference(np.zeros((REFERENCES, num_envs)))
-        self.measurement: Measurement
-        stepwise = actuation.every_period or self.sensors.sampled or user_force.closed_loop
-        self._stride, self._strides = (1, periods) if stepwise else (periods, 1)
+        self._openings: Array = np.zeros((4, num_envs))
+        self._seen: Array = np.zeros((ASKED, num_envs))
+        self._samples: Array = np.zeros((0, 2, num_envs))
+        self._sample = 0
         self._ranges, self._begun = ranges, False
-        self._forces: Array = np.zeros((self._stride, 2, num_envs))
+        self._loops: list[Loop | Callable[[], None]] = []
+        self._look: list[Loop | Callable[[], None]] = []
+        self._closing: Loop | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the loops, which know addresses."""
+        return {**self.__dict__, "_loops": [], "_look": [], "_closing": None}
+
+    @property
+    def time(self) -> Array:
+        """s since each lane's episode began, (N,)."""
+        return self._seen[TIME].copy()
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """Control periods since each lane's episode began, (N,)."""
+        return self._tick[0].astype(np.int64)
+
+    @property
+    def motion(self) -> Array:
+        """True x, y (m), vx, vy (m/s) of the end effector, (4, N)."""
+        return self._motion.copy()
 
     @property
     def force(self) -> Array:
         """User force now, N, (2, N)."""
-        return np.asarray(self._forces[0])
+        return self._force.copy()
+
+    @property
+    def since_jump(self) -> Array:
+        """s since force or stiffness setpoint jumped, (N,)."""
+        return self._since[0].copy()
+
+    @property
+    def openings(self) -> Array:
+        """Openings of the valves of chambers P1, N1, P2, N2 as last commanded, (4, N)."""
+        return self._openings.copy()
+
+    @property
+    def reference(self) -> Reference:
+        """What is asked for now."""
+        return Reference(self._seen[REFERENCE:ASKED].copy())
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the sensors say now."""
+        rows = self._seen[:REFERENCE].copy()
+        return Measurement(
+            rows[TIME], rows[POSITION:POSITION_TIME], rows[POSITION_TIME], rows[VELOCITY:PRESSURE], rows[PRESSURE:USER_FORCE],
+            rows[USER_FORCE:REFERENCE], self.sensors.sampled,
+        )  # fmt: skip
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
@@ -101,11 +170,8 @@ class Simulation:
             self.stiffness.begin(lane, world["stiffness"])
             self.sensors.begin(lane, world["sensors"])
         self.actuation.begin(lanes)
-        self.ticks[lanes] = 0
-        self.since_jump[lanes] = 0.0
-        self.impacts[:, lanes] = 0.0
-        # Not in place: an actuation may keep the array that it returned.
-        self.openings = np.where(lanes, 0.0, self.openings)
+        self._tick[:, lanes], self._seen[TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
+        self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
         self._check_reference(chosen, duration)
         rows = self.reference_at(np.zeros(len(lanes))).rows[:, chosen]
         start, speed = rows[0:2], rows[2:4]
@@ -120,36 +186,102 @@ class Simulation:
         pistons_at(np.concatenate([start, speed]), self.nominal, joints)
         own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
-        self._look()
+        end_effector_motion(self.plant.state, self.plant.lane_parameters, self._motion)
+        self._assemble()
+        self._samples = self._samples[:0]
+        for part in self._look:
+            self._run(part, 1)
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
+        self.action[:] = actions
         self.actuation.accept(actions)
-        impacts = np.zeros_like(self.impacts)
-        for _ in range(self._strides):
-            self.openings = self.actuation.openings(self.plant, self.measurement, self.reference)
-            self.plant.advance_unchecked(self.openings, self._forces, self._stride * self.period)
-            np.maximum(impacts, self.plant.impacts, out=impacts)
-            self.ticks += self._stride
-            forces, setpoints = self._forces, self.reference.rows
-            self._look()
-            _track_jumps(
-                forces, self._forces, setpoints, self.reference.rows, self.period, self.user_force.jump_rate, self.since_jump
-            )
-        self.impacts = impacts
+        self.impacts[:] = 0.0
+        if not self._loops:
+            self._assemble()
+        if self._closing is None:
+            self._run(self._loops[0], self.periods)
+            return
+        for period in range(self.periods):
+            for part in self._loops:
+                if period == 0 or part != self._ask or self.actuation.every_period:
+                    self._run(part, 1)
+        self._run(self._closing, 1)
 
-    def _look(self) -> None:
-        """Bring every attribute but ``since_jump`` and ``impacts`` to the present instant."""
-        plant = self.plant
-        self.time = self.ticks.astype(np.float64) * self.period
-        motion = np.empty_like(self.motion)
-        end_effector_motion(plant.state, plant.lane_parameters, motion)
-        self.motion = motion
-        times = self.time + self.period * np.arange(self._stride)[:, None]
-        # A copy: the hand may fill one array anew each time, and jumps are told from the old samples and the new.
-        self._forces = forces_of(self.user_force, times, motion[:2], motion[2:]).copy()
-        self.reference = self.reference_at(self.time)
-        self.measurement = self.sensors.measure(self.ticks, self.time, motion, plant.pressures, self._forces[0])
+    def _run(self, part: Loop | Callable[[], None], periods: int) -> None:
+        if not isinstance(part, Loop):
+            part()
+        elif part.run(periods, self.threads):
+            self.actuation.explain(self.measurement, self.reference)
+
+    def _assemble(self) -> None:
+        """Bring the loops up to the parts: what is compiled and stands side by side runs in one call."""
+        looking: list[Stage | Callable[[], None]] = [
+            *self._compiled(self.trajectory, "sample", self._follow),
+            *self._compiled(self.stiffness, "sample", self._set),
+            *self._compiled(self.user_force, "force", self._push),
+        ]
+        rate, sensors = self.user_force.jump_rate, self.sensors.stage()
+        acting: list[Stage | Callable[[], None]] = [*self._acting(), plant_stage(self.period)]
+        stages = [*acting, *looking, jump_stage(self.period, rate, self._jumps, begins=False), sensors]
+        alone = all(isinstance(stage, Stage) for stage in stages)
+        self._loops = self._join(stages, self.closing if alone else ())
+        self._closing = None if alone else self._join([], self.closing)[0]
+        self._look = self._join([*looking, jump_stage(self.period, rate, self._jumps, begins=True), sensors])
+
+    def _acting(self) -> list[Stage | Callable[[], None]]:
+        compiled = getattr(self.actuation, "stages", None)
+        return [*compiled()] if compiled else [self._ask]
+
+    @staticmethod
+    def _compiled(part: Any, method: str, instead: Callable[[], None]) -> list[Stage | Callable[[], None]]:
+        """The stage of a part, unless a class that derives from a compiled one has changed ``method``."""
+        for kind in type(part).__mro__:
+            if "stage" in vars(kind):
+                return [part.stage()]
+            if method in vars(kind):
+                break
+        return [instead]
+
+    def _join(self, stages: list[Stage | Callable[[], None]], closing: Sequence[Stage] = ()) -> list[Loop | Callable[[], None]]:
+        plant, lanes = self.plant, self.plant.num_envs
+        world = [(plant.lane_parameters, 0), (plant.state, STATE), (self.impacts, IMPACT), (self._motion, MOTION)]
+        world += [(self._force, FORCE), (self._since, SINCE_JUMP), (self._tick, TICK)]
+        seen = [(self._seen, 0), (self.action, ACTION), (self._openings, OPENING)]
+        shown = getattr(self.actuation, "shown", None)
+        if shown is not None:
+            seen.append((shown, SHOWN))
+        loops: list[Loop | Callable[[], None]] = []
+        waiting: list[Stage] = []
+        for stage in stages:
+            if isinstance(stage, Stage):
+                waiting.append(stage)
+                continue
+            if waiting:
+                loops.append(Loop(lanes, world, seen, waiting))
+            loops.append(stage)
+            waiting = []
+        # The last of them, the sensors, are always compiled.
+        return [*loops, Loop(lanes, world, seen, waiting, closing)]
+
+    def _ask(self) -> None:
+        self._openings[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+
+    def _follow(self) -> None:
+        self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)
+
+    def _set(self) -> None:
+        self._seen[REFERENCE + 8 : ASKED] = self.stiffness.sample(self.time)
+
+    def _push(self) -> None:
+        self._sample += 1
+        if self._sample >= len(self._samples):
+            # A hand that does not feel the rig is asked for a policy step at once.
+            count = 1 if self.user_force.closed_loop else self.periods
+            times = (self._tick + np.arange(count)[:, None]) * self.period
+            self._samples = forces_of(self.user_force, times, self._motion[:2].copy(), self._motion[2:].copy()).copy()
+            self._sample = 0
+        self._force[:] = self._samples[self._sample]
 
     def reference_at(self, time: Array) -> Reference:
         """What is asked for at ``time`` (N,) of the present episodes, s."""
@@ -191,21 +323,3 @@ class Simulation:
                     inverse_geometry(points[:, k], self.parameters)
                 except ValueError as error:
                     raise ValueError(f"reference at {instant:.3g} s: {error}") from error
-
-
-@kernel
-def _track_jumps(
-    forces: Array, later: Array, setpoints: Array, new: Array, period: float, jump_rate: float, since: Array
-) -> None:
-    """Adds the held time to ``since`` (N,), starting anew where the force changes faster than ``jump_rate``, N/s, or a
-    closed-loop setpoint changes at all."""
-    samples = forces.shape[0]
-    for i in range(since.shape[0]):
-        for k in range(samples):
-            since[i] += period
-            for axis in range(2):
-                after = forces[k + 1, axis, i] if k + 1 < samples else later[0, axis, i]
-                if abs(after - forces[k, axis, i]) > jump_rate * period:
-                    since[i] = 0.0
-        if setpoints[8, i] != new[8, i] or setpoints[9, i] != new[9, i] or setpoints[14, i] != new[14, i]:
-            since[i] = 0.0

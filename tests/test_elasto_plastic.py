@@ -46,7 +46,7 @@ def rate(v: float, z: float, level: float, ratio: float = RATIO, sine: bool = Fa
 
 @given(v=st.floats(-10, 10), z=st.floats(-6e-4, 6e-4), level=st.floats(0.5, 40), ratio=st.floats(0.01, 0.9))
 def test_rate_is_the_papers_below_the_limit_and_held_above(v: float, z: float, level: float, ratio: float) -> None:
-    got = friction.bristle_rate_by_law(v, z, level, S0, False, ratio, 1 / (1 - ratio))
+    got = friction.bristle_rate_by_law(v, z, 1 / level, S0, False, ratio, 1 / (1 - ratio))
     held = min(1.0, 5000 * level / (S0 * abs(v))) if v != 0 else 1.0
     assert got == pytest.approx(rate(v, z, level, ratio) * held, rel=1e-9, abs=1e-9)
 

@@ -236,7 +236,7 @@ def test_steady_friction_takes_energy_at_every_speed(v: float, cylinder: int) ->
     level = friction.stribeck_level(v, FC[cylinder], FS[cylinder], VS)
     z = friction.steady_deflection(v, level, S0)
     lugre = friction.lugre_force(v, z, friction.bristle_rate(v, z, level, S0), S0, S1, FV)
-    coulomb = friction.coulomb_force(v, FC[cylinder], FV, 0.002)
+    coulomb = friction.coulomb_force(v, FC[cylinder], FV, 1 / 0.002)
     least = FV * v * v
     assert lugre * v >= least
     assert coulomb * v >= least
@@ -255,3 +255,10 @@ def test_friction_takes_energy_over_a_cycle(law: str) -> None:
         z, work = z + step * rate, work + (step * force * v if k >= turn else 0.0)
     assert np.all(work > 0)
     assert np.all(work[0, 4:] > 4 * amplitude[4:] * FC[0]), "at least Coulomb's rectangle once it slides"
+
+
+@given(v=st.floats(-3, 3), coulomb=st.floats(0, 40), extra=st.floats(0, 20), stribeck_speed=st.floats(1e-3, 0.1))
+def test_inverse_level_is_one_over_the_level(v: float, coulomb: float, extra: float, stribeck_speed: float) -> None:
+    level = friction.stribeck_level(v, coulomb, coulomb + extra, stribeck_speed)
+    weakness = friction.inverse_level(v, coulomb, coulomb + extra, stribeck_speed)
+    assert weakness == pytest.approx(1 / max(level, friction.SMALLEST_LEVEL), rel=1e-13)

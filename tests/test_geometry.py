@@ -108,7 +108,7 @@ def test_equation_1_follows_from_the_triangle() -> None:
     w, root = r4_squared - d3**2 - d6**2, 2 * d3 * d6 * sp.cos(gamma3 - theta)
     assert sp.simplify(w - 2 * d3 * d6 * sp.sin(gamma3 - theta)) == 0
     assert sp.simplify(geometry.s_squared.py_func(w, 2 * d3 * d6) - root**2) == 0
-    arguments = (w, root, 2 * d3 * d6, sp.sin(gamma3), sp.cos(gamma3))
+    arguments = (w, root, 1 / (2 * d3 * d6), sp.sin(gamma3), sp.cos(gamma3))
     assert sp.simplify(geometry.sin_theta1.py_func(*arguments) - sp.sin(theta)) == 0
     assert sp.simplify(geometry.cos_theta1.py_func(*arguments) - sp.cos(theta)) == 0
     to_o3 = d3 * sp.Matrix([sp.cos(gamma3), sp.sin(gamma3)]) - attachment

@@ -51,9 +51,9 @@ def test_equation_5_is_lagranges_equation() -> None:
     """With 40 digits at random points: the package's own lines, fed with symbols, satisfy Lagrange's equations."""
     symbols, q, equations = lagranges_equations()
     m, g, f1, f2, r4, r2, v1, v2 = symbols[3:-2]
-    kappa = geometry.amplification.py_func(r2, r4, q["S"])
-    ours1 = mechanics.acceleration1.py_func(f1, v1, v2, r2, r4, q["w"], q["S"] ** 2, kappa, sp.sin(q["theta"]), m, g)
-    ours2 = mechanics.acceleration2.py_func(f2, v1, r2, r4, q["S"] ** 2, sp.cos(q["theta"]), m, g)
+    kappa = geometry.amplification.py_func(r2, r4, 1 / q["S"])
+    ours1 = mechanics.acceleration1.py_func(f1, v1, v2, r2, r4, q["w"], q["S"] ** 2, kappa, sp.sin(q["theta"]), 1 / m, g)
+    ours2 = mechanics.acceleration2.py_func(f2, v1, r2, r4, q["S"] ** 2, sp.cos(q["theta"]), 1 / m, g)
     accelerations = sp.lambdify(symbols[:-2], [ours1, ours2], "mpmath", cse=True)
     residuals = sp.lambdify(symbols, equations, "mpmath", cse=True)
     rng = np.random.default_rng(0)

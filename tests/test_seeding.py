@@ -124,7 +124,9 @@ def test_draws_stay_inside_their_ranges_and_fill_them_independently():
     # Static friction follows the Coulomb level by a fixed ratio; all else keeps its nominal value.
     np.testing.assert_allclose(drawn["fs1"], 1.33 * drawn["fc1"])
     np.testing.assert_allclose(drawn["fs2"], 1.33 * drawn["fc2"])
-    for name in set(PARAMETER_NAMES) - set(COLUMNS.values()) - {"fs1", "fs2"}:
+    np.testing.assert_array_equal(drawn["spool_rate"], 1 / drawn["tau"])
+    np.testing.assert_array_equal(drawn["inverse_mass"], 1 / drawn["mass"])
+    for name in set(PARAMETER_NAMES) - set(COLUMNS.values()) - {"fs1", "fs2", "spool_rate", "inverse_mass"}:
         np.testing.assert_array_equal(drawn[name], nominal[name], err_msg=name)
 
 
@@ -134,7 +136,11 @@ def test_a_mapping_draws_just_its_parameters_and_a_new_value_each_episode():
     assert 3.99 < drawn["mass"].max() <= 4.0
     assert 6e5 <= drawn["supply"].min() < 6.05e5
     assert 7.95e5 < drawn["supply"].max() <= 8e5
-    assert all(np.ptp(values) == 0 for name, values in drawn.items() if name not in ("mass", "supply"))
+    assert all(
+        np.ptp(values) == 0
+        for name, values in drawn.items()
+        if name not in ("mass", "inverse_mass", "supply", "inverse_supply")
+    )
     env = gymnasium.make("BirthSIM/Probe-v1", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
     masses = []
     for seed in (0, None, None, 0):

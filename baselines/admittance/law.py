@@ -145,9 +145,9 @@ def command(
         jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, share_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
         rate1 += p[at.FV1] * mechanics.acceleration1(
-            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity
+            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity
         )  # fmt: skip
-        rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, m, gravity)
+        rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
         rate1, rate2 = rate1 - told[2, i], rate2 - told[3, i]
         pressure_openings(
             u, 0, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p

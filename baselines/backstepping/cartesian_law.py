@@ -104,8 +104,8 @@ def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, wid
 
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
         # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
-        rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity)
-        rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, m, gravity)
+        rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
+        rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
         pressure_openings(
             u, i, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p
         )

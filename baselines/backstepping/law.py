@@ -195,7 +195,7 @@ def law(
         drag2 = p[at.FC2] * smooth_sign(v2, width) + p[at.FV2] * v2
         load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - drag1 + believed[0, i]
         load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - drag2 + believed[1, i]
-        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, m, gravity)
+        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
         neglected = gravity * cosine + r2 * turn * turn
         a2 = load2 / m + compensate * neglected
         turn_rate = turn * (v1 / r4 + pole * v1) - 2.0 * r4 * a1 / root

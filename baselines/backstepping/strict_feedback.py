@@ -27,16 +27,16 @@ def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, n
         )
         outside1 = p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1])
         outside2 = p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2])
-        net1 = f1 - outside1 - friction.coulomb_force(v1, p[at.FC1], p[at.FV1], p[at.SIGN_SPEED])
-        net2 = f2 - outside2 - friction.coulomb_force(v2, p[at.FC2], p[at.FV2], p[at.SIGN_SPEED])
-        neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.MASS], p[at.GRAVITY])
+        net1 = f1 - outside1 - friction.coulomb_force(v1, p[at.FC1], p[at.FV1], p[at.SIGN_SLOPE])
+        net2 = f2 - outside2 - friction.coulomb_force(v2, p[at.FC2], p[at.FV2], p[at.SIGN_SLOPE])
+        neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY])
         lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
         rates[0, i] = v2
         rates[1, i] = net2 / p[at.MASS] + neglected_share * neglected[i]
         rates[2, i] = control_model.force_rate(u[0, i], k2, v2, lp2 + ln2, index, gas_t)
         rates[3, i] = control_model.stiffness_rate(f2, k2, v2, u[0, i], u[1, i], lp2, ln2, index, gas_t)
         rates[4, i] = v1
-        rates[5, i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS], p[at.GRAVITY])
+        rates[5, i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
         rates[6, i] = control_model.force_rate(u[2, i], k1, v1, lp1 + ln1, index, gas_t)
         rates[7, i] = control_model.stiffness_rate(f1, k1, v1, u[2, i], u[3, i], lp1, ln1, index, gas_t)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.valve_inverse import driving_flows
 from birthsim_env.parts.signals import Mask
 from birthsim_env.physics import control_model, exact, valves
 from birthsim_env.physics import lanes as at
@@ -22,12 +23,10 @@ def predicted_pressure(
     pressure: float, opening: float, area: float, length: float, length_rate: float, period: float, p: Array
 ) -> float:
     """Pressure of a chamber after one period of a valve's ``opening``, Pa, by (6); ``length`` is that of its air, m."""
-    # The controller measures no temperatures: all air counts as ambient.
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
     supply = valves.supply_conductance(opening, p[at.CONDUCTANCE], p[at.LEAKAGE])
     exhaust = valves.exhaust_conductance(opening, p[at.CONDUCTANCE], p[at.LEAKAGE])
-    flow = valves.orifice_flow(supply, p[at.SUPPLY], d, pressure, d, p[at.CRITICAL])
-    flow -= valves.orifice_flow(exhaust, pressure, d, p[at.ATMOSPHERE], d, p[at.CRITICAL])
+    fill, drain = driving_flows(pressure, p)
+    flow = supply * fill - exhaust * drain
     whole, gas_t = max(length, 0.0) + p[at.DEAD_VOLUME] / area, p[at.GAS] * p[at.TEMPERATURE]
     filled = period * control_model.polytropic_rate_p(pressure, flow, 0.0, area, whole, p[at.INDEX], gas_t)
     pressed = period * control_model.polytropic_rate_p(pressure, 0.0, length_rate, area, whole, p[at.INDEX], gas_t)

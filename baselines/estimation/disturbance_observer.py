@@ -47,8 +47,8 @@ def _update(
             + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
             + believed[1, i]
         )
-        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS], p[at.GRAVITY])
-        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.MASS], p[at.GRAVITY])
+        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
+        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY])
         off1, off2 = v1 - estimate[0, i], v2 - estimate[1, i]
         estimate[0, i] += period * (a1 + estimate[2, i] + 2.0 * bandwidth * off1)
         estimate[1, i] += period * (a2 + estimate[3, i] + 2.0 * bandwidth * off2)

@@ -97,8 +97,11 @@ def _update(
             + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
             + believed[1, i]
         )
-        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS], p[at.GRAVITY]) + estimate[4, i]
-        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.MASS], p[at.GRAVITY]) + estimate[5, i]
+        a1 = (
+            mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
+            + estimate[4, i]
+        )
+        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY]) + estimate[5, i]
         estimate[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
         estimate[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
         estimate[2, i] = v1 + period * a1

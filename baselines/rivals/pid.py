@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 
 from baselines.rivals.feedforward import FORCE1, KAPPA
 from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.valve_inverse import driving_flows
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
 from birthsim_env.physics.compilation import helper, kernel
@@ -59,7 +60,6 @@ def command(
     """Writes ``openings`` (4, N) and carries ``integral`` (2, N), N, on. The signals are those of ``Follower``."""
     index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
     low, high = p[at.ATMOSPHERE], p[at.SUPPLY]
-    d = valves.density_factor(p[at.TEMPERATURE], p[at.RHO0], p[at.T0])
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
@@ -78,10 +78,7 @@ def command(
             pp_set, pn_set = pressure_setpoints(given, target[10 + cylinder, i], ap, an, lp, ln, index, low, high)
             flow_p = flow_for(pressure_gain * (pp_set - pp), pp, ap, lp, v, index, gas_t)
             flow_n = flow_for(pressure_gain * (pn_set - pn), pn, an, ln, -v, index, gas_t)
-            fill_p = valves.orifice_flow(1.0, high, d, pp, d, p[at.CRITICAL])
-            drain_p = valves.orifice_flow(1.0, pp, d, low, d, p[at.CRITICAL])
-            fill_n = valves.orifice_flow(1.0, high, d, pn, d, p[at.CRITICAL])
-            drain_n = valves.orifice_flow(1.0, pn, d, low, d, p[at.CRITICAL])
+            (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
             up = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
             un = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
             openings[row, i], openings[row + 1, i] = up, un

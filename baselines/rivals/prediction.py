@@ -62,9 +62,9 @@ class ControlModel:
         w = r4 * r4 - (g.d3**2 + g.d6**2)
         s2 = plain(geometry.s_squared)(w, product)
         root = self.casadi.sqrt(s2)
-        kappa = plain(geometry.amplification)(r2, r4, root)
+        kappa = plain(geometry.amplification)(r2, r4, 1 / root)
         angles = (plain(geometry.sin_theta1), plain(geometry.cos_theta1))
-        return r4, r2, w, s2, kappa, *(angle(w, root, product, sine, cosine) for angle in angles)
+        return r4, r2, w, s2, kappa, *(angle(w, root, 1 / product, sine, cosine) for angle in angles)
 
     def lengths(self, cylinder: Cylinder, y: Any) -> tuple[Any, Any]:
         """Lp and Ln, m, of a piston that an end stop keeps from leaving its stroke: nothing else in the model does."""
@@ -91,8 +91,8 @@ class ControlModel:
             rate_p = plain(control_model.polytropic_rate_p)(pp, qp, v[i], ap, lengths[0] + dead / ap, index, gas_t)
             rate_n = plain(control_model.polytropic_rate_n)(pn, qn, v[i], an, lengths[1] + dead / an, index, gas_t)
             pressure_rates += [rate_p / PRESSURE, rate_n / PRESSURE]
-        a1 = plain(mechanics.acceleration1)(loads[0], *v, r2, r4, w, s2, kappa, sine, mass, gravity)
-        a2 = plain(mechanics.acceleration2)(loads[1], v[0], r2, r4, s2, cosine, mass, gravity)
+        a1 = plain(mechanics.acceleration1)(loads[0], *v, r2, r4, w, s2, kappa, sine, 1 / mass, gravity)
+        a2 = plain(mechanics.acceleration2)(loads[1], v[0], r2, r4, s2, cosine, 1 / mass, gravity)
         return self.casadi.vertcat(*v, a1, a2, *pressure_rates)
 
     def step(self, state: Any, flows: Any, commanded: Any, force: Any, unseen: Any, time: float) -> tuple[Any, Any]:

@@ -6,15 +6,19 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
+from birthsim_env.loop.rows import ACTION, OPENING, SEEN, STATE, WORLD
+from birthsim_env.loop.stage import Stage, block, numbers
 from birthsim_env.parts.signals import Mask, Measurement, Reference
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
 from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.dynamics import driving_flows
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import Plant
 
@@ -54,6 +58,16 @@ class Forgetful:
         return np.empty((0, 0))
 
 
+@kernel
+def _valve_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constant: 1 with one valve per cylinder."""
+    s, one_valve = block(seen, SEEN), numbers(constants, 1)[0] > 0.0
+    for i in range(n):
+        for valve in range(4):
+            s[OPENING + valve, i] = s[ACTION + valve, i] if not one_valve else (1 - 2 * (valve % 2)) * s[ACTION + valve // 2, i]
+    return 0
+
+
 class ValveActuation(Forgetful):
     """The action is the spool opening: voltage = 5 V + 5 V x action. One entry per valve."""
 
@@ -74,20 +88,19 @@ class ValveActuation(Forgetful):
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         return self._openings
 
+    def stages(self) -> list[Stage]:
+        """``openings``, compiled into the closed loop."""
+        return [Stage(_valve_stage, np.array([float(self._one_valve)]), sees_world=False)]
+
 
 @kernel
 def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
     for i in range(state.shape[1]):
-        source = valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
-        full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * source
+        full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * p[at.RHO0, i] * math.sqrt(p[at.COLDNESS, i])
         for cylinder in range(2):
             pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
-            dp = valves.density_factor(state[tp, i], p[at.RHO0, i], p[at.T0, i])
-            dn = valves.density_factor(state[tn, i], p[at.RHO0, i], p[at.T0, i])
-            fill_p = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pp, i], dp, p[at.CRITICAL, i])
-            drain_p = valves.orifice_flow(1.0, state[pp, i], dp, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
-            fill_n = valves.orifice_flow(1.0, p[at.SUPPLY, i], source, state[pn, i], dn, p[at.CRITICAL, i])
-            drain_n = valves.orifice_flow(1.0, state[pn, i], dn, p[at.ATMOSPHERE, i], source, p[at.CRITICAL, i])
+            fill_p, drain_p = driving_flows(p, i, state[pp, i], 1.0 / state[pp, i], p[at.T0, i] / state[tp, i])
+            fill_n, drain_n = driving_flows(p, i, state[pn, i], 1.0 / state[pn, i], p[at.T0, i] / state[tn, i])
             row = 2 * cylinder
             if one_valve:
                 half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
@@ -101,6 +114,15 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
                 flow_p, flow_n = full * wanted[row, i], full * wanted[row + 1, i]
                 openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
                 openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+
+
+@kernel
+def _flow_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constant: 1 with one valve per cylinder."""
+    w, s, one_valve = block(world, WORLD), block(seen, SEEN), numbers(constants, 1)[0] > 0.0
+    state, p = w[STATE : STATE + at.STATES, :n], w[: at.PARAMETERS, :n]
+    _flow_openings(s[ACTION : ACTION + 4, :n], one_valve, state, p, s[OPENING : OPENING + 4, :n])
+    return 0
 
 
 class FlowActuation(Forgetful):
@@ -133,6 +155,10 @@ class FlowActuation(Forgetful):
         openings = np.empty((4, plant.num_envs))
         _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
         return openings
+
+    def stages(self) -> list[Stage]:
+        """``openings``, compiled into the closed loop."""
+        return [Stage(_flow_stage, np.array([float(self._one_valve)]))]
 
 
 ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

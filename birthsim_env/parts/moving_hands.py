@@ -10,9 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from birthsim_env.loop.rows import MOTION, SEEN, TIME, WORLD
+from birthsim_env.loop.stage import Stage, block, numbers, table2, table3, table4
 from birthsim_env.parts.references import minimum_jerk
 from birthsim_env.parts.seeding import Range, draw
-from birthsim_env.parts.user_forces import AlternatingSteps, UserForce
+from birthsim_env.parts.user_forces import AlternatingSteps, UserForce, force_block
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
@@ -37,6 +39,13 @@ def _waves(time: Array, own: Array, forces: Array) -> None:
                 forces[k, axis, i] = share * total
 
 
+@kernel
+def _waves_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    _waves(s[TIME : TIME + 1, :n], table4(tables, 0)[:, :, :, lane : lane + n], force_block(world, n))
+    return 0
+
+
 class _Waves(UserForce):
     """Sums of sines."""
 
@@ -50,6 +59,10 @@ class _Waves(UserForce):
         forces = np.empty((time.shape[0], 2, time.shape[1]))
         _waves(time, self._own, forces)
         return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        return Stage(_waves_stage, tables=(self._own,))
 
 
 class Sine(_Waves):
@@ -129,6 +142,16 @@ def _guide(
             )
 
 
+@kernel
+def _guide_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    w, s = block(world, WORLD), block(seen, SEEN)
+    own, points = table2(tables, 0)[:, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
+    position, velocity = w[MOTION : MOTION + 2, :n], w[MOTION + 2 : MOTION + 4, :n]
+    state, grip = block(memory, 7)[:, :n], numbers(constants, 2)
+    _guide(s[TIME : TIME + 1, :n], position, velocity, own, points, state, grip, force_block(world, n))
+    return 0
+
+
 class Guided(UserForce):
     """A hand that holds the end effector and leads it from place to place.
 
@@ -170,6 +193,10 @@ class Guided(UserForce):
         moving = (np.ascontiguousarray(position), np.ascontiguousarray(velocity))
         _guide(time, *moving, self._own, self._points, self._state, np.array(self.GRIP), forces)
         return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        return Stage(_guide_stage, np.array(self.GRIP), self._state, (self._own, self._points))
 
 
 _ANYWHERE = (0.0, 2 * math.pi)

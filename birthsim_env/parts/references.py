@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
+from birthsim_env.loop.stage import Stage, block, table2
 from birthsim_env.parts.seeding import Range, draw
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
@@ -49,6 +51,13 @@ def _circle(time: Array, own: Array, rows: Array) -> None:
         rows[6, i], rows[7, i] = w * w * w * sine, -w * w * w * cosine
 
 
+@kernel
+def _circle_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    _circle(s[TIME, :n], table2(tables, 0)[:, lane : lane + n], s[REFERENCE : REFERENCE + 8, :n])
+    return 0
+
+
 class Circle(Trajectory):
     """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
 
@@ -67,6 +76,10 @@ class Circle(Trajectory):
         rows = np.empty((8, time.shape[0]))
         _circle(time, self._own, rows)
         return rows
+
+    def stage(self) -> Stage:
+        """``sample``, compiled into the closed loop."""
+        return Stage(_circle_stage, tables=(self._own,))
 
 
 @helper
@@ -110,6 +123,13 @@ def _path(time: Array, own: Array, rows: Array) -> None:
         rows[6, i], rows[7, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
 
 
+@kernel
+def _path_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    _path(s[TIME, :n], table2(tables, 0)[:, lane : lane + n], s[REFERENCE : REFERENCE + 8, :n])
+    return 0
+
+
 class Path(Trajectory):
     """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
 
@@ -147,6 +167,10 @@ class Path(Trajectory):
         rows = np.empty((8, time.shape[0]))
         _path(time, self._own, rows)
         return rows
+
+    def stage(self) -> Stage:
+        """``sample``, compiled into the closed loop."""
+        return Stage(_path_stage, tables=(self._own,))
 
 
 class Hold(Path):

@@ -7,19 +7,48 @@ True, at policy instants otherwise.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numba import carray
 from numpy.typing import NDArray
 
+from birthsim_env.loop.rows import (
+    FORCE,
+    MOTION,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    SEEN,
+    STATE,
+    TICK,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+    WORLD,
+)
+from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
 from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.lanes import PRESSURES, Array
 from birthsim_env.physics.parameters import Electronics
 
 RATE_TIME = 0.02
 """s; assumed: time constant of the low-pass on the position differences that ``lab`` shows as velocity."""
+
+
+@kernel
+def _ideal_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    w, s = block(world, WORLD), block(seen, SEEN)
+    for i in range(n):
+        s[POSITION_TIME, i] = s[TIME, i]
+        for axis in range(2):
+            s[POSITION + axis, i], s[VELOCITY + axis, i] = w[MOTION + axis, i], w[MOTION + 2 + axis, i]
+            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+        for chamber in range(4):
+            s[PRESSURE + chamber, i] = w[STATE + PRESSURES[chamber], i]
+    return 0
 
 
 class IdealSensors:
@@ -36,6 +65,10 @@ class IdealSensors:
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         return Measurement(time, motion[:2], time, motion[2:], pressures, force, sampled=False)
+
+    def stage(self) -> Stage:
+        """``measure``, compiled into the closed loop."""
+        return Stage(_ideal_stage)
 
 
 @helper
@@ -58,7 +91,7 @@ def _normal(key: np.uint64, tick: int, channel: int) -> float:
 
 @kernel
 def _lab(
-    ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
+    ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
     rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
     seen: Array,
 ) -> None:  # fmt: skip
@@ -66,7 +99,7 @@ def _lab(
     has arrived; ``velocity`` (2, N): low-passed differences; ``seen`` (4, N): noisy pressures."""
     depth = queue.shape[0]
     for i in range(time.shape[0]):
-        tick, key = ticks[i], keys[i]
+        tick, key = int(ticks[i]), keys[i]
         index = math.floor(time[i] * rate + 1e-9)
         if tick == 0 or index > math.floor((time[i] - period) * rate + 1e-9):
             slot = int(index) % depth
@@ -90,6 +123,27 @@ def _lab(
                 shown[2, i] = queue[k, 2, i]
         for chamber in range(4):
             seen[chamber, i] = pressures[chamber, i] + pressure_noise * _normal(key, tick, chamber)
+
+
+@kernel
+def _lab_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 5)
+    keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
+    queue, shown, velocity = table3(tables, 1)[:, :, mine], table2(tables, 2)[:, mine], table2(tables, 3)[:, mine]
+    pressures = carray(scratch(4), (4, BLOCK))
+    for chamber in range(4):
+        for i in range(n):
+            pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]
+    _lab(
+        w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, keys, about[0], about[1], about[2], about[3], about[4],
+        queue, shown, velocity, s[PRESSURE : PRESSURE + 4, :n],
+    )  # fmt: skip
+    for i in range(n):
+        s[POSITION_TIME, i] = shown[2, i]
+        for axis in range(2):
+            s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], velocity[axis, i]
+            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+    return 0
 
 
 class LabSensors:
@@ -125,6 +179,11 @@ class LabSensors:
         _lab(ticks, time, motion, pressures, self._keys, *self._numbers, self._queue, self._shown, self._velocity, seen)
         shown = self._shown.copy()
         return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen, force, sampled=True)
+
+    def stage(self) -> Stage:
+        """``measure``, compiled into the closed loop."""
+        keys = self._keys.view(np.float64)
+        return Stage(_lab_stage, np.array(self._numbers), tables=(keys, self._queue, self._shown, self._velocity))
 
 
 class SensorModel(Protocol):

@@ -8,6 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
+from birthsim_env.loop.stage import Stage, block, numbers, table3
 from birthsim_env.parts.references import minimum_jerk
 from birthsim_env.parts.seeding import Range, draw
 from birthsim_env.physics.compilation import kernel
@@ -74,6 +76,11 @@ class StiffnessSchedule:
         _sample(time, self._starts, self._values, self.transition, rows)
         return rows
 
+    def stage(self) -> Stage:
+        """``sample``, compiled into the closed loop."""
+        constants = np.array([self.transition, *self._starts])
+        return Stage(_schedule_stage, constants, tables=(self._values,))
+
 
 @kernel
 def _sample(time: Array, starts: Array, values: Array, transition: float, rows: Array) -> None:
@@ -89,3 +96,13 @@ def _sample(time: Array, starts: Array, values: Array, transition: float, rows: 
             before = values[max(phase - 1, 0), 2 + k, i]
             rows[2 + k, i] = before + (now - before) * minimum_jerk(u, 0)
             rows[4 + k, i] = (now - before) * minimum_jerk(u, 1) / transition
+
+
+@kernel
+def _schedule_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: transition, s; starts of the phases, s."""
+    s, values = block(seen, SEEN), table3(tables, 0)
+    about = numbers(constants, 1 + values.shape[0])
+    rows = s[REFERENCE + 8 : REFERENCE + 15, :n]
+    _sample(s[TIME, :n], about[1:], values[:, :, lane : lane + n], about[0], rows)
+    return 0

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import carray
 
+from birthsim_env.loop.rows import FORCE, SEEN, TIME
+from birthsim_env.loop.stage import Stage, block, pointer, table1, table3
 from birthsim_env.parts.seeding import Range, draw
 from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import checked
 
@@ -75,6 +78,20 @@ def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> Non
             forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
 
 
+@helper
+def force_block(world: int, n: int) -> Array:
+    """The hand's force in a block of the world, one instant: (1, 2, n)."""
+    return carray(pointer(world + FORCE * BLOCK * 8, np.float64), (1, 2, BLOCK))[:, :, :n]
+
+
+@kernel
+def _knots_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
+    _interpolate(s[TIME : TIME + 1, :n], knots, counts, force_block(world, n))
+    return 0
+
+
 def _checked_knots(name: str, knots: list[tuple[float, float, float]]) -> Array:
     """Knots as an array (M, 3), or a ``ValueError`` that names them."""
     try:
@@ -114,6 +131,10 @@ class ForceProfile(UserForce):
         forces = np.empty((time.shape[0], 2, time.shape[1]))
         _interpolate(time, self._knots, self._counts, forces)
         return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        return Stage(_knots_stage, tables=(self._knots, self._counts))
 
 
 class AlternatingSteps(ForceProfile):

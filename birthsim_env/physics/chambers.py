@@ -3,6 +3,8 @@
 V = V0 + S L,   Q = h (2 S + pi D L)(Twall - T) + G12 (Tother - T)
 dP/dt = [gamma r (Tin qin - T qout) - gamma P dV/dt + (gamma - 1) Q] / V
 dT/dt = T [ (dP/dt)/P + (dV/dt)/V - (qin - qout) r T / (P V) ]
+
+Both are computed from powers, so that one division by P V serves a chamber.
 """
 
 from __future__ import annotations
@@ -31,16 +33,12 @@ def enthalpy_temperature_flow(supplied: float, exhausted: float, temperature: fl
 
 
 @helper
-def pressure_rate(
-    pressure: float, volume: float, volume_rate: float, temperature_flow: float, heat: float, gas: float, gamma: float
-) -> float:
-    """dP/dt, Pa/s."""
-    return (gamma * (gas * temperature_flow - pressure * volume_rate) + (gamma - 1.0) * heat) / volume
+def pressing_power(temperature_flow: float, expansion: float, heat: float, gas: float, gamma: float) -> float:
+    """V dP/dt, W; ``expansion`` is the power P dV/dt, W."""
+    return gamma * (gas * temperature_flow - expansion) + (gamma - 1.0) * heat
 
 
 @helper
-def temperature_rate(
-    pressure: float, temperature: float, pressure_rate: float, volume: float, volume_rate: float, net_flow: float, gas: float
-) -> float:
-    """dT/dt, K/s, from the ideal gas law."""
-    return temperature * (pressure_rate / pressure + volume_rate / volume - net_flow * gas * temperature / (pressure * volume))
+def warming_power(pressing: float, expansion: float, net_flow: float, gas: float, temperature: float) -> float:
+    """(P V/T) dT/dt, W, from the ideal gas law; ``pressing`` is V dP/dt."""
+    return pressing + expansion - net_flow * gas * temperature

@@ -6,6 +6,8 @@ shape, works there, and copies back; the right-hand side is inlined where it is 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
@@ -18,44 +20,57 @@ INTEGRATION_STEP = 0.25e-3
 
 
 @helper
-def outer_factor(p: Array, i: int) -> float:
-    """Density factor of supply and surroundings, which are equally warm, kg/m3."""
-    return valves.density_factor(p[at.TEMPERATURE, i], p[at.RHO0, i], p[at.T0, i])
+def driving_flows(p: Array, i: int, pressure: float, inverse: float, inside: float) -> tuple[float, float]:
+    """Flows per unit of conductance from the supply into a chamber, and from it to the atmosphere, Pa kg/m3.
+
+    ``inverse`` is 1/``pressure``, ``inside`` the coldness of the chamber's air.
+    """
+    outer, rho0, critical, knee, slope = p[at.COLDNESS, i], p[at.RHO0, i], p[at.CRITICAL, i], p[at.KNEE, i], p[at.LAMINAR, i]
+    fill = valves.driving_flow(
+        p[at.SUPPLY, i], p[at.INVERSE_SUPPLY, i], outer, pressure, inverse, inside, rho0, critical, knee, slope
+    )  # fmt: skip
+    drain = valves.driving_flow(
+        pressure, inverse, inside, p[at.ATMOSPHERE, i], p[at.INVERSE_ATMOSPHERE, i], outer, rho0, critical, knee, slope
+    )  # fmt: skip
+    return fill, drain
 
 
 @helper
-def orifice_flows(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int, outer: float) -> tuple[float, float]:
-    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s."""
-    inside = valves.density_factor(x[temperature, i], p[at.RHO0, i], p[at.T0, i])
+def orifice_flows(x: Array, p: Array, i: int, pressure: int, spool: int, inverse: float, inside: float) -> tuple[float, float]:
+    """Mass flows of a chamber given by its state rows: in from the supply and out to the atmosphere, kg/s.
+
+    ``inverse`` is 1/P of the chamber, ``inside`` the coldness of its air.
+    """
+    fill, drain = driving_flows(p, i, x[pressure, i], inverse, inside)
     supply = valves.supply_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
     exhaust = valves.exhaust_conductance(x[spool, i], p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-    supplied = valves.orifice_flow(supply, p[at.SUPPLY, i], outer, x[pressure, i], inside, p[at.CRITICAL, i])
-    return supplied, valves.orifice_flow(exhaust, x[pressure, i], inside, p[at.ATMOSPHERE, i], outer, p[at.CRITICAL, i])
+    return supply * fill, exhaust * drain
 
 
 @helper
-def supplied_flow(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> float:
-    """Mass flow from the supply into a chamber given by its state rows, kg/s."""
-    return orifice_flows(x, p, i, pressure, temperature, spool, outer_factor(p, i))[0]
+def flows_of(x: Array, p: Array, i: int, pressure: int, temperature: int, spool: int) -> tuple[float, float]:
+    """``orifice_flows`` of a chamber given by its state rows alone."""
+    return orifice_flows(x, p, i, pressure, spool, 1.0 / x[pressure, i], p[at.T0, i] / x[temperature, i])
 
 
 @helper
 def chamber_rates(
     x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, spool: int, area: int, perimeter: int,
-    length: float, length_rate: float, outer: float,
+    length: float, length_rate: float,
 ) -> None:  # fmt: skip
     """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
-    supplied, exhausted = orifice_flows(x, p, i, pressure, temperature, spool, outer)
-    t, wall = x[temperature, i], p[at.TEMPERATURE, i]
+    t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
+    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
+    # One division serves the chamber: 1/(P V) = T inverse, 1/P = V T inverse, 1/T = P V inverse.
+    energy = x[pressure, i] * volume
+    inverse = 1.0 / (energy * t)
+    supplied, exhausted = orifice_flows(x, p, i, pressure, spool, volume * (t * inverse), p[at.T0, i] * (energy * inverse))
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
     heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
-    volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
-    volume_rate = p[area, i] * length_rate
-    rate = chambers.pressure_rate(x[pressure, i], volume, volume_rate, carried, heat, p[at.GAS, i], p[at.GAMMA, i])
-    dx[pressure, i] = rate
-    dx[temperature, i] = chambers.temperature_rate(
-        x[pressure, i], t, rate, volume, volume_rate, supplied - exhausted, p[at.GAS, i]
-    )
+    expansion = x[pressure, i] * (p[area, i] * length_rate)
+    pressing = chambers.pressing_power(carried, expansion, heat, gas, p[at.GAMMA, i])
+    dx[pressure, i] = pressing * (x[pressure, i] * (t * inverse))
+    dx[temperature, i] = chambers.warming_power(pressing, expansion, supplied - exhausted, gas, t) * (t * t * inverse)
 
 
 @helper
@@ -68,16 +83,16 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
         )
 
         s0, s1 = p[at.BRISTLE_S0, i], p[at.BRISTLE_S1, i]
-        level1 = friction.stribeck_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
-        level2 = friction.stribeck_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
+        weakness1 = friction.inverse_level(v1, p[at.FC1, i], p[at.FS1, i], p[at.STRIBECK, i])
+        weakness2 = friction.inverse_level(v2, p[at.FC2, i], p[at.FS2, i], p[at.STRIBECK, i])
         is_lugre, is_bristle = p[at.LUGRE, i] > 0.5, p[at.LUGRE, i] + p[at.ELASTO_PLASTIC, i] > 0.5
         breakaway, steepness = p[at.BREAKAWAY, i], p[at.STEEPNESS, i]
-        dz1 = friction.bristle_rate_by_law(v1, x[at.Z1, i], level1, s0, is_lugre, breakaway, steepness)
-        dz2 = friction.bristle_rate_by_law(v2, x[at.Z2, i], level2, s0, is_lugre, breakaway, steepness)
+        dz1 = friction.bristle_rate_by_law(v1, x[at.Z1, i], weakness1, s0, is_lugre, breakaway, steepness)
+        dz2 = friction.bristle_rate_by_law(v2, x[at.Z2, i], weakness2, s0, is_lugre, breakaway, steepness)
         bristle1 = friction.lugre_force(v1, x[at.Z1, i], dz1, s0, s1, p[at.FV1, i])
         bristle2 = friction.lugre_force(v2, x[at.Z2, i], dz2, s0, s1, p[at.FV2, i])
-        coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SPEED, i])
-        coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SPEED, i])
+        coulomb1 = friction.coulomb_force(v1, p[at.FC1, i], p[at.FV1, i], p[at.SIGN_SLOPE, i])
+        coulomb2 = friction.coulomb_force(v2, p[at.FC2, i], p[at.FV2, i], p[at.SIGN_SLOPE, i])
         friction1 = bristle1 if is_bristle else coulomb1
         friction2 = bristle2 if is_bristle else coulomb2
 
@@ -94,21 +109,22 @@ def right_hand_side(x: Array, u: Array, f: Array, p: Array, dx: Array, n: int) -
             + mechanics.user_force2(f[0, i], f[1, i], sine, cosine)
         )
         dx[at.Y1, i] = v1
-        dx[at.V1, i] = mechanics.acceleration1(force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.V1, i] = mechanics.acceleration1(
+            force1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i]
+        )
         dx[at.Y2, i] = v2
-        dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.MASS, i], p[at.GRAVITY, i])
+        dx[at.V2, i] = mechanics.acceleration2(force2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS, i], p[at.GRAVITY, i])
         dx[at.Z1, i] = dz1 if is_bristle else 0.0
         dx[at.Z2, i] = dz2 if is_bristle else 0.0
 
-        outer = outer_factor(p, i)
-        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1, outer)
-        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1, outer)
-        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2, outer)
-        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2, outer)
-        dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) / p[at.TAU, i]
-        dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) / p[at.TAU, i]
-        dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) / p[at.TAU, i]
-        dx[at.S2N, i] = (u[3, i] - x[at.S2N, i]) / p[at.TAU, i]
+        chamber_rates(x, p, dx, i, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, p[at.HALF_L1, i] + y1, v1)
+        chamber_rates(x, p, dx, i, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, p[at.HALF_L1, i] - y1, -v1)
+        chamber_rates(x, p, dx, i, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, p[at.HALF_L2, i] + y2, v2)
+        chamber_rates(x, p, dx, i, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, p[at.HALF_L2, i] - y2, -v2)
+        dx[at.S1P, i] = (u[0, i] - x[at.S1P, i]) * p[at.SPOOL_RATE, i]
+        dx[at.S1N, i] = (u[1, i] - x[at.S1N, i]) * p[at.SPOOL_RATE, i]
+        dx[at.S2P, i] = (u[2, i] - x[at.S2P, i]) * p[at.SPOOL_RATE, i]
+        dx[at.S2N, i] = (u[3, i] - x[at.S2N, i]) * p[at.SPOOL_RATE, i]
 
 
 @helper
@@ -154,11 +170,10 @@ def derivatives(state: Array, command: Array, force: Array, parameters: Array, r
 def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
     """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
     for i in range(state.shape[1]):
-        outer = outer_factor(parameters, i)
-        flows[0, i], flows[4, i] = orifice_flows(state, parameters, i, at.PP1, at.TP1, at.S1P, outer)
-        flows[1, i], flows[5, i] = orifice_flows(state, parameters, i, at.PN1, at.TN1, at.S1N, outer)
-        flows[2, i], flows[6, i] = orifice_flows(state, parameters, i, at.PP2, at.TP2, at.S2P, outer)
-        flows[3, i], flows[7, i] = orifice_flows(state, parameters, i, at.PN2, at.TN2, at.S2N, outer)
+        flows[0, i], flows[4, i] = flows_of(state, parameters, i, at.PP1, at.TP1, at.S1P)
+        flows[1, i], flows[5, i] = flows_of(state, parameters, i, at.PN1, at.TN1, at.S1N)
+        flows[2, i], flows[6, i] = flows_of(state, parameters, i, at.PP2, at.TP2, at.S2P)
+        flows[3, i], flows[7, i] = flows_of(state, parameters, i, at.PN2, at.TN2, at.S2N)
 
 
 @helper
@@ -171,6 +186,14 @@ def stage(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float
 
 
 @helper
+def copy(source: Array, target: Array, n: int) -> None:
+    """Copy the states of ``n`` lanes."""
+    for row in range(at.STATES):
+        for i in range(n):
+            target[row, i] = source[row, i]
+
+
+@helper
 def record_impacts(x: Array, p: Array, impacts: Array, n: int) -> None:
     """Keeps the largest speed at which a piston runs into an end stop, m/s."""
     for i in range(n):
@@ -178,6 +201,34 @@ def record_impacts(x: Array, p: Array, impacts: Array, n: int) -> None:
         outward2 = x[at.V2, i] if x[at.Y2, i] > 0.0 else -x[at.V2, i]
         impacts[0, i] = max(impacts[0, i], outward1 if abs(x[at.Y1, i]) > p[at.HALF_L1, i] else 0.0)
         impacts[1, i] = max(impacts[1, i], outward2 if abs(x[at.Y2, i]) > p[at.HALF_L2, i] else 0.0)
+
+
+def steps_in(time: float) -> int:
+    """Runge-Kutta steps that a force sample held for ``time``, s, is integrated in."""
+    return max(1, math.ceil(time / INTEGRATION_STEP - 1e-9))
+
+
+@helper
+def integrate(
+    x: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, dx: Array, total: Array, trial: Array,
+    n: int,
+) -> None:  # fmt: skip
+    """Integrates ``n`` lanes of a state ``x`` by ``steps`` classical Runge-Kutta steps of ``step`` s under constant inputs.
+
+    ``impacts`` (2, n) grows to the largest speed at which each piston ran into an end stop; the rest is scratch (18, n).
+    """
+    for _ in range(steps):
+        copy(x, total, n)
+        right_hand_side(x, u, f, p, dx, n)
+        stage(x, dx, total, trial, n, step / 6.0, step / 2.0)
+        right_hand_side(trial, u, f, p, dx, n)
+        stage(x, dx, total, trial, n, step / 3.0, step / 2.0)
+        right_hand_side(trial, u, f, p, dx, n)
+        stage(x, dx, total, trial, n, step / 3.0, step)
+        right_hand_side(trial, u, f, p, dx, n)
+        stage(x, dx, total, trial, n, step / 6.0, 0.0)
+        copy(total, x, n)
+        record_impacts(x, p, impacts, n)
 
 
 @kernel
@@ -198,18 +249,7 @@ def advance(state: Array, command: Array, forces: Array, parameters: Array, step
         hit[:] = 0.0
         for sample in range(forces.shape[0]):
             load(forces[sample], first, n, f)
-            for _ in range(steps):
-                total[:] = x
-                right_hand_side(x, u, f, p, dx, n)
-                stage(x, dx, total, trial, n, step / 6.0, step / 2.0)
-                right_hand_side(trial, u, f, p, dx, n)
-                stage(x, dx, total, trial, n, step / 3.0, step / 2.0)
-                right_hand_side(trial, u, f, p, dx, n)
-                stage(x, dx, total, trial, n, step / 3.0, step)
-                right_hand_side(trial, u, f, p, dx, n)
-                stage(x, dx, total, trial, n, step / 6.0, 0.0)
-                x[:] = total
-                record_impacts(x, p, hit, n)
+            integrate(x, u, f, p, steps, step, hit, dx, total, trial, n)
         settle(x, n)
         store(x, first, n, state)
         store(hit, first, n, impacts)

@@ -32,8 +32,17 @@ SMALLEST_LEVEL = 1e-9
 @helper
 def stribeck_level(speed: float, coulomb: float, static: float, stribeck_speed: float) -> float:
     """G(v), N."""
-    ratio = speed / stribeck_speed
-    return coulomb + (static - coulomb) / (1.0 + ratio * ratio)
+    square = stribeck_speed * stribeck_speed
+    return coulomb + (static - coulomb) * square / (square + speed * speed)
+
+
+@helper
+def inverse_level(speed: float, coulomb: float, static: float, stribeck_speed: float) -> float:
+    """1/G(v), 1/N, of a level of at least ``SMALLEST_LEVEL``."""
+    square = stribeck_speed * stribeck_speed
+    sum_of_squares = square + speed * speed
+    level = coulomb * sum_of_squares + (static - coulomb) * square
+    return sum_of_squares / max(level, SMALLEST_LEVEL * sum_of_squares)
 
 
 @helper
@@ -45,10 +54,10 @@ def sliding_share(ratio: float, breakaway: float, steepness: float) -> float:
 
 @helper
 def bristle_rate_by_law(
-    speed: float, deflection: float, level: float, stiffness: float, lugre: bool, breakaway: float, steepness: float
+    speed: float, deflection: float, weakness: float, stiffness: float, lugre: bool, breakaway: float, steepness: float
 ) -> float:
-    """dz/dt, m/s, for G(v) = ``level``, of LuGre where ``lugre``, else of the elasto-plastic law; the two share a division."""
-    scale = stiffness * (abs(speed) if lugre else 1.0) / max(level, SMALLEST_LEVEL)
+    """dz/dt, m/s, for 1/G(v) = ``weakness``, of LuGre where ``lugre``, else of the elasto-plastic law."""
+    scale = stiffness * (abs(speed) if lugre else 1.0) * weakness
     relaxation = scale * (1.0 if lugre else abs(speed))
     along = deflection if speed > 0.0 else -deflection
     share = 1.0 if lugre else sliding_share(scale * along, breakaway, steepness)
@@ -59,7 +68,7 @@ def bristle_rate_by_law(
 @helper
 def bristle_rate(speed: float, deflection: float, level: float, stiffness: float) -> float:
     """dz/dt of LuGre, m/s, for G(v) = ``level``."""
-    return bristle_rate_by_law(speed, deflection, level, stiffness, True, 0.0, 1.0)
+    return bristle_rate_by_law(speed, deflection, 1.0 / max(level, SMALLEST_LEVEL), stiffness, True, 0.0, 1.0)
 
 
 @helper
@@ -69,9 +78,9 @@ def lugre_force(speed: float, deflection: float, rate: float, stiffness: float, 
 
 
 @helper
-def coulomb_force(speed: float, coulomb: float, viscous: float, sign_speed: float) -> float:
-    """(4): Fc sign(v) + Fv v, N, with sign(v) linear below ``sign_speed`` so that the equation can be integrated."""
-    return coulomb * max(-1.0, min(1.0, speed / sign_speed)) + viscous * speed
+def coulomb_force(speed: float, coulomb: float, viscous: float, sign_slope: float) -> float:
+    """(4): Fc sign(v) + Fv v, N, with sign(v) = ``sign_slope`` v, s/m, near rest so that the equation can be integrated."""
+    return coulomb * max(-1.0, min(1.0, sign_slope * speed)) + viscous * speed
 
 
 @helper

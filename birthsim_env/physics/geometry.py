@@ -24,35 +24,39 @@ def s_squared(w: float, d_product: float) -> float:
 
 
 @helper
-def sin_theta1(w: float, root: float, d_product: float, sin_gamma3: float, cos_gamma3: float) -> float:
-    """sin(theta1) from (1); ``root`` is S."""
-    return (sin_gamma3 * root - cos_gamma3 * w) / d_product
+def sin_theta1(w: float, root: float, inverse: float, sin_gamma3: float, cos_gamma3: float) -> float:
+    """sin(theta1) from (1); ``root`` is S, ``inverse`` 1/(2 d3 d6)."""
+    return (sin_gamma3 * root - cos_gamma3 * w) * inverse
 
 
 @helper
-def cos_theta1(w: float, root: float, d_product: float, sin_gamma3: float, cos_gamma3: float) -> float:
-    """cos(theta1) from (1); ``root`` is S."""
-    return (cos_gamma3 * root + sin_gamma3 * w) / d_product
+def cos_theta1(w: float, root: float, inverse: float, sin_gamma3: float, cos_gamma3: float) -> float:
+    """cos(theta1) from (1); ``root`` is S, ``inverse`` 1/(2 d3 d6)."""
+    return (cos_gamma3 * root + sin_gamma3 * w) * inverse
 
 
 @helper
-def amplification(r2: float, r4: float, root: float) -> float:
-    """kappa = 2 r2 r4 / S: speed of the end effector across cylinder 2 per speed of cylinder 1."""
-    return 2.0 * r2 * r4 / root
+def amplification(r2: float, r4: float, inverse: float) -> float:
+    """kappa = 2 r2 r4 / S: speed of the end effector across cylinder 2 per speed of cylinder 1; ``inverse`` is 1/S."""
+    return 2.0 * r2 * r4 * inverse
 
 
 @helper
 def pose(
     y1: float, y2: float, k1: float, k2: float, d_squares: float, d_product: float, sin_gamma3: float, cos_gamma3: float
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Lengths r4, r2 (m), w (m2), S^2 (m4), S (m2), kappa, sin(theta1) and cos(theta1) for piston positions y1, y2 (m)."""
+    """Lengths r4, r2 (m), w (m2), S^2 (m4), S (m2), kappa, sin(theta1) and cos(theta1) for piston positions y1, y2 (m).
+
+    One division serves all.
+    """
     r4, r2 = y1 + k1, y2 + k2
     w = r4 * r4 - d_squares
     s2 = s_squared(w, d_product)
     root = math.sqrt(s2)
-    sine = sin_theta1(w, root, d_product, sin_gamma3, cos_gamma3)
-    cosine = cos_theta1(w, root, d_product, sin_gamma3, cos_gamma3)
-    return r4, r2, w, s2, root, amplification(r2, r4, root), sine, cosine
+    inverse = 1.0 / (d_product * root)
+    sine = sin_theta1(w, root, root * inverse, sin_gamma3, cos_gamma3)
+    cosine = cos_theta1(w, root, root * inverse, sin_gamma3, cos_gamma3)
+    return r4, r2, w, s2, root, amplification(r2, r4, d_product * inverse), sine, cosine
 
 
 @helper

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics import exact
+from birthsim_env.physics import exact, valves
 from birthsim_env.physics.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -38,6 +38,7 @@ PARAMETER_NAMES = (
     *("area_p1", "area_n1", "area_p2", "area_n2", "perimeter1", "perimeter2", "dead_volume", "h_wall", "g12"),
     *("conductance", "critical", "leakage", "tau", "supply", "atmosphere", "temperature"),
     *("gas", "gamma", "index", "rho0", "t0"),
+    *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
 )
 PARAMETERS = len(PARAMETER_NAMES)
 (
@@ -88,6 +89,14 @@ PARAMETERS = len(PARAMETER_NAMES)
     INDEX,
     RHO0,
     T0,
+    KNEE,
+    LAMINAR,
+    COLDNESS,
+    INVERSE_SUPPLY,
+    INVERSE_ATMOSPHERE,
+    SPOOL_RATE,
+    SIGN_SLOPE,
+    INVERSE_MASS,
 ) = range(PARAMETERS)
 
 
@@ -95,7 +104,9 @@ def parameter_column(parameters: Parameters) -> Array:
     """One lane's column of the parameter array: (PARAMETERS,), SI units.
 
     ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` and ``elasto_plastic`` are 1 for the friction law of that
-    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway).
+    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). The last rows spare divisions: ``knee`` is
+    1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
+    equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed.
     """
     g, c1, c2, m = parameters.geometry, parameters.cylinder1, parameters.cylinder2, parameters.mechanics
     f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
@@ -113,6 +124,9 @@ def parameter_column(parameters: Parameters) -> Array:
         *(conductance, v.critical_ratio, v.leakage_ratio * conductance, v.time_constant),
         *(a.supply_pressure, a.atmospheric_pressure, a.temperature),
         *(a.gas_constant, a.heat_capacity_ratio, a.polytropic_index, a.reference_density, a.reference_temperature),
+        *(1 / (1 - v.critical_ratio), valves.laminar_slope(v.critical_ratio)),
+        *(a.reference_temperature / a.temperature, 1 / a.supply_pressure, 1 / a.atmospheric_pressure),
+        *(1 / v.time_constant, 1 / f.sign_speed, 1 / m.mass),
     )
     return np.array(values, dtype=np.float64)
 

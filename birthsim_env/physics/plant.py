@@ -80,7 +80,7 @@ class Plant:
     def advance_unchecked(self, command: Array, forces: Array, duration: float) -> None:
         """``advance`` for arrays known to be right: command (4, num_envs), forces (K, 2, num_envs), contiguous float64."""
         held = duration / forces.shape[0]
-        steps = max(1, math.ceil(held / dynamics.INTEGRATION_STEP - 1e-9))
+        steps = dynamics.steps_in(held)
         dynamics.advance(self.state, command, forces, self.lane_parameters, steps, held / steps, self.impacts)
 
     def mass_flows(self) -> Array:

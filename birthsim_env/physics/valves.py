@@ -17,29 +17,40 @@ slope at equal pressures would be infinite."""
 
 
 @helper
-def flow_function(ratio: float, critical: float) -> float:
-    """psi(Pd/Pu) of ISO 6358, in [0, 1]."""
-    scaled = (max(ratio, critical) - critical) / (1.0 - critical)
+def laminar_slope(critical: float) -> float:
+    """-dpsi/dx above ``LINEAR_RATIO``."""
     edge = (LINEAR_RATIO - critical) / (1.0 - critical)
-    subsonic = math.sqrt(max(1.0 - scaled * scaled, 0.0))
-    laminar = math.sqrt(1.0 - edge * edge) * (1.0 - ratio) / (1.0 - LINEAR_RATIO)
-    return laminar if ratio > LINEAR_RATIO else subsonic
+    return math.sqrt(1.0 - edge * edge) / (1.0 - LINEAR_RATIO)
 
 
 @helper
-def density_factor(temperature: float, rho0: float, t0: float) -> float:
-    """rho0 sqrt(T0/T), kg/m3: what a unit of conductance and upstream pressure carries from air at ``temperature``."""
-    return rho0 * math.sqrt(t0 / temperature)
+def flow_square(ratio: float, critical: float, knee: float, slope: float) -> float:
+    """psi(Pd/Pu)^2, see ``flow_function``."""
+    scaled, laminar = (max(ratio, critical) - critical) * knee, slope * max(1.0 - ratio, 0.0)
+    return laminar * laminar if ratio > LINEAR_RATIO else max(1.0 - scaled * scaled, 0.0)
 
 
 @helper
-def orifice_flow(
-    conductance: float, p_from: float, factor_from: float, p_to: float, factor_to: float, critical: float
-) -> float:
-    """Mass flow from one side to the other, kg/s; negative where the far side has the higher pressure (roles exchanged)."""
-    upstream = max(p_from, p_to)
-    size = conductance * upstream * flow_function(min(p_from, p_to) / upstream, critical)
-    return size * factor_from if p_from > p_to else -size * factor_to
+def flow_function(ratio: float, critical: float, knee: float, slope: float) -> float:
+    """psi(Pd/Pu) of ISO 6358, in [0, 1]; ``knee`` is 1/(1 - critical), ``slope`` that of ``laminar_slope``."""
+    return math.sqrt(flow_square(ratio, critical, knee, slope))
+
+
+@helper
+def driving_flow(
+    p_from: float, inverse_from: float, coldness_from: float, p_to: float, inverse_to: float, coldness_to: float,
+    rho0: float, critical: float, knee: float, slope: float,
+) -> float:  # fmt: skip
+    """Mass flow per unit of conductance from one side to the other, Pa kg/m3; negative where the far side has the higher
+    pressure (roles exchanged).
+
+    ``inverse_from`` and ``inverse_to`` are 1/P, which the caller has at hand; the coldness of air is T0/T.
+    """
+    forward = p_from > p_to
+    ratio = p_to * inverse_from if forward else p_from * inverse_to
+    coldness = coldness_from if forward else coldness_to
+    size = rho0 * max(p_from, p_to) * math.sqrt(coldness * flow_square(ratio, critical, knee, slope))
+    return size if forward else -size
 
 
 @helper

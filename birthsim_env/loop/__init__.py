@@ -1,0 +1,1 @@
+"""The closed loop: stages over blocks of lanes, and what runs them."""

@@ -1,0 +1,123 @@
+"""Runs stages over blocks of lanes: one call for all periods of a policy step, blocks spread over threads.
+
+A block of lanes is copied into scratch rows, goes through all periods there, and is copied back. Lanes never meet, so neither
+the number of lanes nor that of threads changes a bit.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numpy as np
+from numba import carray
+from numpy.typing import NDArray
+
+from birthsim_env.loop.rows import SEEN, WORLD
+from birthsim_env.loop.stage import TABLE, Stage, address_of, pointer
+from birthsim_env.loop.stage import call as call_stage
+from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.lanes import Array
+
+Place = tuple[Array, int]
+"""An array (rows, N) and the row of the world, or of what is seen, at which it stands in a block."""
+
+
+@kernel
+def _run(
+    moves: NDArray[np.int64], stages: NDArray[np.int64], rows: int, lanes: int, periods: int, first: int, last: int
+) -> int:  # fmt: skip
+    """``moves`` (M, 4): address of an array, its rows, its first row in a block, whether it is written. ``stages`` (S, 7):
+    address of the function; rows at which world, seen and memory begin (-1: none); addresses of constants and tables; 1 for a
+    closing stage."""
+    space, missed = np.empty((rows, BLOCK)), 0
+    base = np.int64(space.ctypes.data)
+    for start in range(first, last, BLOCK):
+        n = min(BLOCK, last - start)
+        for m in range(moves.shape[0]):
+            array = carray(pointer(moves[m, 0], np.float64), (moves[m, 1], lanes))
+            for row in range(moves[m, 1]):
+                for i in range(n):
+                    space[moves[m, 2] + row, i] = array[row, start + i]
+        for period in range(periods):
+            for s in range(stages.shape[0]):
+                if stages[s, 6] == 0 or period == periods - 1:
+                    places = (
+                        base + stages[s, 1] * BLOCK * 8 if stages[s, 1] >= 0 else 0,
+                        base + stages[s, 2] * BLOCK * 8,
+                        base + stages[s, 3] * BLOCK * 8,
+                    )
+                    missed += call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
+        for m in range(moves.shape[0]):
+            array = carray(pointer(moves[m, 0], np.float64), (moves[m, 1], lanes))
+            for row in range(moves[m, 1] if moves[m, 3] else 0):
+                for i in range(n):
+                    array[row, start + i] = space[moves[m, 2] + row, i]
+    return missed
+
+
+@cache
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """Threads of this process: those of a parent do not survive a fork."""
+    return ThreadPoolExecutor(threads, "birthsim")
+
+
+def available_threads() -> int:
+    """The processors that this process may use, at most ``OMP_NUM_THREADS`` where that is set."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    limit = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, min(usable, int(limit)) if limit.isdigit() else usable)
+
+
+class Loop:
+    """Stages in the order in which a control period runs them, over ``lanes`` lanes.
+
+    ``world`` and ``seen`` place arrays of the caller, C-contiguous float64, which are read before and, where they are
+    writeable, written after a run;
+    ``closing`` stages run once, after the last period. The arrays must outlive the loop.
+    """
+
+    def __init__(
+        self, lanes: int, world: Sequence[Place], seen: Sequence[Place], stages: Sequence[Stage], closing: Sequence[Stage] = ()
+    ) -> None:
+        self._lanes, self._kept = lanes, (world, seen, stages, closing)
+        placed = [*world, *((array, WORLD + row) for array, row in seen)]
+        self._rows, moves, entries = WORLD + SEEN, [], []
+        for array, row in placed:
+            moves.append(self._move(array, row))
+        self._tables: list[NDArray[np.int64]] = []
+        for stage, closes in [*((one, 0) for one in stages), *((one, 1) for one in closing)]:
+            memory = self._rows
+            if stage.memory is not None:
+                moves.append(self._move(stage.memory, memory))
+                self._rows += stage.memory.shape[0]
+            about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
+            for entry, table in zip(about, stage.tables, strict=False):
+                entry[: 1 + table.ndim] = table.ctypes.data, *table.shape
+            self._tables.append(about)
+            places = (0 if stage.sees_world else -1, WORLD, memory)
+            entries.append((address_of(stage.function), *places, stage.constants.ctypes.data, about.ctypes.data, closes))
+        self._moves = np.array(moves, dtype=np.int64).reshape(-1, 4)
+        self._stages = np.array(entries, dtype=np.int64).reshape(-1, 7)
+
+    def _move(self, array: Array, row: int) -> tuple[int, int, int, int]:
+        if array.dtype != np.float64 or not array.flags.c_contiguous or array.ndim != 2 or array.shape[1] != self._lanes:
+            raise ValueError(
+                f"an array {array.dtype} {array.shape} in a loop; allowed: float64, contiguous, (rows, {self._lanes})"
+            )
+        return array.ctypes.data, array.shape[0], row, int(array.flags.writeable)
+
+    def run(self, periods: int = 1, threads: int = 1) -> int:
+        """Run ``periods`` control periods; returns how many lanes and periods a stage could not serve."""
+        blocks = -(-self._lanes // BLOCK)
+        parts = min(threads, blocks)
+        arguments = (self._moves, self._stages, self._rows, self._lanes, periods)
+        if parts == 1:
+            return int(_run(*arguments, 0, self._lanes))
+        edges = [min(self._lanes, BLOCK * (blocks * k // parts)) for k in range(parts)] + [self._lanes]
+        pool = _pool(os.getpid(), parts - 1)
+        waiting = [pool.submit(_run, *arguments, edges[k], edges[k + 1]) for k in range(1, parts)]
+        missed = _run(*arguments, edges[0], edges[1])
+        return int(missed + sum(one.result() for one in waiting))

@@ -1,0 +1,53 @@
+"""Named rows of what the stages of a closed loop share, in blocks (rows, BLOCK).
+
+``World`` is the truth, for the plant and what acts on it; ``Seen`` is what a controller is handed. The rig's parameters and
+state stand at the beginning of the world, in the order of ``physics.lanes``.
+"""
+
+from __future__ import annotations
+
+from birthsim_env.parts.signals import REFERENCES
+from birthsim_env.physics.lanes import PARAMETERS, STATES
+
+STATE = PARAMETERS
+IMPACT = STATE + STATES
+"""Fastest collision of each piston with an end stop in this policy step, m/s."""
+MOTION = IMPACT + 2
+"""True x, y (m), vx, vy (m/s) of the end effector."""
+FORCE = MOTION + 4
+"""The hand's force Fx, Fy, N."""
+SINCE_JUMP = FORCE + 2
+"""s since force or stiffness setpoint jumped."""
+TICK = SINCE_JUMP + 1
+"""Control periods since the episode began."""
+WORLD = TICK + 1
+"""Rows of the world."""
+
+MOST_ACTIONS, MOST_SHOWN = 8, 16
+
+TIME = 0
+"""s since the episode began."""
+POSITION = TIME + 1
+"""Measured x, y of the end effector, m."""
+POSITION_TIME = POSITION + 2
+"""When that was, s."""
+VELOCITY = POSITION_TIME + 1
+"""vx, vy as measured, m/s."""
+PRESSURE = VELOCITY + 2
+"""Measured pressures of chambers P1, N1, P2, N2, Pa."""
+USER_FORCE = PRESSURE + 4
+"""Measured force of the hand, N."""
+REFERENCE = USER_FORCE + 2
+"""What is asked for, in the order of ``signals.REFERENCE_NAMES``."""
+ASKED = REFERENCE + REFERENCES
+"""What a law is asked for: the reference, or what a residual has made of it."""
+FEEDFORWARD = ASKED + REFERENCES
+"""What a law is told besides: forces along cylinders 1 and 2 (N), their rates (N/s), a damping factor."""
+ACTION = FEEDFORWARD + 5
+"""The policy's action."""
+OPENING = ACTION + MOST_ACTIONS
+"""Commanded openings of the valves of chambers P1, N1, P2, N2."""
+SHOWN = OPENING + 4
+"""What an actuation shows of its memory to a policy."""
+SEEN = SHOWN + MOST_SHOWN
+"""Rows of what is seen."""

@@ -1,0 +1,129 @@
+"""Stages: what happens in a control period, each compiled by itself and called by its address.
+
+A stage is a kernel over one block of lanes. Its seven arguments are whole numbers: the addresses of the world and of what is
+seen (``loop.rows``), of its own memory, constants and tables, the first lane of the block and the number of lanes. It returns
+how many lanes it could not serve. ``block``, ``numbers`` and ``table`` turn addresses into arrays; a block's shape is constant,
+so that LLVM vectorises loops over it. A law is called with zero for the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from birthsim_env.physics.compilation import BLOCK, helper
+from birthsim_env.physics.lanes import Array
+
+ARGUMENTS = 7
+SIGNATURE = types.int64(*[types.int64] * ARGUMENTS)
+TABLE = 5
+"""Whole numbers that describe a table: its address and up to four dimensions."""
+
+
+@intrinsic
+def pointer(context: Any, address: Any, kind: Any) -> Any:
+    """Pointer to numbers of the type ``kind`` (a Numba type) at an address."""
+    target = types.CPointer(kind.dtype)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(target))
+
+    return target(address, kind), generate
+
+
+@intrinsic
+def call(context: Any, address: Any, *arguments: Any) -> Any:
+    """Call the stage at an address."""
+    signature = types.int64(types.int64, types.StarArgTuple.from_types(arguments))
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        number = ir.IntType(64)
+        function = builder.inttoptr(given[0], ir.FunctionType(number, [number] * ARGUMENTS).as_pointer())
+        values = [builder.extract_value(given[1], k) for k in range(ARGUMENTS)]
+        return builder.call(function, values)
+
+    return signature, generate
+
+
+@intrinsic(prefer_literal=True)
+def scratch(context: Any, rows: Any) -> Any:
+    """Pointer to a block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
+    size = rows.literal_value * BLOCK
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return cgutils.alloca_once(builder, ir.DoubleType(), size=size)
+
+    return types.CPointer(types.float64)(rows), generate
+
+
+@helper
+def block(address: int, rows: int) -> Array:
+    """The block (``rows``, BLOCK) at an address; with a constant number of rows, a constant shape."""
+    return carray(pointer(address, np.float64), (rows, BLOCK))
+
+
+@helper
+def numbers(address: int, count: int) -> Array:
+    """``count`` numbers at an address."""
+    return carray(pointer(address, np.float64), (count,))
+
+
+@helper
+def table1(tables: int, k: int) -> Array:
+    """Table ``k`` of one dimension."""
+    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
+    return carray(pointer(about[k * TABLE], np.float64), (about[k * TABLE + 1],))
+
+
+@helper
+def table2(tables: int, k: int) -> Array:
+    """Table ``k`` of two dimensions."""
+    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
+    return carray(pointer(about[k * TABLE], np.float64), (about[k * TABLE + 1], about[k * TABLE + 2]))
+
+
+@helper
+def table3(tables: int, k: int) -> Array:
+    """Table ``k`` of three dimensions."""
+    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
+    shape = (about[k * TABLE + 1], about[k * TABLE + 2], about[k * TABLE + 3])
+    return carray(pointer(about[k * TABLE], np.float64), shape)
+
+
+@helper
+def table4(tables: int, k: int) -> Array:
+    """Table ``k`` of four dimensions."""
+    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
+    shape = (about[k * TABLE + 1], about[k * TABLE + 2], about[k * TABLE + 3], about[k * TABLE + 4])
+    return carray(pointer(about[k * TABLE], np.float64), shape)
+
+
+def address_of(stage: Any) -> int:
+    """Where the machine code of a kernel with the signature of a stage begins; compiled when it is first asked for."""
+    if SIGNATURE.args not in stage.overloads:
+        stage.compile(SIGNATURE)
+    compiled = stage.overloads[SIGNATURE.args]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
+
+
+@dataclass
+class Stage:
+    """A compiled stage with what is its own.
+
+    ``memory`` (M, N) is carried from period to period; ``constants`` (C,) are the same for all lanes; ``tables``, C-contiguous
+    with lanes as their last axis, are too large to be carried along. ``sees_world`` is False for whatever controls the rig.
+    """
+
+    function: Callable[..., int]
+    constants: Array = field(default_factory=lambda: np.zeros(1))
+    memory: Array | None = None
+    tables: tuple[NDArray[Any], ...] = ()
+    sees_world: bool = True

@@ -1,0 +1,70 @@
+"""Stages of the world: the plant with its clock, and what jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import carray
+
+from birthsim_env.loop.rows import (
+    FORCE,
+    IMPACT,
+    MOTION,
+    OPENING,
+    REFERENCE,
+    SEEN,
+    SINCE_JUMP,
+    STATE,
+    TICK,
+    TIME,
+    WORLD,
+)
+from birthsim_env.loop.stage import Stage, block, numbers, scratch
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
+
+
+@kernel
+def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: control period, s; integration steps in it."""
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
+    dx, total = carray(scratch(STATES), (STATES, BLOCK)), carray(scratch(STATES), (STATES, BLOCK))
+    trial, x, u = carray(scratch(STATES), (STATES, BLOCK)), w[STATE : STATE + STATES], s[OPENING : OPENING + 4]
+    p, hit = w[:PARAMETERS], w[IMPACT : IMPACT + 2]
+    steps = int(about[1])
+    dynamics.integrate(x, u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, hit, dx, total, trial, n)
+    dynamics.settle(x, n)
+    for i in range(n):
+        w[TICK, i] += 1.0
+        s[TIME, i] = w[TICK, i] * about[0]
+    end_effector_motion(x[:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
+    return 0
+
+
+def plant_stage(period: float) -> Stage:
+    """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand."""
+    return Stage(_plant, np.array([period, dynamics.steps_in(period)]))
+
+
+@kernel
+def _jumps(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: period, s; what of a force's change in one is a jump, N; 1 to start counting the present instant."""
+    w, s, last, about = block(world, WORLD), block(seen, SEEN), block(memory, 5), numbers(constants, 3)
+    for i in range(n):
+        since = w[SINCE_JUMP, i] + about[0]
+        jumped = abs(w[FORCE, i] - last[0, i]) > about[1] or abs(w[FORCE + 1, i] - last[1, i]) > about[1]
+        for k, row in ((2, 8), (3, 9), (4, 14)):
+            jumped = jumped or s[REFERENCE + row, i] != last[k, i]
+        w[SINCE_JUMP, i] = w[SINCE_JUMP, i] if about[2] > 0.0 else 0.0 if jumped else since
+        last[0, i], last[1, i] = w[FORCE, i], w[FORCE + 1, i]
+        last[2, i], last[3, i], last[4, i] = s[REFERENCE + 8, i], s[REFERENCE + 9, i], s[REFERENCE + 14, i]
+    return 0
+
+
+def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> Stage:
+    """Counts the time since the force changed faster than ``jump_rate``, N/s, or a closed-loop setpoint changed at all.
+
+    ``memory`` (5, N): force and setpoints a period ago; where an episode ``begins`` they are only remembered.
+    """
+    return Stage(_jumps, np.array([period, jump_rate * period, float(begins)]), memory)
