@@ -147,7 +147,7 @@ class Simulation:
         """What the sensors say now."""
         rows = self._seen[:REFERENCE].copy()
         return Measurement(
-            rows[TIME], rows[POSITION:POSITION_TIME], rows[POSITION_TIME], rows[VELOCITY:PRESSURE], rows[PRESSURE:USER_FORCE],
+            rows[TIME], rows[POSITION:VELOCITY], rows[POSITION_TIME], rows[VELOCITY:POSITION_TIME], rows[PRESSURE:USER_FORCE],
             rows[USER_FORCE:REFERENCE], self.sensors.sampled,
         )  # fmt: skip
 
@@ -231,7 +231,7 @@ class Simulation:
 
     def _acting(self) -> list[Stage | Callable[[], None]]:
         compiled = getattr(self.actuation, "stages", None)
-        return [*compiled()] if compiled else [self._ask]
+        return [*compiled(self.plant.num_envs, self.sensors.sampled)] if compiled else [self._ask]
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Callable[[], None]) -> list[Stage | Callable[[], None]]:

@@ -9,9 +9,9 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
 import birthsim_env
+from agents.residual import authority
 from agents.residual.env import ResidualEnv, ResidualVectorEnv
-from agents.residual.experience import Experience
-from agents.residual.guard import Guard
+from agents.residual.law import ResidualActuation, ResidualLaw
 from agents.residual.settings import LAWS, ResidualSettings
 from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
@@ -19,6 +19,7 @@ from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
 from birthsim_env.parts.scenarios import SCENARIOS
+from tests.residual_parts import UnexplainedForceObserver
 
 assert birthsim_env  # importing it registers the ids
 IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS)
@@ -104,7 +105,7 @@ def test_zero_actions_on_a_rig_of_ones_own_are_the_law_told_of_that_rig():
 @pytest.fixture
 def unguarded(monkeypatch):
     """Nothing that oscillates costs authority."""
-    monkeypatch.setattr(Guard, "share", property(lambda self: np.ones((2, self._memory.shape[1]))))
+    monkeypatch.setattr(authority, "LEVEL", np.inf)
 
 
 @pytest.mark.parametrize(
@@ -141,15 +142,18 @@ def test_a_held_action_becomes_a_believed_force_and_its_rate_through_the_low_pas
 
 @pytest.fixture
 def told(monkeypatch):
-    """Every force (2, N), N, and rate (2, N), N/s, that a law inside was told about."""
-    beliefs, command = [], BacksteppingController.command
+    """Forces (2, N), N, and rates (2, N), N/s, that the law inside was told about, (4, N) a control period: the loop, else
+    compiled, stops for it."""
+    beliefs, command = [], ResidualLaw.command
 
-    def spied(self, measurement, reference, believed_force=None, believed_rate=None, damping_factor=None):
-        assert damping_factor is None
-        beliefs.append((believed_force.copy(), believed_rate.copy()))
-        return command(self, measurement, reference, believed_force, believed_rate)
+    def spied(self, measurement, reference):
+        openings = command(self, measurement, reference)
+        assert not self.told[4].any()
+        beliefs.append(self.told[:4])
+        return openings
 
-    monkeypatch.setattr(BacksteppingController, "command", spied)
+    monkeypatch.delattr(ResidualActuation, "stages")
+    monkeypatch.setattr(ResidualLaw, "command", spied)
     return beliefs
 
 
@@ -160,7 +164,7 @@ def test_the_believed_force_never_exceeds_the_authority_and_changes_at_the_contr
     actions[30:] = 1.0
     for action in actions:
         env.step(action)
-    forces, rates = np.array(told).swapaxes(0, 1).reshape(2, 50, 10, 2, 4)
+    forces, rates = np.array(told).reshape(50, 10, 2, 2, 4).transpose(2, 0, 1, 3, 4)
     smooth = np.zeros((2, 4))
     for k, action in enumerate(actions):
         for tick in range(10):
@@ -189,7 +193,7 @@ def test_oscillation_costs_authority_and_what_is_left_is_seen(told):
             believed = smooth
             smooth = smooth + (1 - np.exp(-1 / 28)) * (action - smooth)
         # In the last period of a step the share was the one that the policy sees after it.
-        force, rate = (belief[:, 0] for belief in told[10 * step + 9])
+        force, rate = told[10 * step + 9][:, 0].reshape(2, 2)
         np.testing.assert_allclose(force, 400 * shares[step, :, 0] * believed, rtol=1e-5, atol=1e-9)
         np.testing.assert_allclose(rate, 400 * shares[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
 
@@ -210,10 +214,9 @@ def test_an_ended_lane_starts_its_next_episode_with_no_believed_force(told, ungu
             assert infos["time"][1] == 0
             actions[1] = 0.0
     assert ended is not None
-    np.testing.assert_allclose(told[10 * ended][0], [[50, -500, 50]] * 2, rtol=0.02)
-    for belief in told[-1]:
-        np.testing.assert_array_equal(belief[:, 1], 0.0)
-    np.testing.assert_allclose(told[-1][0][:, [0, 2]], 50, rtol=0.02)
+    np.testing.assert_allclose(told[10 * ended][:2], [[50, -500, 50]] * 2, rtol=0.02)
+    np.testing.assert_array_equal(told[-1][:, 1], 0.0)
+    np.testing.assert_allclose(told[-1][:2, [0, 2]], 50, rtol=0.02)
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -276,12 +279,12 @@ def test_observations_end_with_the_last_action_and_what_the_law_remembers(argume
 def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(sensors):
     env = lanes(3, PROBE, sensors=sensors, randomize=True, policy_period=1e-3)
     observation, _ = env.reset(seed=5)
-    experience = Experience(RIG)
-    experience.reset(np.ones(3, dtype=np.bool_))
+    observer = UnexplainedForceObserver(RIG)
+    observer.reset(np.ones(3, dtype=np.bool_))
     for _ in range(400):
-        experience.update(env.measurement)
+        observer.update(env.measurement)
         observation = env.step(np.zeros((3, 2), np.float32))[0]
-        np.testing.assert_array_equal(observation[:, -6:], np.clip(experience.met.T / 100, -10, 10).astype(np.float32))
+        np.testing.assert_array_equal(observation[:, -6:], np.clip(observer.met.T / 100, -10, 10).astype(np.float32))
     assert np.abs(observation[:, -6:]).max() > 0.05
 
 

@@ -52,7 +52,7 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
 
     However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. But for
     `"fixed"` it also works less stiffly for a while where pistons swing beyond 0.25 m/s, whatever the action
-    (`agents.residual.guard`).
+    (`agents.residual.authority`).
     With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
 
     ## Observation space

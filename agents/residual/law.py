@@ -13,16 +13,35 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import carray
 
-from agents.residual.experience import Experience
-from agents.residual.guard import Guard
+from agents.residual import authority, unexplained
 from agents.residual.settings import NO_LAW, ResidualSettings
+from baselines.estimation import disturbance_observer, observers
 from baselines.registry import make_controller
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import (
+    ACTION,
+    ASKED,
+    FEEDFORWARD,
+    MOST_ACTIONS,
+    OPENING,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    REFERENCE,
+    SEEN,
+    SHOWN,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+)
+from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.lanes import PARAMETERS, Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
 
@@ -81,7 +100,12 @@ def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
 
 
 @kernel
-def _stiffen(force: Array, powers: Array, rows: Array) -> None:
+def stiffen(force: Array, powers: Array, rows: Array) -> None:
+    """Changes a reference ``rows`` (15, N) to stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
+
+    K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does. ``force`` (2, N), N, is the
+    hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
+    """
     for i in range(rows.shape[1]):
         for axis in range(2):
             if powers[axis, i] != 0.0:
@@ -91,84 +115,155 @@ def _stiffen(force: Array, powers: Array, rows: Array) -> None:
                 rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
 
 
-def stiffened(reference: Reference, force: Array, powers: Array) -> Reference:
-    """``reference`` (rows over N lanes) with stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
-
-    K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does.
-
-    ``force`` (2, N), N, is the hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
-    """
-    rows = reference.rows.copy()
-    _stiffen(force, powers, rows)
-    return Reference(rows)
-
-
 @kernel
-def _tell(
-    action: Array, share: Array, authority: float, time_constant: float, quickness: float, smooth: Array, told: Array
-) -> None:
+def _tell(action: Array, left: Array, most: float, time_constant: float, quickness: float, smooth: Array, told: Array) -> None:
     """Writes forces, N, their rates, N/s, and, of actions that have them, powers of stiffness and the damping factor (7, N);
     ``smooth`` (size, N) goes on by one period towards ``action``."""
     size = action.shape[0]
     for i in range(action.shape[1]):
         for k in range(2):
-            strength = authority * share[k, i]
+            strength = most * left[k, i]
             told[k, i] = strength * smooth[k, i]
             told[2 + k, i] = strength / time_constant * (action[k, i] - smooth[k, i])
-            told[4 + k, i] = max(smooth[2 + k, i], 0.0) * min(share[0, i], share[1, i]) if size > 2 else 0.0
+            told[4 + k, i] = max(smooth[2 + k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
         told[6, i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth[4, i], 0.0)) if size > 4 else 0.0
         for k in range(size):
             smooth[k, i] += quickness * (action[k, i] - smooth[k, i])
 
 
-class ResidualLaw:
-    """A law with a residual over N lanes; room for them is made by the first ``reset``."""
+CONSTANTS = (
+    *("sampled", "rows", "period", "noise", "size", "authority", "time_constant", "quickness", "level", "unit"),
+    *("has_law", "stiffens", "damps"),
+)
+"""Constants of the stage: 1 with sampled positions; rows of the observer; control period, s; position noise, m; length of an
+action; authority, N; time constant, s, and quickness of the low-pass; speed error, m/s, below which nothing is an oscillation;
+``FORCE_UNIT``; 1 with a law, 1 where the impedance has a stiffness and 1 where it has a damping. The rig follows."""
+SAMPLED, OBSERVER, PERIOD, NOISE, SIZE, AUTHORITY, CONSTANT, QUICKNESS, LEVEL_ROW, UNIT, HAS_LAW, STIFFENS, DAMPS = range(13)
+SMOOTH, LIMITER = 0, MOST_ACTIONS
+MET_ROWS = LIMITER + authority.ROWS
+WAYS = MET_ROWS + unexplained.ROWS
+PISTONS = WAYS + 4
+"""Rows of memory at which its parts begin: smoothed action; authority; forces met; which ways pistons have moved; observer."""
+MEASURED_ROWS = 5
+
+
+@kernel
+def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s, about = block(seen, SEEN), numbers(constants, len(CONSTANTS) + PARAMETERS)
+    p, size, sampled, period = about[len(CONSTANTS) :], int(about[SIZE]), about[SAMPLED] > 0.0, about[PERIOD]
+    m = block(memory, PISTONS + int(about[OBSERVER]))[:, :n]
+    own = carray(scratch(17), (17, BLOCK))[:, :n]
+    joints, disturbance, told, nothing, moving = own[:4], own[4:6], own[6:13], own[13:15], own[15]
+    for i in range(n):
+        nothing[0, i], nothing[1, i], moving[i] = 0.0, 0.0, 1.0
+    force, pistons = s[USER_FORCE:REFERENCE, :n], m[PISTONS:]
+    position, velocity, pressures = s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n], s[PRESSURE:USER_FORCE, :n]
+    if sampled:
+        observers.observe(
+            pistons, s[TIME, :n], position, s[POSITION_TIME, :n], velocity, pressures, p, period, observers.BANDWIDTH,
+            about[NOISE], force, nothing, moving,
+        )  # fmt: skip
+    else:
+        disturbance_observer.observe(
+            pistons, position, velocity, pressures, force, nothing, p, period, unexplained.BANDWIDTH, pistons[4], joints
+        )
+    for i in range(n):
+        if sampled:
+            for k in range(4):
+                joints[k, i] = pistons[k, i]
+            disturbance[0, i], disturbance[1, i] = pistons[4, i], pistons[5, i]
+        else:
+            disturbance[0, i], disturbance[1, i], pistons[4, i] = pistons[2, i], pistons[3, i], 0.0
+    met, limiter, target = m[MET_ROWS:WAYS], m[LIMITER:MET_ROWS], s[REFERENCE:ASKED, :n]
+    unexplained.remember(joints, disturbance, p, period, m[WAYS:PISTONS], met)
+    authority.limit_authority(joints, target, p, period, about[LEVEL_ROW], limiter)
+    action, smooth = s[ACTION : ACTION + size, :n], m[SMOOTH : SMOOTH + size]
+    left = limiter[: authority.SOFTNESS : authority.CYLINDER]
+    _tell(action, left, about[AUTHORITY], about[CONSTANT], about[QUICKNESS], smooth, told)
+    asked = s[ASKED:FEEDFORWARD, :n]
+    for i in range(n):
+        for row in range(REFERENCES):
+            asked[row, i] = target[row, i]
+        for row in range(4):
+            s[FEEDFORWARD + row, i] = told[row, i]
+        s[FEEDFORWARD + 4, i] = told[6, i] if about[DAMPS] > 0.0 else 0.0
+        told[4, i], told[5, i] = told[4, i] - limiter[authority.SOFTNESS, i], told[5, i] - limiter[authority.SOFTNESS, i]
+        for k in range(size):
+            s[SHOWN + k, i] = smooth[k, i]
+        s[SHOWN + size, i], s[SHOWN + size + 1, i] = left[0, i], left[1, i]
+        for k in range(unexplained.ROWS):
+            s[SHOWN + size + 2 + k, i] = max(-LIMIT, min(LIMIT, met[k, i] / about[UNIT]))
+        for valve in range(4 if about[HAS_LAW] == 0.0 else 0):
+            s[OPENING + valve, i] = action[valve, i]
+    if about[STIFFENS] > 0.0:
+        stiffen(force, told[4:6], asked)
+    return 0
+
+
+class ResidualLaw(StagedController):
+    """A law with a residual over N lanes: ``accept`` takes the actions (size, N) of a policy step."""
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
+        super().__init__(parameters)
         self.settings = settings
         # Whichever law it is can be told of forces; those that have an impedance also of a damping factor.
-        self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, parameters)
-        self._experience = Experience(parameters)
-        period = parameters.electronics.control_period
-        self._guard = Guard(period, parameter_column(parameters))
-        self._quickness = 1.0 - exact.exp(-period / settings.time_constant)
-        self._action: Array = np.zeros((settings.size, 0))
-        self._smooth: Array = np.zeros((settings.size, 0))
+        self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
+        self.action: Array = np.zeros((settings.size, 0))
+        self.shown: Array = np.zeros((settings.size + len(MET) + 2, 0))
 
-    def reset(self, lanes: Mask) -> None:
-        """Forget the past of the lanes where ``lanes`` (N,) is True."""
-        if self._smooth.shape[1] != len(lanes):
-            self._action, self._smooth = np.zeros((2, self.settings.size, len(lanes)))
-            if self._law is not None:
-                self._law.reset()
-        if self._law is not None:
-            self._law.reset(lanes)
-        self._experience.reset(lanes)
-        self._guard.reset(lanes)
-        self._action[:, lanes], self._smooth[:, lanes] = 0.0, 0.0
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        settings, board = self.settings, self.parameters.electronics
+        rows = observers.memory_rows(self.parameters) if sampled else MEASURED_ROWS
+        constants = {
+            **{"sampled": sampled, "rows": rows, "period": board.control_period, "noise": board.position_noise},
+            **{"size": settings.size, "authority": settings.authority, "time_constant": settings.time_constant},
+            **{"quickness": 1.0 - exact.exp(-board.control_period / settings.time_constant)},
+            **{"level": authority.LEVEL, "unit": FORCE_UNIT, "has_law": self._law is not None},
+            **{"stiffens": settings.impedance != "fixed", "damps": settings.impedance == "variable"},
+        }
+        fresh = np.zeros(PISTONS + rows)
+        fresh[LIMITER:MET_ROWS] = authority.FRESH
+        fresh[PISTONS + (observers.FRESH if sampled else 4)] = 1.0
+        own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *self._p]), fresh)
+        return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        self._law.explain(measurement, reference)
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        super().reset(lanes)
+        if lanes is not None:
+            if self.action.shape[1] != len(lanes):
+                self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
+            self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
+            self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
 
     def accept(self, actions: Array) -> None:
         """Take the actions (size, N) of a policy step."""
-        self._action = np.array(actions)
+        self.action[:] = actions
 
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
-        """Spool openings (4, N) of one control period."""
-        self._experience.update(measurement)
-        self._guard.update(self._experience.joints, reference)
-        settings, told = self.settings, np.empty((7, self._smooth.shape[1]))
-        _tell(self._action, self._guard.share, settings.authority, settings.time_constant, self._quickness, self._smooth, told)
-        if self._law is None:
-            return self._action
-        if settings.impedance != "fixed":
-            told[4:6] -= self._guard.softness
-            reference = stiffened(reference, np.ascontiguousarray(measurement.user_force), told[4:6])
-        damping = (told[6],) if settings.impedance == "variable" else ()
-        return np.asarray(self._law.command(measurement, reference, told[:2], told[2:4], *damping))
+    @property
+    def limiter(self) -> Array:
+        """Memory of what limits the authority, (``authority.ROWS``, N)."""
+        return self._memories[0][LIMITER:MET_ROWS]
+
+    @property
+    def asked(self) -> Reference:
+        """What the law inside was asked for in the last ``command``."""
+        return Reference(self._seen[ASKED:FEEDFORWARD].copy())
+
+    @property
+    def told(self) -> Array:
+        """What it was told besides: forces along the cylinders, N, their rates, N/s, and a damping factor; (5, N)."""
+        return self._told.copy()
+
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        return [(self.action, ACTION), (self.shown, SHOWN)]
 
     def memory(self) -> Array:
-        """What a policy sees of it, (size + 8, N): smoothed action, shares of the authority, forces met in ``FORCE_UNIT``."""
-        met = np.clip(self._experience.met / FORCE_UNIT, -LIMIT, LIMIT)
-        return np.concatenate([self._smooth, self._guard.share, met])
+        """What a policy sees of it, (size + 8, N): smoothed action, authority that is left, forces met in ``FORCE_UNIT``."""
+        return self.shown.copy()
 
 
 class ResidualActuation:
@@ -182,6 +277,11 @@ class ResidualActuation:
         self.names = action_names(settings)
         self.memory_names = memory_names(settings)
 
+    @property
+    def shown(self) -> Array:
+        """What a policy sees of the law's memory, (size + 8, N)."""
+        return self._law.shown
+
     def begin(self, lanes: Mask) -> None:
         self._law.reset(lanes)
 
@@ -190,6 +290,15 @@ class ResidualActuation:
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         return self._law.command(measurement, reference)
+
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
+        """``openings``, compiled into the closed loop."""
+        self._law.prepare(lanes, sampled)
+        return self._law.stages()
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the law."""
+        self._law.explain(measurement, reference)
 
     def memory(self) -> Array:
         return self._law.memory()

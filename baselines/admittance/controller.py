@@ -8,32 +8,32 @@ halved as well.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from baselines.admittance import law as admittance_law
+from baselines.admittance import stage as at
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.controller import check_gains, lanes_of, told_of
-from baselines.estimation.awareness import Awareness
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from baselines.controller import check_gains, require_stiffness
+from baselines.estimation.admittance import DAMPING_RATIO
+from baselines.estimation.observers import FRESH, memory_rows
+from baselines.staged import LawStage, StagedController
+from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics import exact
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
 
 LEAST_SHARE = 0.35
 """Of the gain, however long the loop oscillates: below it friction wins."""
 
-FRESH = np.zeros((admittance_law.MEMORY, 1))
-"""What a lane remembers when it starts."""
-FRESH[admittance_law.GAIN_SHARES] = 1.0
 
-
-class AdmittanceBackstepping:
+class AdmittanceBackstepping(StagedController):
     """Renders any stiffness matrix through friction, given a force sensor.
 
-    ``Awareness`` turns the measured force into the motion that the hand should find, and observes what is not known of the rig,
+    The stage turns the measured force into the motion that the hand should find, and observes what is not known of the rig,
     friction above all; ``admittance_law`` follows that motion stiffly.
 
     Arguments:
@@ -92,59 +92,28 @@ class AdmittanceBackstepping:
         check_gains(self, gains)
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
-        self.parameters = load_parameters(parameters)
-        self._p = parameter_column(self.parameters)
-        self._period = self.parameters.electronics.control_period
+        super().__init__(parameters)
         self._gains: dict[str, dict[str, float]] = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
-        self._awareness = {kind: Awareness(self.parameters, kind == "lab", own) for kind, own in self._gains.items()}
-        self._memory: Array = np.empty((admittance_law.MEMORY, 0))
 
     @property
     def gain_share(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
-        return np.asarray(self._memory[admittance_law.GAIN_SHARES])
+        return self._memories[0][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
 
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        for part in self._awareness.values():
-            part.reset(lanes)
-        if lanes is None:
-            self._memory = np.empty((admittance_law.MEMORY, 0))
-        elif self._memory.shape[1]:
-            self._memory[:, lanes] = FRESH
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        g, rig = self._gains["lab" if sampled else "ideal"], self.parameters
+        period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else at.MEASURED_ROWS
+        cells = exact.exp(-(g["pressure_bandwidth"] if sampled else math.inf) * period)
+        constants = {
+            **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
+            **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
+            **{"quickness": 1.0 - exact.exp(-period / g["lead_time"]), "least_share": LEAST_SHARE, **g},
+        }
+        fresh = np.zeros(at.PISTONS + rows)
+        fresh[[at.ADMITTANCE + 4, at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0
+        fresh[[at.LAW + row for row in admittance_law.GAIN_SHARES]] = 1.0
+        return [LawStage(at.control, np.array([*(constants[name] for name in at.CONSTANTS), *self._p]), fresh)]
 
-    def command(
-        self,
-        measurement: Measurement,
-        reference: Reference,
-        believed_force: Array | None = None,
-        believed_rate: Array | None = None,
-        damping_factor: Array | None = None,
-    ) -> Array:
-        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
-
-        Called once per control period. ``believed_force`` (2, N), N, along the cylinders, and its rate ``believed_rate``,
-        N/s, are believed in beside what is observed. ``damping_factor`` (N,) multiplies the damping that the hand feels; below
-        1 it is 1. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness setpoint that is not
-        positive definite.
-        """
-        if measurement.position.ndim == 1:
-            given = (believed_force, believed_rate, damping_factor)
-            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
-            return self.command(*one_lane(measurement, reference), *told)[:, 0]
-        lanes = lanes_of(measurement, reference)
-        believed = told_of(lanes, believed_force, believed_rate)
-        if self._memory.shape[1] != lanes:
-            self._memory = np.repeat(FRESH, lanes, axis=1)
-        kind = "lab" if measurement.sampled else "ideal"
-        g, awareness = self._gains[kind], self._awareness[kind]
-        now = awareness.update(measurement, reference, damping_factor)
-        openings = np.empty((4, lanes))
-        quickness = 1.0 - exact.exp(-self._period / g["lead_time"])
-        admittance_law.command(
-            now.joints, now.pressures, now.motion, reference.rows, now.force, now.unseen, now.rest, now.moving,
-            now.spools, self._p, self._period, g["gain"], g["rest_gain"], g["rest_push"], g["dead_zone"],
-            quickness, g["oscillation"], g["yielding"], LEAST_SHARE, PNEUMATIC_GAIN, believed, self._memory, openings,
-        )  # fmt: skip
-        awareness.commanded(openings)
-        return openings
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the first lane whose stiffness is not positive definite."""
+        require_stiffness(reference, 0.0)

@@ -7,16 +7,35 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numba import carray
 
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.controller import lanes_of, told_of
-from baselines.estimation.observers import PistonObserver, measured_joints
+from baselines.estimation.observers import BANDWIDTH, FRESH, PistonObserver, measured_joints, memory_rows, observe
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import (
+    ACTION,
+    ASKED,
+    FEEDFORWARD,
+    OPENING,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    SEEN,
+    SHOWN,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+)
+from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics.compilation import BLOCK, kernel
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.lanes import PARAMETERS, Array
+from birthsim_env.physics.parameters import Parameters
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -44,7 +63,34 @@ class LawTerms:
     pneumatic_stiffness_rate: Array
 
 
-class BacksteppingController:
+@kernel
+def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: rows of the observer's memory, or 0 where speeds are measured; control period, s; bandwidth, 1/s, and position
+    noise, m; options of the law; the rig."""
+    s, about = block(seen, SEEN), numbers(constants, 4 + backstepping_law.OPTIONS + PARAMETERS)
+    options, p = about[4 : 4 + backstepping_law.OPTIONS], about[4 + backstepping_law.OPTIONS :]
+    joints, rows = carray(scratch(4), (4, BLOCK)), int(about[0])
+    if rows > 0:
+        nothing = carray(scratch(3), (3, BLOCK))
+        for i in range(n):
+            nothing[0, i], nothing[1, i], nothing[2, i] = 0.0, 0.0, 1.0
+        m = block(memory, rows)
+        observe(
+            m[:, :n], s[TIME, :n], s[POSITION:VELOCITY, :n], s[POSITION_TIME, :n], s[VELOCITY:POSITION_TIME, :n],
+            s[PRESSURE:USER_FORCE, :n], p, about[1], about[2], about[3], nothing[:2, :n], nothing[:2, :n], nothing[2, :n],
+        )  # fmt: skip
+        for row in range(4):
+            for i in range(n):
+                joints[row, i] = m[row, i]
+    else:
+        piston_motion(s[POSITION:POSITION_TIME], p, joints, n)
+    return backstepping_law.command(
+        joints[:, :n], s[PRESSURE:USER_FORCE, :n], s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], p, options,
+        s[OPENING:SHOWN, :n],
+    )  # fmt: skip
+
+
+class BacksteppingController(StagedController):
     """Backstepping control of position, pneumatic and closed-loop stiffness (Herzig et al. 2015, section IV and Fig. 3).
 
     Arguments:
@@ -66,7 +112,9 @@ class BacksteppingController:
             fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
             valves drain, no force is left to come back, and the episode is lost.
 
-    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds.
+    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. A
+    damping factor is the damping in units of the least there is; up to 1.01 it is that, and where a ``damping_ratio`` is given
+    it says nothing.
     Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
     """
 
@@ -89,11 +137,10 @@ class BacksteppingController:
             raise ValueError(f"valves = {valves!r}; allowed: {', '.join(VALVE_LAYOUTS)}")
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
-        self.parameters = load_parameters(parameters)
+        super().__init__(parameters)
         self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
-        self._p = parameter_column(self.parameters)
         self._options: Array = np.empty(backstepping_law.OPTIONS)
         self._options[backstepping_law.PNEUMATIC_GAIN] = pneumatic_gain
         self._options[backstepping_law.SIGN_WIDTH] = sign_width
@@ -104,39 +151,35 @@ class BacksteppingController:
         self._options[backstepping_law.FORCE_FIRST] = self.force_first
         self._observer = PistonObserver(self.parameters, self._p)
 
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        board, rows = self.parameters.electronics, memory_rows(self.parameters) if sampled else 0
+        numbers = (rows, board.control_period, BANDWIDTH, board.position_noise)
+        fresh = np.zeros(rows)
+        fresh[FRESH : FRESH + 1] = 1.0
+        return [LawStage(_stage, np.array([*numbers, *self._options, *self._p]), fresh)]
+
     def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True. Only the observer has a memory."""
+        super().reset(lanes)
         self._observer.reset(lanes)
 
-    def command(
-        self,
-        measurement: Measurement,
-        reference: Reference,
-        believed_force: Array | None = None,
-        believed_rate: Array | None = None,
-        damping_factor: Array | None = None,
-    ) -> Array:
-        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
-
-        ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes acts on the pistons;
-        ``believed_rate`` (2, N), N/s, is how fast it changes, which the force then follows without the lag of c3.
-        ``damping_factor`` (N,) is the damping in units of the least there is; up to 1.01 it is that, and where a
-        ``damping_ratio`` is given it says nothing.
-        Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that no positive gains render,
-        naming the lane and what is allowed there.
-        """
-        if measurement.position.ndim == 1:
-            given = (believed_force, believed_rate, damping_factor)
-            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
-            return self.command(*one_lane(measurement, reference), *told)[:, 0]
-        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
-        openings = np.empty(measurement.pressures.shape)
-        misses = backstepping_law.command(
-            joints, measurement.pressures, reference.rows, believed, self._p, self._options, openings
-        )
-        if misses > 0:
-            self._refuse(joints, reference)
-        return openings
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the first lane whose setpoints have no gains."""
+        joints = measured_joints(measurement, self._p)
+        for lane, setpoints in enumerate(reference.stiffness.T):
+            if not np.isfinite(joints[:, lane]).all():
+                continue
+            squares = jacobian(joints[:2, lane], self.parameters) ** 2
+            for i, cylinder in enumerate((self.parameters.cylinder1, self.parameters.cylinder2)):
+                stiffness = float(setpoints @ squares[:, i])
+                apparent_mass = float(self.parameters.mechanics.mass * squares[:, i].sum())
+                damping = None
+                if self.damping_ratio is not None and stiffness > 0:
+                    damping = 2 * self.damping_ratio * math.sqrt(stiffness * apparent_mass)
+                try:
+                    gains_for(stiffness, apparent_mass, cylinder.viscous_friction, damping)
+                except ValueError as error:
+                    place = f"reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
+                    raise ValueError(f"{place}, cylinder {i + 1}: {error}") from None
 
     def inspect(
         self,
@@ -169,21 +212,3 @@ class BacksteppingController:
         if measurement.sampled:
             return np.ascontiguousarray(self._observer.update(measurement)), told
         return measured_joints(measurement, self._p), told
-
-    def _refuse(self, joints: Array, reference: Reference) -> None:
-        """Raises the error of the first lane whose setpoints have no gains."""
-        for lane, setpoints in enumerate(reference.stiffness.T):
-            if not np.isfinite(joints[:, lane]).all():
-                continue
-            squares = jacobian(joints[:2, lane], self.parameters) ** 2
-            for i, cylinder in enumerate((self.parameters.cylinder1, self.parameters.cylinder2)):
-                stiffness = float(setpoints @ squares[:, i])
-                apparent_mass = float(self.parameters.mechanics.mass * squares[:, i].sum())
-                damping = None
-                if self.damping_ratio is not None and stiffness > 0:
-                    damping = 2 * self.damping_ratio * math.sqrt(stiffness * apparent_mass)
-                try:
-                    gains_for(stiffness, apparent_mass, cylinder.viscous_friction, damping)
-                except ValueError as error:
-                    place = f"reference.stiffness = ({setpoints[0]:g}, {setpoints[1]:g}) N/m in lane {lane}"
-                    raise ValueError(f"{place}, cylinder {i + 1}: {error}") from None

@@ -66,7 +66,7 @@ def advance(
 
 
 @kernel
-def _update(
+def give_way(
     offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, fresh: Array,
     motion: Array,
 ) -> None:  # fmt: skip
@@ -144,7 +144,7 @@ class Admittance:
         if self._offset.shape[1] != lanes:
             self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)
         motion, factor = np.empty((8, lanes)), told_of(lanes, None, None, damping_factor)[4]
-        _update(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
+        give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
         self._fresh[:] = 0.0
         return motion
 

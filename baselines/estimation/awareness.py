@@ -36,7 +36,8 @@ BELIEVED_LIMIT = 120.0
 
 
 @kernel
-def _unseen(joints: Array, believed: Array, disturbance: Array, p: Array, unseen: Array) -> None:
+def unseen_forces(joints: Array, believed: Array, disturbance: Array, p: Array, unseen: Array) -> None:
+    """Writes ``unseen`` (2, N), N: what is ``believed`` to act along the pistons, and what their ``disturbance`` adds, m/s2."""
     for i in range(joints.shape[1]):
         kappa = geometry.pose(
             joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
@@ -118,7 +119,7 @@ class Awareness:
             self._joints, rest = pistons.update(measurement, force, believed), np.zeros((2, lanes))
         disturbance = np.ascontiguousarray(pistons.disturbance)
         unseen = np.empty((2, lanes))
-        _unseen(self._joints, believed, disturbance, self._p, unseen)
+        unseen_forces(self._joints, believed, disturbance, self._p, unseen)
         spools = self._chambers.spools
         return Situation(motion, force, self._joints, pressures, spools, believed, disturbance, unseen, moving, rest)
 

@@ -37,7 +37,7 @@ def predicted_pressure(
 
 
 @kernel
-def _update(
+def observe(
     spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, share: float,
     fresh: Array,
 ) -> None:  # fmt: skip
@@ -90,7 +90,7 @@ class ChamberObserver:
         if self.spools.shape[1] != lanes:
             self.spools, self.openings = np.zeros((4, lanes)), np.zeros((4, lanes))
             self._pressures, self._fresh = np.zeros((4, lanes)), np.ones(lanes)
-        _update(
+        observe(
             self.spools, self._pressures, self.openings, measured, joints, self._p, self._period, self._share, self._fresh
         )  # fmt: skip
         self._fresh[:] = 0.0

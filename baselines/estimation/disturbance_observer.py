@@ -19,7 +19,7 @@ from birthsim_env.physics.lanes import Array
 
 
 @kernel
-def _update(
+def observe(
     estimate: Array, position: Array, velocity: Array, pressures: Array, force: Array, believed: Array, p: Array,
     period: float, bandwidth: float, fresh: Array, joints: Array,
 ) -> None:  # fmt: skip
@@ -87,7 +87,7 @@ class DisturbanceObserver:
         if self._estimate.shape[1] != lanes:
             self._estimate, self._fresh = np.zeros((4, lanes)), np.ones(lanes)
         joints = np.empty((4, lanes))
-        _update(
+        observe(
             self._estimate, measurement.position, measurement.velocity, measurement.pressures, force, believed, self._p,
             self._period, self._bandwidth, self._fresh, joints,
         )  # fmt: skip

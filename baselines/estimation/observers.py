@@ -53,24 +53,35 @@ STIR = 1.9
 """Low-passed innovation, in standard deviations of the position noise, that ends a rest: 4.5 of its own."""
 
 
-@kernel
-def _update(
-    estimate: Array, history: Array, slot: int, sampled: Array, position: Array, velocity: Array, age: Array, pressures: Array,
-    p: Array, period: float, bandwidth: float, noise: float, force: Array, believed: Array, moving: Array, rest: Array,
-    innovations: Array, reluctance: Array, fresh: Array,
-) -> None:  # fmt: skip
-    """One control period. ``estimate`` (6, N): y1, y2, v1, v2, d1, d2. ``history`` (H, 2, N): past y1, y2, ring at ``slot``.
+ESTIMATE, REST, INNOVATION, RELUCTANCE, FRESH, LAST, SLOT, HISTORY = 0, 6, 8, 10, 12, 13, 14, 15
+"""Rows at which parts of an observer's memory begin: y1, y2, v1, v2, d1, d2; how far each piston rests, 0 to 1; low-passed
+innovations, m; factors of ``REST_TIME``; 1 at a new start; time of the newest sample, s; where in the history the present
+stands; past y1, y2, a ring."""
 
-    ``sampled`` (N,) time since the previous sample, s, zero where none is new; ``age`` (N,) of the newest sample, s;
+
+@kernel
+def observe(
+    memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, pressures: Array, p: Array,
+    period: float, bandwidth: float, noise: float, force: Array, believed: Array, moving: Array,
+) -> None:  # fmt: skip
+    """One control period; carries ``memory`` (M, N) on.
+
     ``force`` (2, N) the user's, N, and ``believed`` (2, N), N along the pistons, as known; ``moving`` (N,) 1 where no piston
-    may rest; ``rest`` (2, N) how far each rests, 0 to 1; ``innovations`` (2, N) low-passed, m; ``reluctance``
-    (2, N) factor of ``REST_TIME``; ``fresh`` (N,) 1 at a new start.
+    may rest.
     """
-    depth, held = history.shape[0], exact.exp(-REST_BANDWIDTH * period)
+    estimate, rest, innovations = memory[ESTIMATE:REST], memory[REST:INNOVATION], memory[INNOVATION:RELUCTANCE]
+    reluctance, history = memory[RELUCTANCE:FRESH], memory[HISTORY:]
+    depth, held = history.shape[0] // 2, exact.exp(-REST_BANDWIDTH * period)
     motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
     for i in range(estimate.shape[1]):
+        slot = (int(memory[SLOT, i]) + 1) % depth
+        sampled = position_time[i] - memory[LAST, i]
+        # The memory goes no further back than the rig's own description of its tracker.
+        age = min(time[i] - position_time[i], (depth - 1) * period)
+        memory[SLOT, i], memory[LAST, i] = slot, position_time[i]
         motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
-        if fresh[i] > 0.0:
+        if memory[FRESH, i] > 0.0:
+            memory[FRESH, i] = 0.0
             motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
             piston_motion(motion, p, joints, 1)
             for cylinder in range(2):
@@ -79,7 +90,7 @@ def _update(
                 estimate[4 + cylinder, i], rest[cylinder, i], innovations[cylinder, i] = 0.0, 0.0, 0.0
                 reluctance[cylinder, i] = 1.0
                 for k in range(depth):
-                    history[k, cylinder, i] = joints[cylinder, 0]
+                    history[2 * k + cylinder, i] = joints[cylinder, 0]
             continue
         y1, y2, v1, v2 = estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i]
         r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
@@ -114,16 +125,16 @@ def _update(
             reluctance[cylinder, i] += (1.0 - reluctance[cylinder, i]) * min(period / TRUST_TIME, 1.0)
             settling = min(period / (REST_TIME * reluctance[cylinder, i]), 1.0)
             rest[cylinder, i] = (1.0 - moving[i]) * (resting + (1.0 - resting) * settling if slow else resting)
-        history[slot, 0, i] = estimate[0, i]
-        history[slot, 1, i] = estimate[1, i]
-        if sampled[i] > 0.0:
+        history[2 * slot, i] = estimate[0, i]
+        history[2 * slot + 1, i] = estimate[1, i]
+        if sampled > 0.0:
             piston_motion(motion, p, joints, 1)
-            periods = age[i] / period
+            periods = age / period
             back = min(int(periods), depth - 2)
             part = min(periods - back, 1.0)
             for cylinder in range(2):
-                newer = history[(slot - back) % depth, cylinder, i]
-                older = history[(slot - back - 1) % depth, cylinder, i]
+                newer = history[2 * ((slot - back) % depth) + cylinder, i]
+                older = history[2 * ((slot - back - 1) % depth) + cylinder, i]
                 innovation = joints[cylinder, 0] - (newer + part * (older - newer))
                 innovations[cylinder, i] += INNOVATION_SHARE * (innovation - innovations[cylinder, i])
                 explained = STIR * noise / (kappa if cylinder == 0 else 1.0)
@@ -131,17 +142,17 @@ def _update(
                 if abs(innovations[cylinder, i]) > explained:
                     reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
                     rest[cylinder, i], resting = 0.0, 0.0
-                kept = exact.exp(-bandwidth * sampled[i])
-                to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled[i]))
-                to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled[i]
-                to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled[i] ** 2
+                kept = exact.exp(-bandwidth * sampled)
+                to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
+                to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
+                to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
                 # What the sample says of its own instant is carried on to the present: late samples do not destabilise.
                 for k in range(depth):
-                    since = age[i] - k * period
+                    since = age - k * period
                     change = to_position + since * (to_speed + 0.5 * since * to_disturbance)
-                    history[(slot - k) % depth, cylinder, i] += change * innovation
-                estimate[cylinder, i] = history[slot, cylinder, i]
-                estimate[2 + cylinder, i] += (to_speed + to_disturbance * age[i]) * innovation
+                    history[2 * ((slot - k) % depth) + cylinder, i] += change * innovation
+                estimate[cylinder, i] = history[2 * slot + cylinder, i]
+                estimate[2 + cylinder, i] += (to_speed + to_disturbance * age) * innovation
                 estimate[4 + cylinder, i] += to_disturbance * innovation
 
 
@@ -163,6 +174,12 @@ def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
     return joints
 
 
+def memory_rows(parameters: Parameters) -> int:
+    """Rows of the memory that a rig's tracker asks for."""
+    board = parameters.electronics
+    return HISTORY + 2 * (int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4)
+
+
 class PistonObserver:
     """Positions and speeds of both pistons, (4, N): y1, y2 (m), v1, v2 (m/s), from sampled positions.
 
@@ -175,21 +192,25 @@ class PistonObserver:
         self._period = board.control_period
         self._bandwidth, self._noise = bandwidth, board.position_noise
         self._p = lane_parameters
-        self._depth = int((board.position_latency + 1 / board.position_rate) / self._period) + 4
-        self._estimate: Array = np.empty((6, 0))
-        self.rest: Array = np.empty((2, 0))
+        self._rows = memory_rows(parameters)
+        self._memory: Array = np.empty((self._rows, 0))
 
     @property
     def disturbance(self) -> Array:
         """d of both pistons, m/s2, (2, N)."""
-        return self._estimate[4:6]
+        return self._memory[ESTIMATE + 4 : REST]
+
+    @property
+    def rest(self) -> Array:
+        """How far each piston is taken to rest, 0 to 1, (2, N)."""
+        return self._memory[REST:INNOVATION]
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         if lanes is None:
-            self._estimate = np.empty((6, 0))
-        elif self._estimate.shape[1]:
-            self._fresh[lanes] = 1.0
+            self._memory = np.empty((self._rows, 0))
+        elif self._memory.shape[1]:
+            self._memory[FRESH, lanes] = 1.0
 
     def update(
         self,
@@ -204,24 +225,13 @@ class PistonObserver:
         ``moving`` (N,) is 1 where the end effector is to move, else 0; without it no piston is taken to rest.
         """
         lanes = measurement.position.shape[1]
-        if self._estimate.shape[1] != lanes:
-            self._estimate = np.zeros((6, lanes))
-            self._history: Array = np.zeros((self._depth, 2, lanes))
-            self._slot = 0
-            self._fresh: Array = np.ones(lanes)
-            self.rest, self._innovations, self._reluctance = np.zeros((2, lanes)), np.zeros((2, lanes)), np.ones((2, lanes))
-            self._last: Array = measurement.position_time.copy()
-        self._slot = (self._slot + 1) % self._depth
-        sampled = measurement.position_time - self._last
-        # The memory goes no further back than the rig's own description of its tracker.
-        age = np.minimum(measurement.time - measurement.position_time, (self._depth - 1) * self._period)
-        _update(
-            self._estimate, self._history, self._slot, sampled, measurement.position, measurement.velocity, age,
+        if self._memory.shape[1] != lanes:
+            self._memory = np.zeros((self._rows, lanes))
+            self._memory[FRESH] = 1.0
+        observe(
+            self._memory, measurement.time, measurement.position, measurement.position_time, measurement.velocity,
             measurement.pressures, self._p, self._period, self._bandwidth, self._noise,
             np.zeros((2, lanes)) if force is None else force, np.zeros((2, lanes)) if believed is None else believed,
-            np.ones(lanes) if moving is None else moving, self.rest, self._innovations, self._reluctance,
-            self._fresh,
+            np.ones(lanes) if moving is None else moving,
         )  # fmt: skip
-        self._last = measurement.position_time.copy()
-        self._fresh[:] = 0.0
-        return self._estimate[:4]
+        return self._memory[:4]

@@ -26,7 +26,8 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
 
 
 @kernel
-def _update(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
+def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
+    """Carries ``bristles`` (2, N) on by one period of ``motion`` (8, N) and writes what they hold back, ``drag`` (2, N), N."""
     one, joints = np.empty((4, 1)), np.empty((4, 1))
     for i in range(motion.shape[1]):
         for row in range(4):
@@ -72,7 +73,7 @@ class ReferenceFriction:
         if self._bristles.shape[1] != lanes:
             self._bristles = np.zeros((2, lanes))
         drag = np.empty((2, lanes))
-        _update(motion, self._p, self._period, self._bristles, drag)
+        rub(motion, self._p, self._period, self._bristles, drag)
         return drag
 
     def forecast(self, ahead: Array, ticks: NDArray[np.int64]) -> Array:

@@ -29,11 +29,11 @@ TIME = 0
 """s since the episode began."""
 POSITION = TIME + 1
 """Measured x, y of the end effector, m."""
-POSITION_TIME = POSITION + 2
-"""When that was, s."""
-VELOCITY = POSITION_TIME + 1
+VELOCITY = POSITION + 2
 """vx, vy as measured, m/s."""
-PRESSURE = VELOCITY + 2
+POSITION_TIME = VELOCITY + 2
+"""When the position was measured, s."""
+PRESSURE = POSITION_TIME + 1
 """Measured pressures of chambers P1, N1, P2, N2, Pa."""
 USER_FORCE = PRESSURE + 4
 """Measured force of the hand, N."""

@@ -88,7 +88,7 @@ class ValveActuation(Forgetful):
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         return self._openings
 
-    def stages(self) -> list[Stage]:
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
         return [Stage(_valve_stage, np.array([float(self._one_valve)]), sees_world=False)]
 
@@ -156,7 +156,7 @@ class FlowActuation(Forgetful):
         _flow_openings(self._wanted, self._one_valve, plant.state, plant.lane_parameters, openings)
         return openings
 
-    def stages(self) -> list[Stage]:
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
         return [Stage(_flow_stage, np.array([float(self._one_valve)]))]
 

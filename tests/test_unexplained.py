@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from agents.residual.experience import MOVING, ROWS, Experience
+from agents.residual.unexplained import MOVING, ROWS
 from baselines.admittance.controller import AdmittanceBackstepping
 from birthsim_env.parts.sensors import LabSensors
 from birthsim_env.parts.signals import Measurement, Reference
@@ -17,6 +17,7 @@ from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
 from tests import closed_loop, rigid_body
 from tests import derived_law as derived
+from tests.residual_parts import UnexplainedForceObserver
 
 BELIEVED = Parameters()
 SLIDING = {"friction.law": "coulomb"}
@@ -44,7 +45,7 @@ def wanted(time: float) -> Reference:
 
 
 PUSH = np.array([[6.0], [-4.0]])
-"""N, of a hand whose force is measured: it is no experience."""
+"""N, of a hand whose force is measured: it is no observer."""
 
 
 @cache
@@ -76,11 +77,11 @@ def seen(sensors: str, seconds: float = 5.0) -> tuple[list[Measurement], Array]:
 
 def course(record: list[Measurement], lanes: int = LANES) -> Array:
     """What was met, (T, ROWS, N)."""
-    experience, path = Experience(BELIEVED), []
-    experience.reset(np.ones(lanes, dtype=np.bool_))
+    observer, path = UnexplainedForceObserver(BELIEVED), []
+    observer.reset(np.ones(lanes, dtype=np.bool_))
     for measured in record:
-        experience.update(measured)
-        path.append(experience.met.copy())
+        observer.update(measured)
+        path.append(observer.met.copy())
     return np.array(path)
 
 
@@ -154,32 +155,32 @@ def test_lanes_are_independent_and_a_reset_forgets_one_alone(sensors: str) -> No
     for lane in range(LANES):
         alone = course([of_lanes(measured, slice(lane, lane + 1)) for measured in record], 1)
         np.testing.assert_array_equal(alone[:, :, 0], together[:, :, lane])
-    experience, chosen = Experience(BELIEVED), np.array([False, True, False])
-    experience.reset(np.ones(LANES, dtype=np.bool_))
+    observer, chosen = UnexplainedForceObserver(BELIEVED), np.array([False, True, False])
+    observer.reset(np.ones(LANES, dtype=np.bool_))
     for measured in record:
-        experience.update(measured)
-    experience.reset(chosen)
-    np.testing.assert_array_equal(experience.met, np.where(chosen, 0.0, together[-1]))
-    fresh, later = Experience(BELIEVED), seen(sensors)[0][1200:1500]
+        observer.update(measured)
+    observer.reset(chosen)
+    np.testing.assert_array_equal(observer.met, np.where(chosen, 0.0, together[-1]))
+    fresh, later = UnexplainedForceObserver(BELIEVED), seen(sensors)[0][1200:1500]
     fresh.reset(np.ones(LANES, dtype=np.bool_))
     kept = course([*record, *later])
     for k, measured in enumerate(later):
-        experience.update(measured)
+        observer.update(measured)
         fresh.update(measured)
-        np.testing.assert_array_equal(experience.met[:, 1], fresh.met[:, 1])
-        np.testing.assert_array_equal(experience.met[:, [0, 2]], kept[1200 + k][:, [0, 2]])
+        np.testing.assert_array_equal(observer.met[:, 1], fresh.met[:, 1])
+        np.testing.assert_array_equal(observer.met[:, [0, 2]], kept[1200 + k][:, [0, 2]])
     assert fresh.met.shape == (ROWS, LANES)
 
 
 def test_joints_are_those_of_the_sensors() -> None:
     record, truth = seen("ideal")
-    experience = Experience(BELIEVED)
-    experience.reset(np.ones(LANES, dtype=np.bool_))
+    observer = UnexplainedForceObserver(BELIEVED)
+    observer.reset(np.ones(LANES, dtype=np.bool_))
     for k in range(0, 600, 50):
-        experience.update(record[k])
-        np.testing.assert_allclose(experience.joints, truth[k], atol=1e-12)
+        observer.update(record[k])
+        np.testing.assert_allclose(observer.joints, truth[k], atol=1e-12)
     # Another number of lanes is a new start.
-    experience.reset(np.ones(1, dtype=np.bool_))
-    assert not experience.met.any()
-    experience.update(of_lanes(record[0], slice(1)))
-    assert experience.joints.shape == (4, 1)
+    observer.reset(np.ones(1, dtype=np.bool_))
+    assert not observer.met.any()
+    observer.update(of_lanes(record[0], slice(1)))
+    assert observer.joints.shape == (4, 1)

@@ -1,15 +1,16 @@
-"""The guard: what oscillates loses authority in its direction, what swings takes stiffness; what decays or is slow does not."""
+"""What limits the authority: what oscillates loses it in its direction, what swings takes stiffness; what decays does not."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from agents.residual.guard import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING, Guard
+from agents.residual.authority import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING
 from birthsim_env.parts.signals import REFERENCES, Reference
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 from tests import linkage_by_points as by_points
+from tests.residual_parts import AuthorityLimiter
 
 PERIOD = 1e-3
 TIMES = PERIOD * np.arange(1500)
@@ -20,21 +21,21 @@ SIZES = [np.hypot(*by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k
 """Speed of the end effector per speed of each piston."""
 
 
-def new(lanes: int) -> Guard:
-    guard = Guard(PERIOD, parameter_column(RIG))
-    guard.reset(np.ones(lanes, dtype=np.bool_))
-    return guard
+def new(lanes: int) -> AuthorityLimiter:
+    limiter = AuthorityLimiter(PERIOD, parameter_column(RIG))
+    limiter.reset(np.ones(lanes, dtype=np.bool_))
+    return limiter
 
 
-def watched(guard: Guard, speeds: Array, targets: Array | None = None) -> Array:
+def watched(limiter: AuthorityLimiter, speeds: Array, targets: Array | None = None) -> Array:
     """The shares (T, 2, N) while the pistons move with ``speeds`` (T, 2, N) at one place, and the target with ``targets``."""
     shares, lanes = [], speeds.shape[2]
     for k, speed in enumerate(speeds):
         rows = np.zeros((REFERENCES, lanes))
         if targets is not None:
             rows[2:4], _ = by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, *targets[k])
-        guard.update(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]), Reference(rows))
-        shares.append(guard.share.copy())
+        limiter.update(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]), Reference(rows))
+        shares.append(limiter.fraction.copy())
     return np.array(shares)
 
 
@@ -87,16 +88,16 @@ def test_an_oscillation_that_the_target_asks_for_costs_nothing() -> None:
 
 
 def test_a_reset_gives_a_lane_its_authority_back_and_forgets_its_half_waves() -> None:
-    guard, speeds = new(3), shaken([wave(2 * LEVEL)] * 3, 1)
-    watched(guard, speeds)
-    guard.reset(np.array([False, True, False]))
-    np.testing.assert_array_equal(guard.share, [[1, 1, 1], [LEAST, 1, LEAST]])
-    after, fresh = watched(guard, speeds), watched(new(1), speeds[:, :, :1])
+    limiter, speeds = new(3), shaken([wave(2 * LEVEL)] * 3, 1)
+    watched(limiter, speeds)
+    limiter.reset(np.array([False, True, False]))
+    np.testing.assert_array_equal(limiter.fraction, [[1, 1, 1], [LEAST, 1, LEAST]])
+    after, fresh = watched(limiter, speeds), watched(new(1), speeds[:, :, :1])
     np.testing.assert_array_equal(after[:, :, 1], fresh[:, :, 0])
     np.testing.assert_array_equal(after[:, 1, [0, 2]], LEAST)
     # Another number of lanes is a new start.
-    guard.reset(np.ones(2, dtype=np.bool_))
-    np.testing.assert_array_equal(guard.share, np.ones((2, 2)))
+    limiter.reset(np.ones(2, dtype=np.bool_))
+    np.testing.assert_array_equal(limiter.fraction, np.ones((2, 2)))
 
 
 def test_lanes_do_not_know_of_each_other() -> None:
@@ -108,10 +109,10 @@ def test_lanes_do_not_know_of_each_other() -> None:
 
 def softness_of(waves: list[Array], cylinder: int) -> Array:
     """The softness (T, N) while the pistons are shaken so."""
-    guard, softness = new(len(waves)), []
+    limiter, softness = new(len(waves)), []
     for speed in shaken(waves, cylinder):
-        watched(guard, speed[None])
-        softness.append(guard.softness.copy())
+        watched(limiter, speed[None])
+        softness.append(limiter.softness.copy())
     return np.array(softness)
 
 
@@ -129,8 +130,8 @@ def test_swings_take_stiffness_that_comes_back_in_time(cylinder: int) -> None:
 
 
 def test_stiffness_is_taken_up_to_a_bound_and_given_back_by_a_reset() -> None:
-    guard = new(2)
-    watched(guard, shaken([wave(3 * SWING), wave(3 * SWING)], 0))
-    assert np.all((guard.softness > 0.9 * MOST_SOFTENING) & (guard.softness <= MOST_SOFTENING))
-    guard.reset(np.array([True, False]))
-    assert guard.softness[0] == 0 < guard.softness[1]
+    limiter = new(2)
+    watched(limiter, shaken([wave(3 * SWING), wave(3 * SWING)], 0))
+    assert np.all((limiter.softness > 0.9 * MOST_SOFTENING) & (limiter.softness <= MOST_SOFTENING))
+    limiter.reset(np.array([True, False]))
+    assert limiter.softness[0] == 0 < limiter.softness[1]

@@ -1,0 +1,127 @@
+"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from baselines.controller import lanes_of, told_of
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import (
+    ASKED,
+    FEEDFORWARD,
+    OPENING,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    REFERENCE,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+)
+from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference, one_lane
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters, load_parameters
+
+
+@dataclass(frozen=True)
+class LawStage:
+    """A stage of a law: its function, its constants (C,), and the memory (M,) of a lane that starts."""
+
+    function: Callable[..., int]
+    constants: Array
+    fresh: Array
+
+
+class StagedController:
+    """A law that is compiled stages. A law derives from it, gives ``law_stages`` and says in ``explain`` what it refuses.
+
+    ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
+    """
+
+    def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
+        self.parameters = load_parameters(parameters)
+        self._p = parameter_column(self.parameters)
+        self._lanes, self._sampled = 0, False
+        self._made: list[LawStage] = []
+        self._memories: list[Array] = []
+        self._loop: Loop | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without the loop, which knows addresses."""
+        return {**self.__dict__, "_loop": None}
+
+    def law_stages(self, sampled: bool) -> Sequence[LawStage]:
+        """The law for one kind of sensors: ``sampled`` where positions are samples, see ``Measurement``."""
+        raise NotImplementedError(f"{type(self).__name__}.law_stages(sampled) is missing; it returns LawStage objects")
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the ``ValueError`` for signals, over N lanes, that a stage could not serve."""
+        raise ValueError(f"{type(self).__name__} has no gains for one of the setpoints")
+
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
+        if (lanes, sampled) != (self._lanes, self._sampled):
+            self._lanes, self._sampled, self._made, self._loop = lanes, sampled, list(self.law_stages(sampled)), None
+            self._memories = [np.repeat(one.fresh[:, None], lanes, axis=1) for one in self._made]
+
+    def stages(self) -> list[Stage]:
+        """The law as stages of a closed loop, with what it remembers."""
+        pairs = zip(self._made, self._memories, strict=True)
+        return [Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs]
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        if lanes is None:
+            self._lanes = 0
+        else:
+            for one, memory in zip(self._made, self._memories, strict=True):
+                memory[:, lanes] = one.fresh[:, None]
+
+    def command(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        believed_force: Array | None = None,
+        believed_rate: Array | None = None,
+        damping_factor: Array | None = None,
+    ) -> Array:
+        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
+
+        Called once per control period. ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes
+        acts on the pistons, and ``believed_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies the damping
+        where the law has one to vary. Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that
+        the law cannot render.
+        """
+        if measurement.position.ndim == 1:
+            given = (believed_force, believed_rate, damping_factor)
+            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+            return self.command(*one_lane(measurement, reference), *told)[:, 0]
+        lanes = lanes_of(measurement, reference)
+        self.prepare(lanes, measurement.sampled)
+        if self._loop is None:
+            self._seen, self._told = np.zeros((ASKED + REFERENCES, lanes)), np.zeros((5, lanes))
+            self._openings: Array = np.zeros((4, lanes))
+            placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
+            self._loop = Loop(lanes, [], placed, self.stages())
+        self._told[:] = told_of(lanes, believed_force, believed_rate, damping_factor)
+        fill_seen(self._seen, measurement, reference)
+        if self._loop.run():
+            self.explain(measurement, reference)
+        return self._openings.copy()
+
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""
+        return []
+
+
+def fill_seen(rows: Array, measurement: Measurement, reference: Reference) -> None:
+    """Write signals over N lanes into the first rows of what is seen, as far as ``ASKED`` and its reference."""
+    rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
+    rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
+    rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
+    rows[REFERENCE:ASKED] = rows[ASKED:] = reference.rows

@@ -1,0 +1,65 @@
+"""Parts of a residual's stage by themselves, over N lanes: what limits its authority, and what it finds unexplained."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.residual import authority, unexplained
+from baselines.estimation.disturbance_observer import DisturbanceObserver
+from baselines.estimation.observers import PistonObserver
+from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+
+
+class AuthorityLimiter:
+    """``fraction`` (2, N) of the authority that is left along cylinders 1 and 2, and ``softness`` (N,) for the law."""
+
+    def __init__(self, period: float, lane_parameters: Array) -> None:
+        self._period, self._p, self._memory = period, lane_parameters, np.zeros((authority.ROWS, 0))
+
+    @property
+    def fraction(self) -> Array:
+        return self._memory[: authority.SOFTNESS : authority.CYLINDER]
+
+    @property
+    def softness(self) -> Array:
+        return np.asarray(self._memory[authority.SOFTNESS])
+
+    def reset(self, lanes: Mask) -> None:
+        if self._memory.shape[1] != len(lanes):
+            self._memory = np.zeros((authority.ROWS, len(lanes)))
+        self._memory[:, lanes] = authority.FRESH[:, None]
+
+    def update(self, joints: Array, reference: Reference) -> None:
+        authority.limit_authority(joints, reference.rows, self._p, self._period, authority.LEVEL, self._memory)
+
+
+class UnexplainedForceObserver:
+    """``met`` (ROWS, N) of N lanes, brought up once per control period."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._period, self._p = parameters.electronics.control_period, parameter_column(parameters)
+        self._measured = DisturbanceObserver(self._period, self._p, unexplained.BANDWIDTH)
+        self._sampled = PistonObserver(parameters, self._p)
+        self.met: Array = np.zeros((unexplained.ROWS, 0))
+        self.joints: Array = np.zeros((4, 0))
+
+    def reset(self, lanes: Mask) -> None:
+        if self.met.shape[1] != len(lanes):
+            self.met, self._seen = np.zeros((unexplained.ROWS, len(lanes))), np.zeros((4, len(lanes)))
+            self._measured.reset()
+            self._sampled.reset()
+        self._measured.reset(lanes)
+        self._sampled.reset(lanes)
+        self.met[:, lanes], self._seen[:, lanes] = 0.0, 0.0
+
+    def update(self, measurement: Measurement) -> None:
+        force = np.ascontiguousarray(measurement.user_force)
+        observer = self._sampled if measurement.sampled else self._measured
+        if isinstance(observer, PistonObserver):
+            self.joints = np.ascontiguousarray(observer.update(measurement, force))
+        else:
+            self.joints = observer.update(measurement, force, np.zeros_like(force))
+        disturbance = np.ascontiguousarray(observer.disturbance)
+        unexplained.remember(self.joints, disturbance, self._p, self._period, self._seen, self.met)
