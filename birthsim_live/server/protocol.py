@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import to_json
 
-from baselines.files import finite
 from birthsim_live.rig.clock import SLOWEST
 from birthsim_live.rig.settings import Strict, refusal, within
 
@@ -109,7 +108,7 @@ def parse(text: str | bytes) -> Message:
 
 def encode(message: Mapping[str, Any]) -> str:
     """A message as JSON; what is not finite becomes null."""
-    return json.dumps(finite(dict(message)), allow_nan=False, separators=(",", ":"))
+    return to_json(message, inf_nan_mode="null").decode()
 
 
 def error(text: str) -> dict[str, str]:
