@@ -136,7 +136,7 @@ def test_the_seed_is_all_that_a_search_depends_on(own, tmp_path, trial_costs, mo
 
 def test_the_robust_statistic():
     losses = np.array([1.0, 2.0, 3.0, np.nan, np.inf, 500.0])
-    capped = [1, 2, 3, tune.LOST, tune.LOST, tune.LOST]
+    capped = [1, 2, 3, tune.WORST, tune.WORST, tune.WORST]
     assert tune.robust(losses) == pytest.approx(np.mean(capped) + np.quantile(capped, 0.95))
 
 

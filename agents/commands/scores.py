@@ -15,7 +15,7 @@ from agents.policy.files import WEIGHTS
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
 from baselines.bench.comparison import ENVIRONMENTS, default_controllers, file_stem
 from baselines.bench.evaluation import DISCOUNTS, evaluate
-from baselines.bench.statistics import judged, number, summarize
+from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
 from baselines.commands.shared import run, seed_number, whole
 from baselines.files import make_folder, write_json, write_text
@@ -118,7 +118,7 @@ def score_cell(
     result = evaluate(environment, law, controller, episodes, seed, progress=False, sensors=sensors, randomize=randomize)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt
-    error = summarize(judged(result.metrics["settled_rms"], result.lost, applies=True))["median"]
+    error = summarize(penalize_lost(result.metrics["settled_rms"], result.lost, applies=True))["median"]
     return {
         "returns": {str(discount): float(np.mean(values)) for discount, values in result.returns.items()},
         "halves": [float(np.mean(result.returns[1.0][part::2])) for part in (0, 1)],

@@ -10,7 +10,7 @@ import birthsim_env
 from baselines.bench import comparison
 from baselines.bench.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
 from baselines.bench.comparison_tables import full, losses, overview
-from baselines.bench.statistics import in_words
+from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
 from baselines.bench.tasks import Result, code_stamp, run_tasks
 from baselines.commands.parts import with_options
@@ -88,7 +88,7 @@ def _write(
     }
     content = {
         "arguments": shown, "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
-        "cells": in_words(figures), "studies": by_study,
+        "cells": jsonable(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)
     files = ["comparison.json"]

@@ -7,9 +7,9 @@ linear one. That holds for names of the registry and for ``path/to/file.py:Class
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
 the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.bench.probes``, with each
 sensor model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus
-the hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95
-% quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
-are proposed by Optuna's TPE sampler.
+the hunting in the stiffness test; at most ``WORST``, which is what a lost lane costs. The cost is the sum over
+scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the
+next are drawn at random, the rest are proposed by Optuna's TPE sampler.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
+from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import check_world, run, seed_number, whole
 from baselines.controller import Controller
@@ -44,8 +45,9 @@ if TYPE_CHECKING:
 WORLDS = 3_000_000
 """Seed of the first lane; those of evaluations, trainings and validations are lower."""
 
-LOST = 20.0
-"""mm: what a lost lane costs, and the most that any lane does."""
+WORST = 20.0
+"""mm, assumed: the most that a lane costs, be it lost or not. It is less than ``LOST_ERROR``, so that one bad lane does not
+outweigh all others."""
 
 RANDOM = 20
 """Trials before the sampler models their costs: the start and those drawn at random."""
@@ -83,19 +85,19 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
     return start
 
 
-def probes(rig: Parameters, lanes: int) -> Probes:
+def probes(rig: Parameters, lanes: int) -> StiffnessTest:
     """Stiffness tests on randomised rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
     rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
     rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
     force[lane % 2, lane] = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes)
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
-    return Probes(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
+    return StiffnessTest(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
 
 
 def robust(losses: Array) -> float:
-    """Mean + 95 % quantile of the losses (N,), mm, none of which counts more than ``LOST``."""
-    capped = np.minimum(np.nan_to_num(losses, nan=LOST, posinf=LOST), LOST)
+    """Mean + 95 % quantile of the losses (N,), mm, none of which counts more than ``WORST``."""
+    capped = np.fmin(losses, WORST)
     return float(capped.mean() + np.quantile(capped, 0.95))
 
 
@@ -111,10 +113,10 @@ def costs(
         circle = evaluate("BirthSIM/Circle-v1", controller, "", lanes, WORLDS, sensors=kind, **setting)
         if len(circle.seeds) < lanes:
             raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
-        parts[f"circle, {kind}"] = robust(np.where(circle.lost, LOST, circle.metrics["settled_rms"]))
-        answers = run_probes(probes(rig, lanes), controller, kind, WORLDS)
+        parts[f"circle, {kind}"] = robust(penalize_lost(circle.metrics["settled_rms"], circle.lost, True))
+        answers = run_stiffness_test(probes(rig, lanes), controller, kind, WORLDS)
         missed = np.hypot(*(answers.displacement - answers.expected)) + answers.hunting.max(axis=0)
-        parts[f"stiffness test, {kind}"] = robust(np.where(answers.lost, LOST, 1e3 * missed))
+        parts[f"stiffness test, {kind}"] = robust(penalize_lost(1e3 * missed, answers.lost, True))
     return parts
 
 
