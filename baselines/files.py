@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 
 def make_folder(path: Path) -> Path:
@@ -19,11 +21,27 @@ def make_folder(path: Path) -> Path:
     return path
 
 
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised."""
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        with partial.open("wb") as file:
+            yield file
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text as a whole or not at all."""
+    with whole_file(path) as file:
+        file.write(text.encode())
+
+
 def write_json(path: Path, content: Any) -> None:
     """Write JSON as a whole or not at all; a number that is not finite becomes null, for which JSON has no other word."""
-    partial = path.with_suffix(path.suffix + ".partial")
-    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
-    partial.replace(path)
+    write_text(path, json.dumps(finite(content), indent=1, allow_nan=False))
 
 
 def finite(content: Any) -> Any:

@@ -25,7 +25,7 @@ PNEUMATIC_STIFFNESS = np.array([[4400.0], [2200.0]])
 def shorten_probes(
     patch: pytest.MonkeyPatch, rest: float = 1.0, rise: float = 0.5, hold: float = 2.0, window: float = 0.5
 ) -> None:
-    """Probes with other times than those of the comparison, s, for as long as ``patch`` lasts."""
+    """Stiffness tests with other times than those of the comparison, s, for as long as ``patch`` lasts."""
     for name, seconds in (("REST", rest), ("RISE", rise), ("HOLD", hold), ("WINDOW", window)):
         patch.setattr(probes, name, seconds)
 

@@ -11,7 +11,7 @@ from scipy.linalg import sqrtm
 
 from baselines import BacksteppingController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.controller import Controller
 from birthsim_env.parts.sensors import LabSensors
 from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
@@ -135,7 +135,7 @@ def rendered(law: Controller, rig: Parameters, matrices: Array, pushed: float = 
     asked = np.tile(np.repeat(matrices, 4, axis=0), (len(POSES), 1, 1))
     stiffness = np.stack([asked[:, 0, 0], asked[:, 1, 1], asked[:, 0, 1]])
     place = np.repeat(np.array(POSES), 4 * count, axis=0).T.copy()
-    answers = run_probes(Probes(place, np.tile(force, len(POSES) * count), stiffness, rig), law)
+    answers = run_stiffness_test(StiffnessTest(place, np.tile(force, len(POSES) * count), stiffness, rig), law)
     assert not answers.lost.any()
     moved = answers.displacement.reshape(2, len(POSES), count, 4)
     compliance = np.stack([moved[..., 0] - moved[..., 1], moved[..., 2] - moved[..., 3]], axis=-1) / (2 * pushed)
@@ -160,7 +160,7 @@ def test_large_pushes_find_the_same_spring() -> None:
     force = np.array([[20.0, 40.0, 60.0, 30.0], [10.0, -15.0, 25.0, 60.0]])
     stiffness = np.repeat([[3000.0], [1500.0], [800.0]], 4, axis=1)
     place = np.repeat([[0.5], [-0.02]], 4, axis=1)
-    answers = run_probes(Probes(place, force, stiffness, FRICTIONLESS), CartesianBackstepping(FRICTIONLESS))
+    answers = run_stiffness_test(StiffnessTest(place, force, stiffness, FRICTIONLESS), CartesianBackstepping(FRICTIONLESS))
     assert np.hypot(*answers.expected).max() > 0.03
     np.testing.assert_allclose(answers.displacement, answers.expected, rtol=0, atol=2e-5)
 
@@ -181,7 +181,7 @@ def test_a_circle_is_followed_with_a_coupled_setpoint() -> None:
     assert np.sqrt(np.mean(np.square(errors))) < 5e-5
 
 
-def no_sensor(scales: tuple[float, ...], forces: tuple[float, ...], poses: int) -> tuple[Probes, Array]:
+def no_sensor(scales: tuple[float, ...], forces: tuple[float, ...], poses: int) -> tuple[StiffnessTest, Array]:
     """Pushes on both axes at 1000 and 4000 N/m with friction off by ``scales``, and their size (N,)."""
     grid = [
         (pose, stiffness, axis, force, scale) for pose in POSES[:poses] for stiffness in (1000.0, 4000.0) for axis in (0, 1)
@@ -192,7 +192,7 @@ def no_sensor(scales: tuple[float, ...], forces: tuple[float, ...], poses: int) 
         Parameters().replace({"cylinder1.coulomb_friction": 12.0 * s, "cylinder2.coulomb_friction": 15.0 * s}) for s in scale
     ]
     push = size * (axis == np.array([[0], [1]]))
-    return Probes(place.T.copy(), push, np.stack([stiffness, stiffness, 0 * stiffness]), rigs), push
+    return StiffnessTest(place.T.copy(), push, np.stack([stiffness, stiffness, 0 * stiffness]), rigs), push
 
 
 def test_stiffness_through_friction_without_a_force_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -202,11 +202,11 @@ def test_stiffness_through_friction_without_a_force_sensor(monkeypatch: pytest.M
     """
     closed_loop.shorten_probes(monkeypatch)
     probes, push = no_sensor((0.75, 1.25), (20.0, -40.0), 3)
-    answers = run_probes(probes, CartesianBackstepping(), force_sensor=False)
+    answers = run_stiffness_test(probes, CartesianBackstepping(), force_sensor=False)
     errors = np.abs(answers.stiffness_error(push))
     assert np.median(errors) < 0.01
     assert errors.max() < 0.05
-    paper = np.abs(run_probes(probes, BacksteppingController(), force_sensor=False).stiffness_error(push))
+    paper = np.abs(run_stiffness_test(probes, BacksteppingController(), force_sensor=False).stiffness_error(push))
     assert np.median(paper) > 0.1
 
 

@@ -288,8 +288,8 @@ def test_the_dictionary_is_json_and_says_everything():
     assert read["lost"] == [False, True, False]
     assert read["lost_episodes"] == 1
     # A world asks for what it asks, whatever controls it.
-    assert read["demand"] == run(Slam(lanes=())).demand
-    assert len(set(read["demand"])) == 3
+    assert read["required_strength_ratio"] == run(Slam(lanes=())).required_strength_ratio
+    assert len(set(read["required_strength_ratio"])) == 3
     assert read["cost_us_per_lane_and_call"] > 0
     assert set(read["episodes"]) == set(read["summary"]) == set(UNITS)
     for name in UNITS:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance.controller import AdmittanceBackstepping
-from baselines.bench.feasibility import demand
+from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
 from birthsim_env.physics.lanes import MASS, Array
 from tests import derived_law as derived
@@ -68,7 +68,7 @@ def test_holding_still_takes_the_weight_along_each_cylinder(place: tuple[float, 
     masses = env.simulation.plant.lane_parameters[MASS]
     assert np.ptp(masses) > 0.5
     weight = columns_at(np.array(place)).T @ [0.0, 9.81]
-    np.testing.assert_allclose(demand(env), [share(mass * weight) for mass in masses], rtol=1e-9)
+    np.testing.assert_allclose(required_strength_ratio(env), [share(mass * weight) for mass in masses], rtol=1e-9)
 
 
 def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force() -> None:
@@ -76,7 +76,7 @@ def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_i
     for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False):
         sizes = np.linspace(0, 300, 13)
         pushes = sizes * np.array([[np.cos(angle)], [np.sin(angle)]])
-        found = demand(made(13, reference=Hold(tuple(place)), user_force=Steady(pushes)))
+        found = required_strength_ratio(made(13, reference=Hold(tuple(place)), user_force=Steady(pushes)))
         expected = []
         for push in pushes.T:
             # The most of the whole episode: the weight alone at its start, or the hand's full force.
@@ -98,16 +98,16 @@ def test_moving_takes_inertia_and_friction() -> None:
         needed = columns.T @ (4.0 * (-0.06 * rate**2 * way + [0.0, 9.81]))
         needed += [35.0, 60.0] * speed + 12.0 * np.sign(speed)
         most = max(most, share(needed, rig))
-    np.testing.assert_allclose(demand(env), most, rtol=1e-9)
+    np.testing.assert_allclose(required_strength_ratio(env), most, rtol=1e-9)
 
 
 def test_a_compliant_target_out_of_reach_is_infinite_in_its_lane_alone() -> None:
     """At 500 N/m 200 N ask for 0.4 m."""
     soft = StiffnessSchedule(closed_loop=(500.0,))
     pushes = np.array([[10.0, 200.0, -10.0], [0.0, 0.0, 5.0]])
-    found = demand(made(3, stiffness=soft, user_force=Steady(pushes)))
+    found = required_strength_ratio(made(3, stiffness=soft, user_force=Steady(pushes)))
     np.testing.assert_array_equal(np.isinf(found), [False, True, False])
-    alone = demand(made(2, stiffness=soft, user_force=Steady(pushes[:, [0, 2]])))
+    alone = required_strength_ratio(made(2, stiffness=soft, user_force=Steady(pushes[:, [0, 2]])))
     np.testing.assert_array_equal(found[[0, 2]], alone)
 
 
@@ -115,10 +115,10 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
     """The hand's force, either way along both axes, is scaled to 0.9 and 1.12 of what the air can bear, and held for 2 s."""
     sizes, forces = np.linspace(20.0, 400.0, 200), []
     for unit in np.array([[[1.0], [0.0]], [[-1.0], [0.0]], [[0.0], [1.0]], [[0.0], [-1.0]]]):
-        asked = demand(made(200, user_force=Steady(unit * sizes), parameters=FRICTIONLESS))
+        asked = required_strength_ratio(made(200, user_force=Steady(unit * sizes), parameters=FRICTIONLESS))
         forces.append(unit * np.interp([0.9, 1.12], asked, sizes))
     env = made(8, user_force=Steady(np.hstack(forces)), parameters=FRICTIONLESS, policy_period=1e-3, duration=2.5)
-    np.testing.assert_allclose(demand(env), np.tile([0.9, 1.12], 4), atol=0.01)
+    np.testing.assert_allclose(required_strength_ratio(env), np.tile([0.9, 1.12], 4), atol=0.01)
     law, lost = AdmittanceBackstepping(FRICTIONLESS), np.zeros(8, dtype=np.bool_)
     for _ in range(2400):
         _, _, terminated, _, infos = env.step(law.command(env.measurement, env.reference).T)
@@ -132,7 +132,7 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
 def test_looking_ahead_changes_nothing() -> None:
     one, other = (gymnasium.make_vec("BirthSIM/Descent-v1", num_envs=3, randomize=True) for _ in range(2))
     one.reset(seed=4), other.reset(seed=4)
-    demand(one)
+    required_strength_ratio(one)
     for _ in range(5):
         np.testing.assert_array_equal(one.step(np.zeros((3, 4)))[0], other.step(np.zeros((3, 4)))[0])
 
@@ -149,7 +149,7 @@ class PerLane(UserForce):
 def test_a_force_per_lane_is_a_force():
     env, own = (gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, user_force=hand) for hand in (PerLane(), held))
     env.reset(seed=0), own.reset(seed=0)
-    np.testing.assert_allclose(demand(env), demand(own), rtol=1e-12)
+    np.testing.assert_allclose(required_strength_ratio(env), required_strength_ratio(own), rtol=1e-12)
 
 
 def held(time, position, velocity):
@@ -162,7 +162,7 @@ def test_looking_ahead_leaves_a_hand_with_a_memory_as_it_was():
         env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force="guided", duration=2.0)
         env.reset(seed=1)
         if looks:
-            demand(env)
+            required_strength_ratio(env)
         for _ in range(150):
             seen = env.step(np.zeros((2, 4)))[0]
         observations.append(seen)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
 from birthsim_env.physics.parameters import Parameters
 from tests import closed_loop
@@ -19,9 +19,10 @@ def test_it_renders_the_setpoint_where_the_papers_law_is_too_stiff(monkeypatch: 
     closed_loop.shorten_probes(monkeypatch)
     poses, setpoints, axes = (np.array(column) for column in zip(*CASES, strict=True))
     force = 20.0 * (axes == np.array([[0], [1]]))
-    probes = Probes(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), Parameters())
+    probes = StiffnessTest(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), Parameters())
     paper, frozen = (
-        run_probes(probes, make_controller(name, Parameters())) for name in ("backstepping-weight", "backstepping-frozen")
+        run_stiffness_test(probes, make_controller(name, Parameters()))
+        for name in ("backstepping-weight", "backstepping-frozen")
     )
     assert not frozen.lost.any()
     assert np.median(paper.stiffness_error(force)) > 0.15, "too stiff"

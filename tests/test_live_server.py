@@ -24,8 +24,8 @@ from birthsim_live.rig.session import Session
 from birthsim_live.server import protocol
 from birthsim_live.server.addresses import is_loopback, listen
 from birthsim_live.server.app import create_app
-from birthsim_live.server.live_desk import LiveDesk
-from birthsim_live.server.replay_desk import ReplayDesk
+from birthsim_live.server.live_hub import LiveHub
+from birthsim_live.server.replay_hub import ReplayHub
 from tests.console import PATIENCE, call, run
 
 HERE = "http://127.0.0.1:8000"
@@ -34,13 +34,13 @@ MESSAGES = 100_000
 """That are waited through, for half an hour and more: frames come on all the while."""
 
 
-def client(desk: Any, folder: Path | None = None, **options: Any) -> TestClient:
-    return TestClient(create_app(desk, recordings=folder, **options), base_url=HERE)
+def client(hub: Any, folder: Path | None = None, **options: Any) -> TestClient:
+    return TestClient(create_app(hub, recordings=folder, **options), base_url=HERE)
 
 
 @pytest.fixture
 def live(tmp_path: Path) -> Iterator[TestClient]:
-    with client(LiveDesk(Session(Parameters()), tmp_path), tmp_path) as one:
+    with client(LiveHub(Session(Parameters()), tmp_path), tmp_path) as one:
         yield one
 
 
@@ -125,7 +125,7 @@ def test_whatever_is_sent_the_socket_lives_on(live: TestClient) -> None:
             ("x" * (protocol.LONGEST + 1), "allowed: up to 16384"),
             ('{"type":"set","settings":{"Kclx":-1}}', "Kclx = -1; allowed: 200 to 8000 N/m"),
             ('{"type":"set","settings":{"Kclx":3000,"stiffness_source":"scenario"}}', "beside Kclx"),
-            ('{"type":"drag","position":[NaN,0],"id":1}', "NaN"),
+            ('{"type":"drag","position":[NaN,0],"id":1}', "nan"),
             ('{"type":"seek","time":1}', "seek in a live session"),
         ):
             ws.send_text(sent)
@@ -161,7 +161,7 @@ def test_recording_download_and_replay(live: TestClient, tmp_path: Path) -> None
     for foreign in ("../secret.npz", "..%2fsecret.npz", "none.npz", "one.txt"):
         assert live.get(f"/recordings/{foreign}").status_code == 404
     recording = load_recording(tmp_path / name)
-    with client(ReplayDesk(Player(recording))) as replay, replay.websocket_connect(SOCKET) as ws:
+    with client(ReplayHub(Player(recording))) as replay, replay.websocket_connect(SOCKET) as ws:
         hello = until(ws, of("hello"))
         assert hello["mode"] == "replay"
         assert hello["state"]["duration"] == recording.duration
@@ -181,7 +181,7 @@ def test_recording_download_and_replay(live: TestClient, tmp_path: Path) -> None
 
 def test_a_running_recording_is_finished_when_the_server_ends(tmp_path: Path) -> None:
     with (
-        client(LiveDesk(Session(Parameters()), tmp_path), tmp_path) as one,
+        client(LiveHub(Session(Parameters()), tmp_path), tmp_path) as one,
         one.websocket_connect(SOCKET) as ws,
     ):
         say(ws, "record", on=True)
@@ -192,7 +192,7 @@ def test_a_running_recording_is_finished_when_the_server_ends(tmp_path: Path) ->
 
 def test_a_folder_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with client(LiveDesk(Session(Parameters()), tmp_path / "file")) as one, one.websocket_connect(SOCKET) as ws:
+    with client(LiveHub(Session(Parameters()), tmp_path / "file")) as one, one.websocket_connect(SOCKET) as ws:
         say(ws, "record", on=True)
         assert "exists" in until(ws, of("error"))["message"]
 
@@ -225,8 +225,8 @@ def test_foreign_hosts_and_origins_are_refused(live: TestClient, headers: dict[s
 
 
 def test_a_host_of_ones_own_is_the_only_one(tmp_path: Path) -> None:
-    desk = LiveDesk(Session(Parameters()), tmp_path)
-    with TestClient(create_app(desk, ("rig.example",)), base_url="http://rig.example:8000") as one:
+    hub = LiveHub(Session(Parameters()), tmp_path)
+    with TestClient(create_app(hub, ("rig.example",)), base_url="http://rig.example:8000") as one:
         assert one.get("/nothing").status_code == 404
         assert one.get("/nothing", headers={"host": "127.0.0.1:8000"}).status_code == 403
 
@@ -289,7 +289,7 @@ def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    monkeypatch.setattr("birthsim_live.commands.live.Session", None)
+    monkeypatch.setattr("birthsim_live.rig.session.Session", None)
     for command, arguments in (("live", []), ("replay", ["pull.npz"])):
         status, _, complained = call(command, monkeypatch, capsys, *arguments)
         assert status == 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import permutations
 from typing import Any
 
@@ -27,7 +26,7 @@ RIG = Parameters()
 
 
 def session(**settings: Any) -> Session:
-    return Session(RIG, replace(default_settings(RIG), **settings))
+    return Session(RIG, default_settings(RIG).model_copy(update=settings))
 
 
 def part(one: Session, name: str) -> Array:
@@ -217,7 +216,7 @@ def test_more_damping_is_a_slower_answer(controller: str) -> None:
     rig = RIG.replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
     ways = []
     for damping in (1.0, 2.0):
-        one = Session(rig, replace(default_settings(rig), controller=controller, damping=damping))
+        one = Session(rig, default_settings(rig).model_copy(update={"controller": controller, "damping": damping}))
         assert one.shown_settings()["damping_applies"] is True
         one.advance(10)
         one.hands.hold = Hold(np.array([0.53, 0.0]), 1)

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares, lsq_linear
 
 from baselines.bench.comparison import default_controllers
-from baselines.bench.probes import Answers, Probes, run_probes
+from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.estimation.awareness import Awareness
 from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
@@ -219,12 +219,12 @@ def later(plan: Array, steps: Array) -> Array:
 
 def pushed(
     monkeypatch: pytest.MonkeyPatch, sensors: str, rest: float, hold: float, cases: list[tuple[float, ...]]
-) -> tuple[Array, Answers]:
+) -> tuple[Array, StiffnessResult]:
     """Stiffness errors and answers of short probes: pose, force and setpoint Kx, Ky, Kxy of every case, on the believed rig."""
     closed_loop.shorten_probes(monkeypatch, rest, 0.1, hold, 0.1)
     columns = np.array(cases).T.copy()
-    own = Probes(columns[:2], columns[2:4], columns[4:], RIG)
-    answers = run_probes(own, controllers(1)[0], sensors, seed=3)
+    own = StiffnessTest(columns[:2], columns[2:4], columns[4:], RIG)
+    answers = run_stiffness_test(own, controllers(1)[0], sensors, seed=3)
     assert not answers.lost.any()
     return np.abs(answers.stiffness_error(own.force)), answers
 

@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 import birthsim_env
 from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Cylinder, Parameters
@@ -47,8 +47,8 @@ def test_rendered_stiffness_is_the_setpoint(name: str, monkeypatch: pytest.Monke
     closed_loop.shorten_probes(monkeypatch)
     poses, setpoints, axes, ways = (np.array(column) for column in zip(*CASES, strict=True))
     force = setpoints * 0.005 * ways * (axes == np.array([[0], [1]]))
-    probes = Probes(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), FRICTIONLESS)
-    answers = run_probes(probes, make_controller(name, FRICTIONLESS))
+    probes = StiffnessTest(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), FRICTIONLESS)
+    answers = run_stiffness_test(probes, make_controller(name, FRICTIONLESS))
     assert not answers.lost.any()
     assert np.abs(answers.stiffness_error(force)).max() < 0.01
     assert answers.hunting.max() < 1e-5

@@ -125,6 +125,22 @@ def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
         lanes.step(together.T)
 
 
+def test_any_function_is_a_policy(steering):
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
+    stored = load_policy(steering)
+    given = ResidualController(None, lambda seen: stored.network.actions(seen).astype(float), stored.settings)
+    folder = ResidualController(policy=steering)
+    env.reset(seed=5)
+    for _ in range(50):
+        openings = folder.command(env.measurement, env.reference)
+        np.testing.assert_array_equal(given.command(env.measurement, env.reference), openings)
+        env.step(openings.T)
+    with pytest.raises(ValueError, match=r"policy gives actions \(3, 5\); allowed: \(3, 2\)"):
+        ResidualController(None, lambda seen: np.zeros((3, 5))).command(env.measurement, env.reference)
+    with pytest.raises(ValueError, match=r"settings = ResidualSettings\(.*\) beside policy = .*; allowed: beside a function"):
+        ResidualController(None, steering, stored.settings)
+
+
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_a_reset_forgets_the_last_episode(steering, sensors):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3, sensors=sensors)

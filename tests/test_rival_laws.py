@@ -10,7 +10,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
 from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, prepare
-from baselines.rivals.follower import Follower
+from baselines.rivals.tracking import TrackingController
 from birthsim_env.parts.signals import Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array, parameter_column
@@ -189,7 +189,9 @@ def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
 # On the control model
 
 
-def on_the_model(law: Follower, rig: Parameters, start: Array, reference: Reference, seconds: float) -> Iterator[Array]:
+def on_the_model(
+    law: TrackingController, rig: Parameters, start: Array, reference: Reference, seconds: float
+) -> Iterator[Array]:
     """States y1, y2, v1, v2, Pp1, Pn1, Pp2, Pn2 of the control model (5), (6) under a law at 1 kHz, valves without lag."""
     acceleration, cylinders = derived.accelerations(rig, 0.01, True), (rig.cylinder1, rig.cylinder2)
 

@@ -14,7 +14,7 @@ import pytest
 from baselines import BacksteppingController
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-from baselines.rivals.follower import Follower, beyond
+from baselines.rivals.tracking import TrackingController, beyond
 from birthsim_env.parts.sensors import LabSensors
 from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics import geometry
@@ -38,11 +38,11 @@ def lab_sense(rig: Parameters, lanes: int) -> Callable[..., Measurement]:
 
 
 @cache
-def nth_rival(kind: type[Follower], number: int) -> Follower:
+def nth_rival(kind: type[TrackingController], number: int) -> TrackingController:
     return kind()
 
 
-def rivals(kind: type[Follower], count: int) -> list[Follower]:
+def rivals(kind: type[TrackingController], count: int) -> list[TrackingController]:
     """As good as new, which takes less time than new ones."""
     found = [nth_rival(kind, number) for number in range(count)]
     for rival in found:
@@ -73,7 +73,7 @@ def papers_law() -> float:
 
 @every_rival
 @pytest.mark.parametrize(("lab", "share"), [(False, 0.13), (True, 0.35)], ids=["ideal", "lab"])
-def test_a_rival_stays_on_the_circle(rival: type[Follower], lab: bool, share: float, papers_law: float) -> None:
+def test_a_rival_stays_on_the_circle(rival: type[TrackingController], lab: bool, share: float, papers_law: float) -> None:
     """Measured with exact sensors: PID 0.15, LQR 0.22, sliding mode 0.48 mm RMS; with the tracker 0.70, 0.62 and 1.3 mm."""
     typical, worst = circle_error(rivals(rival, 1)[0].command, HEAVY, lab)
     assert typical < share * papers_law
@@ -85,7 +85,7 @@ def test_without_control_the_end_effector_is_nowhere_near() -> None:
 
 
 @every_rival
-def test_a_rival_renders_the_stiffness(rival: type[Follower]) -> None:
+def test_a_rival_renders_the_stiffness(rival: type[TrackingController]) -> None:
     """LuGre friction, a rig 1 kg heavier than believed: pushed by 20 N, it gives way as asked, in any direction."""
     stiffness = np.array([[1000.0, 2000.0, 4000.0, 2000.0], [1000.0, 2000.0, 4000.0, 4000.0]])
     reference = closed_loop.holding(np.repeat([[0.5], [0.02]], 4, axis=1), stiffness)
@@ -134,7 +134,7 @@ def of_lanes(pair: tuple[Measurement, Reference], lanes: Any) -> tuple[Measureme
 
 @every_rival
 @pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
-def test_one_rig_is_one_lane_of_many(rival: type[Follower], sampled: bool) -> None:
+def test_one_rig_is_one_lane_of_many(rival: type[TrackingController], sampled: bool) -> None:
     path, laws = signals(40, 30, sampled), rivals(rival, 4)
     together = np.array([laws[0].command(*pair) for pair in path])
     assert len(np.unique(together[-1])) > 100
@@ -145,7 +145,7 @@ def test_one_rig_is_one_lane_of_many(rival: type[Follower], sampled: bool) -> No
 
 
 @every_rival
-def test_reset_of_some_lanes_starts_only_those_anew(rival: type[Follower]) -> None:
+def test_reset_of_some_lanes_starts_only_those_anew(rival: type[TrackingController]) -> None:
     path, masked = signals(3, 40, False), np.array([False, True, False])
     kept, reset, late = rivals(rival, 3)
     for tick, pair in enumerate(path):
@@ -161,7 +161,7 @@ def test_reset_of_some_lanes_starts_only_those_anew(rival: type[Follower]) -> No
 
 
 @every_rival
-def test_integrals_rest_while_a_valve_is_full(rival: type[Follower]) -> None:
+def test_integrals_rest_while_a_valve_is_full(rival: type[TrackingController]) -> None:
     """Half a second far from the target, then back on it: no more than the integral's start remains (no windup)."""
     (law,), position = rivals(rival, 1), np.array([[0.5], [0.0]])
     reference = closed_loop.holding(position, 2000.0)
@@ -192,7 +192,7 @@ def test_the_integral_of_the_pid_rests_while_the_supply_gives_no_more() -> None:
 
 
 @every_rival
-def test_the_observer_is_told_what_is_known(rival: type[Follower], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_observer_is_told_what_is_known(rival: type[TrackingController], monkeypatch: pytest.MonkeyPatch) -> None:
     """The measured force, and in which lanes the compliant motion is faster than 1 mm/s."""
     told, (law,) = [], rivals(rival, 1)
     update = law._observer.update
@@ -212,7 +212,7 @@ def test_the_dead_zone_is_continuous() -> None:
 
 
 @every_rival
-def test_a_piston_past_its_stroke_gets_finite_openings(rival: type[Follower]) -> None:
+def test_a_piston_past_its_stroke_gets_finite_openings(rival: type[TrackingController]) -> None:
     rig, (law,) = Parameters(), rivals(rival, 1)
     past = np.array([[1, -1, 1, -1], [1, 1, -1, -1]]) * np.array([[0.1005], [0.2005]])
     measured = derived.seen(past, np.zeros((2, 4)), np.full((4, 4), 4e5), rig)
@@ -221,7 +221,7 @@ def test_a_piston_past_its_stroke_gets_finite_openings(rival: type[Follower]) ->
 
 
 @every_rival
-def test_gains_that_cannot_be_are_refused(rival: type[Follower]) -> None:
+def test_gains_that_cannot_be_are_refused(rival: type[TrackingController]) -> None:
     least = {name: low for name, (low, _) in rival.TUNABLE.items()}
     for name, low in least.items():
         allowed = "zero or a positive number" if low == 0 else "a positive number"
@@ -232,7 +232,7 @@ def test_gains_that_cannot_be_are_refused(rival: type[Follower]) -> None:
 
 
 @every_rival
-def test_signals_over_different_lanes_are_refused(rival: type[Follower]) -> None:
+def test_signals_over_different_lanes_are_refused(rival: type[TrackingController]) -> None:
     (measured, reference), (law,) = signals(3, 1, False)[0], rivals(rival, 1)
     fewer, fewer_wanted = of_lanes((measured, reference), slice(1))
     for name in ("velocity", "pressures", "user_force"):

@@ -21,10 +21,10 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 
 
-def evaluation(name, error, lost=(), demand=()):
+def evaluation(name, error, lost=(), beyond=()):
     one = Evaluation(name, seeds=list(range(len(error))), cost=1.0)
     one.lost = [k in lost for k in range(len(error))]
-    one.demand = [1.2 if k in demand else 0.5 for k in range(len(error))]
+    one.required_strength_ratio = [1.2 if k in beyond else 0.5 for k in range(len(error))]
     for metric in UNITS:
         one.metrics[metric] = [float(value) for value in error]
     return one
@@ -57,8 +57,8 @@ def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
 
 
 def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
-    law = evaluation("law", [2.0, 2.0, 2.0, 50.0], demand=(3,))
-    residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], demand=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
+    law = evaluation("law", [2.0, 2.0, 2.0, 50.0], beyond=(3,))
+    residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
     text = seed_table(law, residuals)
     assert "3 of 4 episodes are within the rig's strength; 2 training seeds" in text
     assert f"Pooled error of each seed: 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} mm. Lost: 0 by law, 0, 1 by the seeds" in text

@@ -13,25 +13,27 @@ from scipy import stats
 from baselines.bench import statistics
 from baselines.bench.statistics import (
     LEVEL,
-    described,
-    in_words,
-    judged,
+    LOST_ERROR,
+    jsonable,
     median_interval,
     number,
     paired_ratios,
+    penalize_lost,
     quantile,
     summarize,
+    summary_with_interval,
 )
 
 INF, NAN = math.inf, math.nan
 
 
 def test_a_lost_episode_is_infinitely_bad_whatever_its_figures_were():
-    np.testing.assert_array_equal(judged([1.0, 2.0, NAN, 4.0], [False, True, True, False]), [1, INF, INF, 4])
+    np.testing.assert_array_equal(penalize_lost([1.0, 2.0, NAN, 4.0], [False, True, True, False]), [1, INF, INF, 4])
     # A metric of which no episode says anything does not become one by losing episodes, unless others say it applies.
-    np.testing.assert_array_equal(judged([NAN, NAN], [True, False]), [NAN, NAN])
-    np.testing.assert_array_equal(judged([NAN, NAN], [True, False], applies=True), [INF, NAN])
-    np.testing.assert_array_equal(judged([3.0, 1.0], [True, False], applies=False), [3, 1])
+    np.testing.assert_array_equal(penalize_lost([NAN, NAN], [True, False]), [NAN, NAN])
+    np.testing.assert_array_equal(penalize_lost([NAN, NAN], [True, False], applies=True), [INF, NAN])
+    np.testing.assert_array_equal(penalize_lost([3.0, 1.0], [True, False], applies=False), [3, 1])
+    np.testing.assert_array_equal(penalize_lost([3.0, INF], [True, False], True, LOST_ERROR), [100, INF])
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.95, 1.0])
@@ -128,17 +130,17 @@ def test_ratios_are_by_episode_and_equal_where_both_are_lost_or_nothing():
 
 
 def test_description_is_of_the_sizes():
-    result = described([-3.0, 1.0, 2.0, NAN])
+    result = summary_with_interval([-3.0, 1.0, 2.0, NAN])
     assert result["median"] == 2.0
     assert result["worst"] == 3.0
     assert result["count"] == 3
     assert result["low"] <= 2 <= result["high"]
     assert result["q95"] == pytest.approx(np.quantile([1, 2, 3], 0.95))
-    lost = described([INF, INF, 1.0])
+    lost = summary_with_interval([INF, INF, 1.0])
     assert lost["median"] == lost["worst"] == INF
 
 
 def test_numbers_and_json_say_lost():
     assert [number(value) for value in (1.23456, INF, NAN, 1234.5)] == ["1.23", "lost", "-", "1.23e+03"]
-    said = in_words([{"a": {"median": INF, "low": 1.5}, "count": 3}])
+    said = jsonable([{"a": {"median": INF, "low": 1.5}, "count": 3}])
     assert json.loads(json.dumps(said, allow_nan=False)) == [{"a": {"median": "lost", "low": 1.5}, "count": 3}]

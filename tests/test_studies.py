@@ -10,7 +10,7 @@ from matplotlib import pyplot as plt
 
 from baselines.bench import studies
 from baselines.bench.pneumatic_range import pneumatic_range, pneumatic_setpoint
-from baselines.bench.probes import POSES, Answers
+from baselines.bench.probes import POSES, StiffnessResult
 from baselines.bench.studies import (
     COUPLED,
     STUDIES,
@@ -43,9 +43,9 @@ def spring(monkeypatch):
         lost = np.isin(np.arange(probes.size), state["lost"])
         expected = probes.reference().compliant_target(probes.force) - probes.position
         offset = np.array(state["offset"])[:, None] + 0 * moved
-        return Answers(np.where(lost, np.nan, moved), expected, np.abs(moved), lost, offset)
+        return StiffnessResult(np.where(lost, np.nan, moved), expected, np.abs(moved), lost, offset)
 
-    monkeypatch.setattr(studies, "run_probes", answer)
+    monkeypatch.setattr(studies, "run_stiffness_test", answer)
     return state
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from baselines.admittance.controller import AdmittanceBackstepping
 from baselines.bench.evaluation import evaluate
-from baselines.bench.probes import POSES, Answers, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
 from birthsim_env.parts.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.seeding import stream
@@ -31,7 +31,7 @@ def slippery(scale: float, law: str = "lugre") -> Parameters:
 
 def pushes(
     forces: tuple[float, ...], rigs: tuple[Parameters, ...] = (BELIEVED,), setpoints: tuple[float, ...] = (1000, 2000, 4000)
-) -> Probes:
+) -> StiffnessTest:
     """Every force on both axes at every pose and setpoint, on every rig: a lane each."""
     grid = [
         (pose, stiffness, axis, force, rig) for pose in POSES for stiffness in setpoints for axis in (0, 1) for force in forces
@@ -40,10 +40,10 @@ def pushes(
     poses, stiffness, axis, force, own = zip(*grid, strict=True)
     push = np.array(force) * (np.array(axis) == np.array([[0], [1]]))
     rows = np.array([stiffness, stiffness, np.zeros(len(grid))], dtype=float)
-    return Probes(np.array(poses).T.copy(), push, rows, own if len(rigs) > 1 else rigs[0])
+    return StiffnessTest(np.array(poses).T.copy(), push, rows, own if len(rigs) > 1 else rigs[0])
 
 
-def errors(probes: Probes, answers: Answers) -> tuple[Array, Array]:
+def errors(probes: StiffnessTest, answers: StiffnessResult) -> tuple[Array, Array]:
     """|stiffness error| (N,), and the larger axis' hunting (N,), mm."""
     return np.abs(answers.stiffness_error(probes.force)), 1e3 * answers.hunting.max(axis=0)
 
@@ -56,7 +56,7 @@ def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pyte
     """
     closed_loop.shorten_probes(monkeypatch)
     probes = pushes((5.0, -40.0), (slippery(0.75, law), slippery(1.25, law)))
-    error, hunting = errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED)))
+    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED)))
     assert error.max() < 0.002
     assert hunting.max() < 0.01
 
@@ -66,7 +66,7 @@ def test_coupled_setpoints_through_friction(monkeypatch: pytest.MonkeyPatch) -> 
     closed_loop.shorten_probes(monkeypatch)
     probes = pushes((15.0, -30.0), (slippery(0.75), slippery(1.25)), (3000.0,))
     probes.stiffness[1:] = [[1500.0], [800.0]]
-    answers = run_probes(probes, AdmittanceBackstepping(BELIEVED))
+    answers = run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED))
     off = np.hypot(*(answers.displacement - answers.expected)) / np.hypot(*answers.expected)
     assert np.hypot(*answers.expected).min() > 0.005
     assert off.max() < 0.002
@@ -80,7 +80,7 @@ def test_a_trackers_samples(law: str) -> None:
     95 % 0.61 %, worst 2.3 %; hunting 0.42 mm.
     """
     probes = pushes((5.0, -40.0), (slippery(1.0, law),))
-    error, hunting = errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11))
+    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11))
     assert np.quantile(error, 0.95) < 0.01
     assert error.max() < 0.05
     assert hunting.max() < 0.5
@@ -91,7 +91,7 @@ def test_a_trackers_samples_over_many_seeds() -> None:
     found = []
     probes = pushes((5.0, -5.0, 10.0, -10.0, 20.0, -20.0, 40.0, -40.0))
     for seed in range(4):
-        found.append(errors(probes, run_probes(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=100_000 * seed)))
+        found.append(errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=100_000 * seed)))
     error, hunting = np.array(found).swapaxes(0, 1)
     assert np.quantile(error, 0.95) < 0.01
     assert error.max() < 0.05
@@ -130,8 +130,8 @@ def test_a_hundred_unknown_rigs_are_held(sensors: str) -> None:
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
     force[lane % 2, lane] = rng.uniform(5, 30, lanes) * rng.choice([-1, 1], lanes)
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
-    probes = Probes(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
-    answers = run_probes(probes, AdmittanceBackstepping(BELIEVED), sensors)
+    probes = StiffnessTest(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
+    answers = run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), sensors)
     error, hunting = errors(probes, answers)
     assert not answers.lost.any()
     assert np.quantile(error, 0.95) < (0.001 if sensors == "ideal" else 0.02)
@@ -217,9 +217,12 @@ def test_some_gains_are_for_the_tracker_alone(gain: str, value: float) -> None:
 def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not() -> None:
     """1.5 kg with valves of 12 ms, half the mass and three times the lag that are believed: fixed gains oscillate on."""
     rig = Parameters().replace({"mechanics.mass": 1.5, "valves.time_constant": 0.012})
-    probes = Probes(np.array([[0.5], [0.0]]), np.array([[10.0], [0.0]]), np.array([[2000.0], [2000.0], [0.0]]), rig)
+    probes = StiffnessTest(np.array([[0.5], [0.0]]), np.array([[10.0], [0.0]]), np.array([[2000.0], [2000.0], [0.0]]), rig)
     yielding, fixed = AdmittanceBackstepping(BELIEVED), AdmittanceBackstepping(BELIEVED, yielding=1.0)
-    (_, calm), (_, shaking) = errors(probes, run_probes(probes, yielding)), errors(probes, run_probes(probes, fixed))
+    (_, calm), (_, shaking) = (
+        errors(probes, run_stiffness_test(probes, yielding)),
+        errors(probes, run_stiffness_test(probes, fixed)),
+    )
     assert calm[0] < 0.2 * shaking[0]
     assert 0.35 <= yielding.gain_share.min() < 1
     assert np.all(fixed.gain_share == 1)

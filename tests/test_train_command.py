@@ -38,7 +38,7 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
         results = strict(tmp_path / name / "evaluation.json")["results"]
         assert [result["controller"] for result in results] == ["backstepping", "residual"]
         medians.append([result["episodes"]["settled_rms"] for result in results])
-        assert results[0]["demand"] == results[1]["demand"]
+        assert results[0]["required_strength_ratio"] == results[1]["required_strength_ratio"]
     assert medians[0] == medians[1]
     assert not np.array_equal(*medians[0])
 

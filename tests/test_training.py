@@ -280,7 +280,7 @@ class Fake:
 @pytest.fixture
 def scored(monkeypatch):
     """The score of ``Fake`` with the demands given."""
-    monkeypatch.setattr(validation, "demand", lambda env: env.demands)
+    monkeypatch.setattr(validation, "required_strength_ratio", lambda env: env.demands)
 
     def score(*demands):
         env = Fake(demands)
@@ -355,7 +355,7 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
     law = evaluate("BirthSIM/Probe-v1", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
     np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
-    np.testing.assert_array_equal(result.demand, score.demand)
+    np.testing.assert_array_equal(result.required_strength_ratio, score.required_strength_ratio)
     assert np.mean(result.metrics["settled_rms"]) < 0.9 * np.mean(law.metrics["settled_rms"])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -67,15 +68,6 @@ def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def test_gains_are_searched_by_decades_where_they_must_be_positive():
-    for share, stiff, linear in ((0.0, 1.0, 0.0), (0.25, 10.0, 0.5), (0.5, 100.0, 1.0), (1.0, 10000.0, 2.0)):
-        gains = tune.from_unit(np.array([share, share]), BOUNDS)
-        assert gains == {"stiff": pytest.approx(stiff), "share": pytest.approx(linear)}
-        np.testing.assert_allclose(tune.to_unit(gains, BOUNDS), share)
-    assert tune.from_unit(np.array([0.123456, 0.5]), BOUNDS)["stiff"] == 3.118, "four digits: what is printed is what ran"
-    np.testing.assert_array_equal(tune.to_unit({"stiff": 0.01, "share": 7.0}, BOUNDS), [0, 1])
-
-
 def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_costs, monkeypatch, capsys):
     start = tmp_path / "bad.json"
     start.write_text('{"gains": {"stiff": 1.5, "share": 1.9, "other": 3}}')
@@ -96,9 +88,9 @@ def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_cos
         assert [float(word) for word in table[name]] == pytest.approx(
             [trials[0]["gains"][name], value, *BOUNDS[name]], rel=1e-3
         )
-    random, varied = trials[1 : tune.RANDOM + 1], trials[tune.RANDOM + 1 :]
-    assert np.mean([trial["cost"] for trial in varied[20:]]) < 0.5 * np.mean([trial["cost"] for trial in random])
-    assert np.ptp([np.log10(trial["gains"]["stiff"]) for trial in random]) > 2.5, "the random ones cover the range"
+    random, proposed = trials[1 : tune.RANDOM], trials[tune.RANDOM :]
+    assert np.mean([trial["cost"] for trial in proposed[20:]]) < 0.5 * np.mean([trial["cost"] for trial in random])
+    assert np.ptp([np.log10(trial["gains"]["stiff"]) for trial in random]) > 2.5, "the random ones cover the range, by decades"
 
 
 def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_costs, monkeypatch, capsys):
@@ -144,7 +136,7 @@ def test_the_seed_is_all_that_a_search_depends_on(own, tmp_path, trial_costs, mo
 
 def test_the_robust_statistic():
     losses = np.array([1.0, 2.0, 3.0, np.nan, np.inf, 500.0])
-    capped = [1, 2, 3, tune.LOST, tune.LOST, tune.LOST]
+    capped = [1, 2, 3, tune.WORST, tune.WORST, tune.WORST]
     assert tune.robust(losses) == pytest.approx(np.mean(capped) + np.quantile(capped, 0.95))
 
 
@@ -192,6 +184,7 @@ BAD = [
         ("--controller", "pid", "--start", "{tmp}/other.json"),
         "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
     ),
+    (("--controller", "{own}:Own", "--start", "{tmp}/beyond.json"), "beyond.json' has share = 2.5; allowed: 0 to 2"),
     (("--controller", "pid", "--parameters", "nowhere.toml"), "'nowhere.toml'"),
 ]
 
@@ -199,6 +192,7 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "message"), BAD)
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own, tmp_path, monkeypatch, capsys):
     (tmp_path / "other.json").write_text('{"gains": {"damping": 1.0}}')
+    (tmp_path / "beyond.json").write_text('{"gains": {"stiff": 1.0, "share": 2.5}}')
     given = [argument.format(tmp=tmp_path, own=own.removesuffix(":Own")) for argument in arguments]
     status, printed, complained = call("tune", monkeypatch, capsys, *given, "--out", tmp_path / "out")
     assert (status, printed) == (2, "")
@@ -216,9 +210,18 @@ def test_trials_of_another_search_are_not_mixed_in(own, tmp_path, trial_costs, m
     ):
         status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, *changed, "--out", out)
         assert status == 2
-        assert f"{out}/trials.json has {said}, or another --out" in complained
+        assert f"{out}/trials.journal has {said}, or another --out" in complained
     assert (out / "trials.json").read_text() == before
-    (out / "trials.json").write_text("{}")
-    status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
+    for foreign in ("{}\n", "trials\n\n"):
+        (out / "trials.journal").write_text(foreign)
+        status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 5, "--out", out)
+        assert status == 2
+        assert "trials.journal is no list of trials" in complained
+
+
+def test_without_the_extra_it_says_how_to_get_it(own, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    status, _, complained = call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
     assert status == 2
-    assert "trials.json is no list of trials" in complained
+    assert "pip install 'birthsim[tune]'" in complained
+    assert not (tmp_path / "out").exists()

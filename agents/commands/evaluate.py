@@ -13,7 +13,7 @@ from baselines.bench.evaluation import Evaluation, evaluate, overview, table
 from baselines.commands.evaluate_all import JOBS, evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, check_world, policy_of, run, seed_number, whole
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, write_json, write_text
 from baselines.registry import controller_names, make_controller
 from birthsim_env.parts.randomization import described
 
@@ -139,7 +139,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         pictures += ", learning_curves"
         draw_learning_curves(learning_curves(policies), folder)
     lines = [caption, "", overview(evaluations)]
-    (folder / "evaluation.md").write_text(f"{caption}\n\n{drawn}\n\n{text}\n", encoding="utf-8")
+    write_text(folder / "evaluation.md", f"{caption}\n\n{drawn}\n\n{text}\n")
     shown = {key: str(value) for key, value in vars(arguments).items()}
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
     write_json(folder / "evaluation.json", {"arguments": shown, "rig": rig.to_dict(), "results": results})

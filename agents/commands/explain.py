@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.bench.statistics import number
 from baselines.commands.shared import run
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, write_json, write_text
 
 
 def main() -> None:
@@ -85,7 +85,7 @@ def _explain(arguments: argparse.Namespace) -> None:
         )
         lines.append(f"| {row['setpoint']:g} | {row['controller']} | {figures} | {row['lost']} |")
     text = "\n".join(lines)
-    (folder / "residual.md").write_text(text + "\n", encoding="utf-8")
+    write_text(folder / "residual.md", text + "\n")
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
     write_json(folder / "residual.json", content)
     print(f"{text}\n\nwritten to {folder}/: correction.png and .svg, residual.md, residual.json")

@@ -15,10 +15,10 @@ from agents.policy.files import WEIGHTS
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
 from baselines.bench.comparison import ENVIRONMENTS, default_controllers, file_stem
 from baselines.bench.evaluation import DISCOUNTS, evaluate
-from baselines.bench.statistics import judged, number, summarize
+from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
 from baselines.commands.shared import run, seed_number, whole
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, write_json, write_text
 from baselines.registry import UNCONTROLLED, make_controller
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import Parameters
@@ -66,7 +66,7 @@ def _scores(arguments: argparse.Namespace) -> None:
         scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
         lines.append(f"## {short}, {sensors} sensors, {RIGS[rig]} rig\n\n{_table(rows, known)}")
     write_json(folder / "scores.json", {"code": code_stamp(), "seed": arguments.seed, "scores": scores})
-    (folder / "scores.md").write_text("\n\n".join(lines) + "\n", encoding="utf-8")
+    write_text(folder / "scores.md", "\n\n".join(lines) + "\n")
     print("\n\n".join(lines))
 
 
@@ -118,7 +118,7 @@ def score_cell(
     result = evaluate(environment, law, controller, episodes, seed, progress=False, sensors=sensors, randomize=randomize)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt
-    error = summarize(judged(result.metrics["settled_rms"], result.lost, applies=True))["median"]
+    error = summarize(penalize_lost(result.metrics["settled_rms"], result.lost, applies=True))["median"]
     return {
         "returns": {str(discount): float(np.mean(values)) for discount, values in result.returns.items()},
         "halves": [float(np.mean(result.returns[1.0][part::2])) for part in (0, 1)],

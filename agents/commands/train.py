@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import signal
-import threading
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium
-from tqdm import tqdm
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
 from baselines.files import make_folder, write_json
+from baselines.side_by_side import side_by_side
 from birthsim_env.parts.randomization import described
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
@@ -74,8 +70,9 @@ def _train(arguments: argparse.Namespace) -> None:
         for k, (seed, folder) in enumerate(zip(seeds, folders, strict=True))
     ]
     print(described(rig, training.randomize))
-    results = _side_by_side(work, arguments.jobs) if arguments.jobs > 1 else [_one(*piece) for piece in work]
-    _report(training, residual, list(seeds), results)
+    results: dict[int, dict[str, Any]] = {}
+    side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    _report(training, residual, list(seeds), [results[k] for k in range(len(work))])
     print(f"written to {arguments.out}/")
 
 
@@ -104,24 +101,6 @@ def _one(
     reached = train(settings, residual, folder, rig, resume, position)
     write_json(folder / "training.json", reached)
     return reached
-
-
-def _side_by_side(work: list[tuple[Any, ...]], jobs: int) -> list[dict[str, Any]]:
-    with ProcessPoolExecutor(min(jobs, len(work)), multiprocessing.get_context("spawn"), _begin_worker) as executor:
-        futures = [executor.submit(_one, *piece) for piece in work]
-        try:
-            return [future.result() for future in futures]
-        except BaseException:
-            for process in multiprocessing.active_children():
-                process.terminate()
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _begin_worker() -> None:
-    """Ctrl-C reaches the whole process group: the parent ends its workers, whose checkpoints stay."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's
 
 
 def _report(

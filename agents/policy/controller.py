@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy
@@ -16,6 +18,9 @@ from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
+PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
+"""Actions (N, ``settings.size``) in [-1, 1] for observations (N, ``observation_size(settings)``)."""
+
 
 def observation_size(settings: ResidualSettings) -> int:
     """Length of what a policy with these settings sees."""
@@ -23,32 +28,36 @@ def observation_size(settings: ResidualSettings) -> int:
 
 
 class ResidualController:
-    """The law with a trained policy on top: the policy is asked every policy period, the law at every call.
+    """The law with a policy on top: the policy is asked every policy period, the law at every call.
 
     ``policy`` is a folder that ``birthsim-train`` wrote, or the name of a policy that comes with the package; of several
-    training seeds the one that did best in validation runs. Raises ``ValueError`` for a damaged or foreign one.
+    training seeds the one that did best in validation runs. Raises ``ValueError`` for a damaged or foreign one. Or it is any
+    ``PolicyFunction``; what it may do is said by ``settings``, which a folder knows by itself.
     """
 
-    def __init__(self, parameters: Parameters | str | Path | None = None, policy: str | Path = "circle") -> None:
+    def __init__(
+        self,
+        parameters: Parameters | str | Path | None = None,
+        policy: str | Path | PolicyFunction = "circle",
+        settings: ResidualSettings | None = None,
+    ) -> None:
         rig = load_parameters(parameters)
-        self._policy = load_policy(best_policy(policy))
-        settings, network = self._policy.settings, self._policy.network
-        expected = observation_size(settings)
-        if network.inputs != expected or network.outputs != settings.size:
-            raise ValueError(
-                f"policy = {str(policy)!r} maps {network.inputs} to {network.outputs} numbers; "
-                f"allowed: {expected} to {settings.size}"
-            )
+        if callable(policy):
+            self._policy, settings = policy, settings or ResidualSettings()
+        elif settings is None:
+            self._policy, settings = _stored(policy)
+        else:
+            raise ValueError(f"settings = {settings!r} beside policy = {str(policy)!r}; allowed: beside a function")
         self._nominal = parameter_column(rig)
         self._periods = policy_periods(settings.policy_period, rig)
-        self._law = ResidualLaw(rig, settings)
+        self._law, self._size = ResidualLaw(rig, settings), settings.size
         self.reset()
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         if lanes is None:
             self._calls = 0
-            self._action: Array = np.zeros((self._policy.settings.size, 0))
+            self._action: Array = np.zeros((self._size, 0))
         elif self._action.shape[1]:
             self._action[:, lanes] = 0.0
             self._law.reset(lanes)
@@ -64,7 +73,21 @@ class ResidualController:
         if self._calls % self._periods == 0:
             beside = np.concatenate([self._action, self._law.memory()])
             seen = observation.observe(measurement, reference, beside, self._nominal)
-            self._action = np.ascontiguousarray(self._policy.network.actions(seen).T, dtype=np.float64)
+            actions = self._policy(seen)
+            if np.shape(actions) != (lanes, self._size):
+                raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {(lanes, self._size)}")
+            self._action = np.ascontiguousarray(actions.T, dtype=np.float64)
             self._law.accept(self._action)
         self._calls += 1
         return self._law.command(measurement, reference)
+
+
+def _stored(place: str | Path) -> tuple[PolicyFunction, ResidualSettings]:
+    """The policy of a folder and its settings."""
+    stored = load_policy(best_policy(place))
+    network, seen, said = stored.network, observation_size(stored.settings), stored.settings.size
+    if (network.inputs, network.outputs) != (seen, said):
+        raise ValueError(
+            f"policy = {str(place)!r} maps {network.inputs} to {network.outputs} numbers; allowed: {seen} to {said}"
+        )
+    return network.actions, stored.settings

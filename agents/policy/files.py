@@ -18,7 +18,7 @@ from safetensors.numpy import load, save
 
 from agents.policy.network import PolicyNetwork
 from agents.residual.settings import ResidualSettings
-from baselines.files import finite
+from baselines.files import whole_file, write_json
 
 FORMAT = "birthsim-residual-2"
 WEIGHTS, CONFIGURATION = "policy.safetensors", "policy.json"
@@ -50,11 +50,9 @@ def save_policy(policy: Policy, folder: Path) -> None:
         "sha256": hashlib.sha256(content).hexdigest(),
     }
     # The configuration names the weights by their hash and is written last: a pair that does not belong together is refused.
-    described = json.dumps(finite(configuration), indent=1, allow_nan=False)
-    for name, data in ((WEIGHTS, content), (CONFIGURATION, described.encode())):
-        partial = folder / f"{name}.partial"
-        partial.write_bytes(data)
-        partial.replace(folder / name)
+    with whole_file(folder / WEIGHTS) as file:
+        file.write(content)
+    write_json(folder / CONFIGURATION, configuration)
 
 
 def load_policy(folder: str | Path) -> Policy:

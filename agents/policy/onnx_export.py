@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from agents.policy.files import Policy
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork
 from agents.residual.law import action_names, observation_names
+from baselines.files import whole_file
 from birthsim_env.observation import LIMIT
 
 FORMAT = "birthsim-residual-onnx-1"
@@ -108,9 +109,8 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     content = model.SerializeToString()
     exported = _checked(content, module, network)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    partial.write_bytes(content)
-    partial.replace(path)
+    with whole_file(path) as file:
+        file.write(content)
     return exported
 
 

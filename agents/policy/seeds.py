@@ -12,11 +12,8 @@ import numpy as np
 from agents.policy.files import load_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import crossed_interval, interquartile_mean, judged, number, quantile
+from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, number, penalize_lost, quantile
 from birthsim_env.physics.lanes import Array
-
-LOST = 100.0
-"""mm: the error that a lost lane counts as."""
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""
@@ -74,7 +71,7 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
     for one in evaluations:
         whole.seeds += one.seeds
         whole.lost += one.lost
-        whole.demand += one.demand
+        whole.required_strength_ratio += one.required_strength_ratio
         whole.success += one.success
         for discount, values in one.returns.items():
             whole.returns[discount] += values
@@ -86,8 +83,8 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
 
 
 def pooled(values: Array) -> float:
-    """RMS of all values, mm, of which a lost episode counts as ``LOST``."""
-    return float(np.sqrt(np.mean(np.square(np.where(np.isinf(values), LOST, values)))))
+    """RMS of all values, mm, of which an infinite one, a lost episode, counts as ``LOST_ERROR``."""
+    return float(np.sqrt(np.mean(np.square(penalize_lost(values, np.isinf(values), True, LOST_ERROR)))))
 
 
 def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
@@ -96,7 +93,7 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     Interquartile means with 95 % bootstrap intervals over seeds and episodes, what the residual takes off the law's error,
     and the pooled error of each seed.
     """
-    feasible = np.asarray(law.demand) < 1.0
+    feasible = np.asarray(law.required_strength_ratio) < 1.0
     lines = [
         f"{int(feasible.sum())} of {len(feasible)} episodes are within the rig's strength; {len(residuals)} training seeds. "
         "IQM: interquartile mean, with 95 % intervals over seeds and episodes.",
@@ -106,7 +103,7 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     ]
 
     def sizes(evaluation: Evaluation, metric: str) -> Array:
-        return np.abs(judged(evaluation.metrics[metric], evaluation.lost))
+        return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))
 
     def rows(metric: str, name: str, statistic: Callable[[Array], float]) -> None:
         matrix = np.stack([sizes(one, metric) for one in residuals])[:, feasible]
@@ -140,7 +137,7 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     lost = ", ".join(str(sum(one.lost)) for one in residuals)
     lines += [
         f"Pooled error of each seed: {each} mm. Lost: {sum(law.lost)} by {law.controller}, {lost} by the seeds "
-        f"(in the pooled error as {LOST:g} mm).  ",
+        f"(in the pooled error as {LOST_ERROR:g} mm).  ",
         f"Pooled over all {len(feasible)} episodes, those beyond the rig's strength too: {number(pooled(base))} mm by "
         f"{law.controller}, {number(pooled(matrix))} mm with the residual.",
     ]

@@ -17,7 +17,7 @@ import numpy as np
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
 from baselines.bench.pneumatic_range import pneumatic_setpoint
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import quantile
 from baselines.controller import Controller
 from birthsim_env.parts.randomization import documented_ranges, draw_parameters
@@ -130,9 +130,9 @@ def rendered(controllers: Sequence[tuple[str, Controller]], seed: int = 0) -> li
         stiffness = np.repeat([[setpoint], [setpoint], [0.0]], len(cases), axis=1)
         rigs = [draw_parameters(Parameters(), documented_ranges(Parameters()), rng) for _ in cases]
         pneumatic = pneumatic_setpoint(position, np.stack(displacement(*force, *stiffness)), force, Parameters())
-        probes = Probes(position, force, stiffness, rigs, pneumatic)
+        probes = StiffnessTest(position, force, stiffness, rigs, pneumatic)
         for name, controller in controllers:
-            answers = run_probes(probes, controller, seed=seed)
+            answers = run_stiffness_test(probes, controller, seed=seed)
             figures = {"error_percent": np.abs(100 * answers.stiffness_error(force))}
             figures |= {f"hunting_{axis}_mm": 1e3 * answers.hunting[k] for k, axis in enumerate("xy")}
             row = {"setpoint": setpoint, "controller": name, "lost": int(answers.lost.sum()), "cases": len(cases)}

@@ -13,6 +13,8 @@ from typing import Any
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from baselines.files import whole_file
+
 NAME = "checkpoint.pt"
 
 
@@ -31,9 +33,8 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
         "settings": json.dumps(settings, sort_keys=True),
         "past": json.dumps(past),
     }
-    partial = folder / f"{NAME}.partial"
-    torch.save(content, partial)
-    partial.replace(folder / NAME)
+    with whole_file(folder / NAME) as file:
+        torch.save(content, file)
 
 
 def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any]) -> dict[str, Any] | None:

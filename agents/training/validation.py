@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policy.seeds import LOST
-from baselines.bench.feasibility import demand
+from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import EpisodeMetrics
-from baselines.bench.statistics import quantile
+from baselines.bench.statistics import LOST_ERROR, penalize_lost, quantile
 from birthsim_env.success import SETTLED
 
 VALIDATION_SEED = 1_000_000
@@ -40,13 +39,13 @@ class Score:
     stiffness: Lanes
     hunting: Lanes
     saturation: Lanes
-    demand: Lanes
+    required_strength_ratio: Lanes
     lost: int
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
         """Lanes (N,) whose world asks for no more than the cylinders can give."""
-        return self.demand < 1.0
+        return self.required_strength_ratio < 1.0
 
     @property
     def pooled(self) -> float:
@@ -84,7 +83,7 @@ def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed:
     Figures are sampled once per policy step.
     """
     observation, info = env.reset(seed=seed)
-    asked = demand(env)
+    asked = required_strength_ratio(env)
     lanes = env.num_envs
     metrics = EpisodeMetrics(lanes, env.simulation.period * env.simulation.periods)
     alive: NDArray[np.bool_] = np.ones(lanes, dtype=np.bool_)
@@ -102,7 +101,7 @@ def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed:
     result = metrics.result()
     with np.errstate(invalid="ignore"):
         return Score(
-            np.where(alive, result["settled_rms"], LOST),
+            penalize_lost(result["settled_rms"], ~alive, True, LOST_ERROR),
             100 * felt / np.where(counts > 0, counts, np.nan),
             np.fmax(result["hunting_x"], result["hunting_y"]),
             result["saturation"],

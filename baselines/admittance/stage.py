@@ -39,9 +39,9 @@ CONSTANTS = (
     *("sampled", "rows", "period", "mass", "ratio", "friction_share", "trust", "bandwidth", "noise", "pneumatic_gain"),
     *("gain", "rest_gain", "rest_push", "dead_zone", "quickness", "oscillation", "yielding", "least_share"),
 )
-"""Constants of the stage: 1 with sampled positions; rows of the observer of the pistons; control period, s; mass, kg, and damping
-ratio of the admittance; fraction of friction fed forward; trust in a pressure cell, 0 to 1; bandwidth, 1/s, of the observer;
-position noise, m; c4, 1/s; and what ``law.command`` takes. The rig follows."""
+"""Constants of the stage: 1 with sampled positions; rows of the observer of the pistons; control period, s; mass, kg, and
+damping ratio of the admittance; fraction of friction fed forward; trust in a pressure cell, 0 to 1; bandwidth, 1/s, of the
+observer; position noise, m; c4, 1/s; and what ``law.command`` takes. The rig follows."""
 SAMPLED, ROWS, PERIOD, MASS, RATIO, FRICTION, TRUST, BANDWIDTH, NOISE, PNEUMATIC, GAIN = range(11)
 NUMBERS = len(CONSTANTS)
 

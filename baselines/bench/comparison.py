@@ -18,7 +18,7 @@ import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import described, judged, paired_ratios
+from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.bench.tasks import Result, Task
 from baselines.registry import CONTROLLERS, SLOW, make_controller, split_options
 from birthsim_env.parts.scenarios import SCENARIOS
@@ -147,8 +147,8 @@ def gather(named: dict[tuple[str, Conditions], Result]) -> Cells:
 def statistics(cells: Cells) -> list[dict[str, Any]]:
     """Per cell its figures, for tables and JSON.
 
-    ``metrics`` holds per metric that applies in the environment ``described`` sizes, lost episodes infinitely bad; ``ratios``
-    the same of the paired ratios to ``REFERENCE``, where that law ran and the metric has one.
+    ``metrics`` holds, per metric that applies in the environment, the ``summary_with_interval`` of its sizes, lost episodes
+    infinitely bad; ``ratios`` that of the paired ratios to ``REFERENCE``, where that law ran and the metric has one.
     """
     applicable = {
         (cell.conditions.environment, metric)
@@ -161,11 +161,11 @@ def statistics(cells: Cells) -> list[dict[str, Any]]:
         for metric in METRICS:
             if metric in CONDITIONAL and (conditions.environment, metric) not in applicable:
                 continue
-            mine = judged(cell.metrics[metric], cell.lost, applies=True)
-            figures["metrics"][metric] = described(mine)
+            mine = penalize_lost(cell.metrics[metric], cell.lost, applies=True)
+            figures["metrics"][metric] = summary_with_interval(mine)
             if reference is not None and controller != REFERENCE and metric not in WITHOUT_RATIO:
-                theirs = judged(reference.metrics[metric], reference.lost, applies=True)
-                figures["ratios"][metric] = described(paired_ratios(mine, theirs))
+                theirs = penalize_lost(reference.metrics[metric], reference.lost, applies=True)
+                figures["ratios"][metric] = summary_with_interval(paired_ratios(mine, theirs))
         found.append({
             "controller": controller, "environment": conditions.environment, "sensors": conditions.sensors,
             "plant": conditions.plant, "hand": conditions.hand, "episodes": len(cell.lost), "lost": int(sum(cell.lost)),

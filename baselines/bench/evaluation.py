@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import birthsim_env
-from baselines.bench.feasibility import demand
+from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import UNITS, EpisodeMetrics
-from baselines.bench.statistics import in_words, judged, number, summarize
+from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller, checked_command
 from birthsim_env.physics.lanes import Array
 
@@ -33,15 +33,15 @@ DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
 class Evaluation:
     """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
 
-    ``demand`` is the share of the rig's strength that each episode asks for, whatever controls it. ``returns`` are the sums of
-    rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
+    ``required_strength_ratio`` is the share of the rig's strength that each episode asks for, whatever controls it. ``returns``
+    are the sums of rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
     """
 
     controller: str
     seeds: list[int] = field(default_factory=list)
     metrics: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in UNITS})
     lost: list[bool] = field(default_factory=list)
-    demand: list[float] = field(default_factory=list)
+    required_strength_ratio: list[float] = field(default_factory=list)
     returns: dict[float, list[float]] = field(default_factory=lambda: {discount: [] for discount in DISCOUNTS})
     success: list[bool] = field(default_factory=list)
     cost: float = float("nan")
@@ -49,7 +49,7 @@ class Evaluation:
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Metric -> median, mean, 95 % and maximum over the episodes, of which a lost one is infinitely bad."""
-        return {name: summarize(judged(values, self.lost)) for name, values in self.metrics.items()}
+        return {name: summarize(penalize_lost(values, self.lost)) for name, values in self.metrics.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """What goes into the JSON file; ``summary`` says "lost" where a figure is infinite."""
@@ -57,12 +57,12 @@ class Evaluation:
             "controller": self.controller,
             "seeds": self.seeds,
             "units": UNITS,
-            "summary": in_words(self.summary()),
+            "summary": jsonable(self.summary()),
             "lost_episodes": int(sum(self.lost)),
             "cost_us_per_lane_and_call": self.cost,
             "episodes": self.metrics,
             "lost": self.lost,
-            "demand": self.demand,
+            "required_strength_ratio": self.required_strength_ratio,
             "returns": self.returns,
             "success": self.success,
         }
@@ -114,7 +114,7 @@ def _run_batch(
     )
     _, info = env.reset(seed=list(seeds))
     controller.reset()
-    asked = demand(env)
+    asked = required_strength_ratio(env)
     metrics = EpisodeMetrics(len(seeds), period)
     alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
     lost, success = np.zeros_like(alive), np.zeros_like(alive)
@@ -149,7 +149,7 @@ def _run_batch(
     for name, values in metrics.result().items():
         result.metrics[name] += [float(value) for value in values]
     result.seeds += seeds
-    result.demand += [float(value) for value in asked]
+    result.required_strength_ratio += [float(value) for value in asked]
     result.lost += [bool(value) for value in lost]
     result.success += [bool(value) for value in success]
     for discount, sums in zip(DISCOUNTS, returns, strict=True):
@@ -162,7 +162,7 @@ def overview(evaluations: list[Evaluation]) -> str:
     width = max(24, *(len(one.controller) for one in evaluations))
     lines = [f"{'settled error, mm':{width}}{'median':>10}{'95 %':>10}{'largest':>10}{'lost episodes':>18}"]
     for one in evaluations:
-        summary = summarize(judged(one.metrics["settled_rms"], one.lost, applies=True))
+        summary = summarize(penalize_lost(one.metrics["settled_rms"], one.lost, applies=True))
         figures = "".join(f"{number(summary[key]):>10}" for key in ("median", "q95", "max"))
         lines.append(f"{one.controller:{width}}{figures}{f'{sum(one.lost)} of {len(one.lost)}':>18}")
         unsaid = int(np.isnan(np.asarray(one.metrics["settled_rms"])[~np.asarray(one.lost)]).sum())

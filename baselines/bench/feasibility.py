@@ -24,7 +24,7 @@ MOVING = 1e-3
 """m/s; a slower piston may rest, and its friction then holds rather than loads it."""
 
 
-def demand(env: Any) -> Array:
+def required_strength_ratio(env: Any) -> Array:
     """The largest share (N,) of what the cylinders can bear that the present episodes of a vector environment ask for.
 
     1 and more is beyond the rig. Forces of the hand are those at the places asked for; a compliant target that the rig cannot

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
 from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensors import SENSORS
@@ -31,7 +32,7 @@ POSES = ((0.5, 0.0), (0.4, 0.05), (0.6, 0.05), (0.4, -0.08), (0.62, -0.1))
 
 
 @dataclass(frozen=True)
-class Probes:
+class StiffnessTest:
     """N cases: ``position`` (2, N) m, ``force`` (2, N) N, ``stiffness`` (3, N) N/m as Kclx, Kcly, Kclxy, pneumatic stiffness
     ``pneumatic`` (2,) or (2, N) N/m, and ``rigs``, the plant for all or one per lane."""
 
@@ -55,7 +56,7 @@ class Probes:
 
 
 @dataclass(frozen=True)
-class Answers:
+class StiffnessResult:
     """What the rigs did: the mean ``displacement`` (2, N), m, of the last second at full force from the last second at rest;
     ``expected`` (2, N), m, what the stiffness asked for gives; ``hunting`` (2, N), m, largest peak to peak in these seconds;
     ``lost`` (N,), the lanes that left the range of numbers or ran into an end stop; ``offset`` (2, N), m, the mean of the last
@@ -72,12 +73,12 @@ class Answers:
         along = np.einsum("in,in->n", self.displacement, force)
         asked = np.einsum("in,in->n", self.expected, force)
         with np.errstate(divide="ignore"):
-            return np.where(self.lost, np.inf, asked / along - 1)
+            return penalize_lost(asked / along - 1, self.lost, applies=True)
 
 
-def run_probes(
-    probes: Probes, controller: Controller, sensors: str = "ideal", seed: int = 0, force_sensor: bool = True
-) -> Answers:
+def run_stiffness_test(
+    probes: StiffnessTest, controller: Controller, sensors: str = "ideal", seed: int = 0, force_sensor: bool = True
+) -> StiffnessResult:
     """Push in every lane. ``force_sensor`` False shows the controller a force of zero."""
     rigs, lanes = probes.rigs, probes.size
     board = (rigs if isinstance(rigs, Parameters) else rigs[0]).electronics
@@ -107,7 +108,7 @@ def run_probes(
     displacement = held.mean() - rest.mean()
     lost = ~np.isfinite(displacement).all(axis=0) | (impacts > board_limit(rigs))
     expected, hunting = reference.compliant_target(probes.force) - probes.position, np.maximum(held.span(), rest.span())
-    return Answers(displacement, expected, hunting, lost, rest.mean() - probes.position)
+    return StiffnessResult(displacement, expected, hunting, lost, rest.mean() - probes.position)
 
 
 def board_limit(rigs: Parameters | Sequence[Parameters]) -> float:

@@ -1,4 +1,4 @@
-"""Statistics over episodes, in which a lost episode is infinitely bad.
+"""Statistics over episodes, in which a lost episode is infinitely bad, or as bad as ``LOST_ERROR`` where errors are pooled.
 
 An episode that ends early has figures only up to its end, and those may well be good ones. So that a controller gains
 nothing by losing an episode, every figure of a lost episode counts as infinite: medians and quantiles that lean on one are
@@ -22,16 +22,19 @@ RESAMPLES = 9999
 LEVEL = 0.95
 """Confidence of the intervals."""
 
+LOST_ERROR = 100.0
+"""mm: what a lost lane counts as where errors are pooled, in means and sums of squares, which infinity would make infinite."""
 
-def judged(values: ArrayLike, lost: ArrayLike, applies: bool | None = None) -> Array:
-    """``values`` (N,) with infinity where ``lost`` (N,), unless the metric does not apply: then as they are.
+
+def penalize_lost(values: ArrayLike, lost: ArrayLike, applies: bool | None = None, penalty: float = np.inf) -> Array:
+    """``values`` with ``penalty`` where ``lost``, of the same shape, unless the metric does not apply: then as they are.
 
     ``applies`` None means: if any of the values is finite.
     """
     given = np.asarray(values, dtype=np.float64)
     if applies is None:
         applies = bool(np.isfinite(given).any())
-    return np.where(np.asarray(lost, dtype=np.bool_), np.inf, given) if applies else given
+    return np.where(np.asarray(lost, dtype=np.bool_), penalty, given) if applies else given
 
 
 def quantile(values: ArrayLike, share: float) -> float:
@@ -114,7 +117,7 @@ def paired_ratios(mine: ArrayLike, reference: ArrayLike) -> Array:
         return np.where(above == below, 1.0, above / below)
 
 
-def described(values: ArrayLike) -> dict[str, Any]:
+def summary_with_interval(values: ArrayLike) -> dict[str, Any]:
     """``median`` with its interval ``low`` and ``high``, ``q95``, ``worst`` and ``count`` of the sizes of ``values``."""
     size = np.abs(_said(values))
     low, high = median_interval(size)
@@ -136,10 +139,10 @@ def number(value: float) -> str:
     return "lost" if np.isinf(value) else f"{value:.3g}"
 
 
-def in_words(content: Any) -> Any:
+def jsonable(content: Any) -> Any:
     """``content`` for JSON, which has no infinity: "lost" in its place, at any depth."""
     if isinstance(content, dict):
-        return {name: in_words(value) for name, value in content.items()}
+        return {name: jsonable(value) for name, value in content.items()}
     if isinstance(content, list):
-        return [in_words(value) for value in content]
+        return [jsonable(value) for value in content]
     return "lost" if isinstance(content, float) and np.isinf(content) else content

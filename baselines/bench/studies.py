@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from baselines.bench.comparison import file_stem
 from baselines.bench.pneumatic_range import pneumatic_setpoint
-from baselines.bench.probes import POSES, Answers, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.bench.tasks import Result, Task
 from baselines.registry import make_controller
 from birthsim_env.parts.signals import Mask, displacement
@@ -52,8 +52,8 @@ Pose = tuple[float, float]
 
 def _push(
     controller: str, rig: Parameters, cases: Sequence[tuple[Pose, float, float]], stiffness: ArrayLike
-) -> tuple[Answers, Array]:
-    """Answers and forces (2, N) of cases (pose, size in N, direction in rad) with ``stiffness`` (3,) or (3, N), N/m.
+) -> tuple[StiffnessResult, Array]:
+    """Results and forces (2, N) of cases (pose, size in N, direction in rad) with ``stiffness`` (3,) or (3, N), N/m.
 
     The pneumatic stiffness is one that the cylinders can hold in every case: what is measured is the law, not the supply.
     """
@@ -64,7 +64,9 @@ def _push(
     setpoints = np.ascontiguousarray(np.broadcast_to(setpoints.reshape(3, -1), (3, len(cases))))
     position = np.ascontiguousarray(position)
     pneumatic = pneumatic_setpoint(position, np.stack(displacement(*force, *setpoints)), force, rig)
-    return run_probes(Probes(position, force, setpoints, rig, pneumatic), make_controller(controller, rig)), force
+    return run_stiffness_test(
+        StiffnessTest(position, force, setpoints, rig, pneumatic), make_controller(controller, rig)
+    ), force
 
 
 def _listed(values: Array, lost: Mask) -> list[list[float | None]]:

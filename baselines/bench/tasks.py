@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import platform
-import signal
-import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,6 +19,7 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.files import write_json
+from baselines.side_by_side import side_by_side
 
 _ROOT = Path(__file__).resolve().parent.parent.parent
 _SHOWN_ONLY = (
@@ -86,7 +82,9 @@ def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, title: str) -> tup
         print(f"{title}: {stale} are there with other settings, rig or code, and are computed anew")
     failures: dict[str, str] = {}
     with tqdm(total=len(tasks), initial=len(results), desc=title, unit="piece", disable=not missing) as bar:
-        for task, outcome in _work(missing, min(jobs, len(missing))):
+
+        def take(number: int, outcome: Result | str) -> None:
+            task = missing[number]
             if isinstance(outcome, dict):
                 content = {"code": stamp, "settings": task.settings, "result": outcome}
                 (folder / task.name).parent.mkdir(parents=True, exist_ok=True)
@@ -96,6 +94,8 @@ def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, title: str) -> tup
             else:
                 failures[task.name] = outcome
             bar.update()
+
+        side_by_side(_attempt, [(task,) for task in missing], jobs, take)
     return results, failures
 
 
@@ -106,34 +106,6 @@ def _read(path: Path) -> dict[str, Any] | None:
     except (FileNotFoundError, ValueError):
         return None
     return content if isinstance(content, dict) and "result" in content else None
-
-
-def _work(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Result | str]]:
-    """The tasks with their results, or with what they raised, in the order in which they end."""
-    if jobs <= 1:
-        for task in tasks:
-            yield task, _attempt(task)
-        return
-    others = set(multiprocessing.active_children())
-    executor = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _begin_worker)
-    try:
-        futures = {executor.submit(_attempt, task): task for task in tasks}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BaseException as error:
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
-        if isinstance(error, BrokenProcessPool):
-            raise OSError("a process that computed has died, of lack of memory perhaps; complete pieces are kept") from error
-        raise
-    finally:
-        executor.shutdown(cancel_futures=True)
-
-
-def _begin_worker() -> None:
-    """Ctrl-C reaches the whole process group: the parent ends its workers, which must leave nothing behind."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's
 
 
 def _attempt(task: Task) -> Result | str:

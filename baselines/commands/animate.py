@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number
-from baselines.files import make_folder
+from baselines.files import make_folder, whole_file
 from baselines.registry import controller_names, make_controller
 from birthsim_env.drawing.rendering import PairRenderer, Scene
 from birthsim_env.parts.randomization import described
@@ -118,15 +118,19 @@ def draw(
 def save(frames: list[Image.Image], rate: int, path: Path) -> None:
     """Write an endless animation."""
     durations = [round(1000 / rate)] * (len(frames) - 1) + [round(1000 * PAUSE)]
-    options: dict[str, Any] = {"save_all": True, "append_images": frames[1:], "duration": durations, "loop": 0}
+    options: dict[str, Any] = {
+        "format": path.suffix[1:], "save_all": True, "append_images": frames[1:], "duration": durations, "loop": 0,
+    }  # fmt: skip
     if path.suffix == ".webp":
-        frames[0].save(path, lossless=True, method=4, **options)
+        with whole_file(path) as file:
+            frames[0].save(file, lossless=True, method=4, **options)
     else:
         # One palette for all frames, from ten of them: with one each, areas that do not move would flicker.
         some = [np.asarray(frame) for frame in frames[:: max(1, len(frames) // 10)]]
         palette = Image.fromarray(np.concatenate(some)).quantize(255)
         still = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-        still[0].save(path, **{**options, "append_images": still[1:]})
+        with whole_file(path) as file:
+            still[0].save(file, **{**options, "append_images": still[1:]})
 
 
 def _animate(arguments: argparse.Namespace) -> None:

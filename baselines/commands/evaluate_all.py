@@ -10,11 +10,11 @@ import birthsim_env
 from baselines.bench import comparison
 from baselines.bench.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
 from baselines.bench.comparison_tables import full, losses, overview
-from baselines.bench.statistics import in_words
+from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
 from baselines.bench.tasks import Result, code_stamp, run_tasks
 from baselines.commands.parts import with_options
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, write_json, write_text
 from baselines.registry import CONTROLLERS, SLOW, split_options
 from birthsim_env.parts.randomization import described
 from birthsim_env.physics.parameters import Parameters
@@ -88,7 +88,7 @@ def _write(
     }
     content = {
         "arguments": shown, "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
-        "cells": in_words(figures), "studies": by_study,
+        "cells": jsonable(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)
     files = ["comparison.json"]
@@ -98,7 +98,7 @@ def _write(
             f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
             f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
         )
-        (folder / "comparison.md").write_text(f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n", encoding="utf-8")
+        write_text(folder / "comparison.md", f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n")
         print(f"{caption}\n\n{text}\n")
         files.append("comparison.md")
     drawn = [*draw_comparison(figures, folder), *draw_studies(by_study, folder)]

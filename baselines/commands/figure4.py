@@ -14,7 +14,7 @@ from tqdm import tqdm
 import birthsim_env
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import run
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, whole_file, write_json
 from baselines.registry import controller_names, make_controller
 from birthsim_env.physics.lanes import Array
 from birthsim_env.success import SETTLED
@@ -72,7 +72,8 @@ def record_run(
             if len(record["time"]) % 500 == 0:
                 bar.update(500)
             if picture is not None and len(record["time"]) == round(PICTURE_TIME / period):
-                Image.fromarray(np.asarray(env.render())).save(picture)
+                with whole_file(picture) as file:
+                    Image.fromarray(np.asarray(env.render())).save(file, format="png")
     env.close()
     return {name: np.array(values) for name, values in record.items()}
 

@@ -7,9 +7,9 @@ linear one. That holds for names of the registry and for ``path/to/file.py:Class
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
 the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.bench.probes``, with each
 sensor model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus
-the hunting in the stiffness test; ``LOST`` where the lane is lost. The cost is the sum over scenarios and sensors of mean + 95
-% quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the next are drawn at random, the rest
-vary the best so far.
+the hunting in the stiffness test; at most ``WORST``, which is what a lost lane costs. The cost is the sum over
+scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the
+next are drawn at random, the rest are proposed by Optuna's TPE sampler.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import argparse
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
-from baselines.bench.probes import POSES, Probes, run_probes
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
+from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import check_world, run, seed_number, whole
 from baselines.controller import Controller
@@ -38,30 +38,22 @@ from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
+if TYPE_CHECKING:
+    from optuna import Study
+    from optuna.trial import FrozenTrial
+
 WORLDS = 3_000_000
 """Seed of the first lane; those of evaluations, trainings and validations are lower."""
 
-LOST = 20.0
-"""mm: what a lost lane costs, and the most that any lane does."""
+WORST = 20.0
+"""mm, assumed: the most that a lane costs, be it lost or not. It is less than ``LOST_ERROR``, so that one bad lane does not
+outweigh all others."""
 
 RANDOM = 20
-"""Trials drawn at random before the best is varied."""
-
-SPREAD, WIDER, NARROWER = 0.15, 1.5, 0.92
-"""Standard deviation of the first variation, as a share of a gain's range, and its factors after a success and a failure: it
-stays where one in six succeeds (the 1/5 rule of evolution strategies)."""
+"""Trials before the sampler models their costs: the start and those drawn at random."""
 
 Gains = dict[str, float]
 Bounds = dict[str, tuple[float, float]]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Gains, their cost in mm, and what it is made of."""
-
-    gains: Gains
-    cost: float
-    parts: dict[str, float]
 
 
 def bounds_of(name: str, rig: Parameters) -> Bounds:
@@ -81,61 +73,31 @@ def bounds_of(name: str, rig: Parameters) -> Bounds:
 def start_of(path: Path | None, bounds: Bounds) -> Gains:
     """The gains of trial 0: those of a gains.json, or the middle of every range."""
     if path is None:
-        return from_unit(np.full(len(bounds), 0.5), bounds)
+        return {name: math.sqrt(low * high) if low > 0 else high / 2 for name, (low, high) in bounds.items()}
     try:
         gains = json.loads(path.read_text(encoding="utf-8"))["gains"]
-        return {name: float(gains[name]) for name in bounds}
+        start = {name: float(gains[name]) for name in bounds}
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"--start {str(path)!r} lacks {error}; allowed: JSON with gains: {', '.join(bounds)}") from error
+    for name, (low, high) in bounds.items():
+        if not low <= start[name] <= high:
+            raise ValueError(f"--start {str(path)!r} has {name} = {start[name]:g}; allowed: {low:g} to {high:g}")
+    return start
 
 
-def from_unit(point: Array, bounds: Bounds) -> Gains:
-    """Gains at a point of the unit cube, to four digits."""
-    gains = {}
-    for share, (name, (low, high)) in zip(point, bounds.items(), strict=True):
-        gains[name] = float(f"{low * (high / low) ** share if low > 0 else high * share:.4g}")
-    return gains
-
-
-def to_unit(gains: Gains, bounds: Bounds) -> Array:
-    """The point of the unit cube nearest to some gains."""
-    shares = [
-        math.log(max(gains[name], low) / low) / math.log(high / low) if low > 0 else gains[name] / high
-        for name, (low, high) in bounds.items()
-    ]
-    return np.clip(shares, 0.0, 1.0)
-
-
-def proposal(trials: list[Trial], start: Gains, bounds: Bounds, seed: int) -> Gains:
-    """The gains to try after ``trials``; it depends on nothing else, so that a search can be taken up again."""
-    count, size = len(trials), len(bounds)
-    if count == 0:
-        return start
-    rng = np.random.default_rng([seed, count])
-    if count <= RANDOM:
-        return from_unit(rng.uniform(size=size), bounds)
-    costs_so_far = np.minimum.accumulate([trial.cost for trial in trials])
-    successes = int(np.sum(np.diff(costs_so_far[RANDOM:]) < 0))
-    spread = min(SPREAD * WIDER**successes * NARROWER ** (count - RANDOM - 1 - successes), SPREAD)
-    best = to_unit(min(trials, key=lambda trial: trial.cost).gains, bounds)
-    varied = rng.uniform(size=size) < 0.5
-    varied[rng.integers(size)] = True
-    return from_unit(np.clip(best + varied * spread * rng.normal(size=size), 0.0, 1.0), bounds)
-
-
-def probes(rig: Parameters, lanes: int) -> Probes:
+def probes(rig: Parameters, lanes: int) -> StiffnessTest:
     """Stiffness tests on randomised rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
     rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
     rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
     force[lane % 2, lane] = rng.uniform(5, 40, lanes) * rng.choice([-1, 1], lanes)
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
-    return Probes(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
+    return StiffnessTest(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
 
 
 def robust(losses: Array) -> float:
-    """Mean + 95 % quantile of the losses (N,), mm, none of which counts more than ``LOST``."""
-    capped = np.minimum(np.nan_to_num(losses, nan=LOST, posinf=LOST), LOST)
+    """Mean + 95 % quantile of the losses (N,), mm, none of which counts more than ``WORST``."""
+    capped = np.fmin(losses, WORST)
     return float(capped.mean() + np.quantile(capped, 0.95))
 
 
@@ -151,24 +113,68 @@ def costs(
         circle = evaluate("BirthSIM/Circle-v1", controller, "", lanes, WORLDS, sensors=kind, **setting)
         if len(circle.seeds) < lanes:
             raise KeyboardInterrupt  # which ``evaluate`` has caught, to keep what is complete
-        parts[f"circle, {kind}"] = robust(np.where(circle.lost, LOST, circle.metrics["settled_rms"]))
-        answers = run_probes(probes(rig, lanes), controller, kind, WORLDS)
+        parts[f"circle, {kind}"] = robust(penalize_lost(circle.metrics["settled_rms"], circle.lost, True))
+        answers = run_stiffness_test(probes(rig, lanes), controller, kind, WORLDS)
         missed = np.hypot(*(answers.displacement - answers.expected)) + answers.hunting.max(axis=0)
-        parts[f"stiffness test, {kind}"] = robust(np.where(answers.lost, LOST, 1e3 * missed))
+        parts[f"stiffness test, {kind}"] = robust(penalize_lost(1e3 * missed, answers.lost, True))
     return parts
 
 
+def open_study(folder: Path, setting: dict[str, Any]) -> Study:
+    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
+    try:
+        import optuna
+        from optuna.storages import JournalStorage
+        from optuna.storages.journal import JournalFileBackend
+    except ImportError as error:
+        raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    path = make_folder(folder) / "trials.journal"
+    try:
+        storage = JournalStorage(JournalFileBackend(str(path)))
+        study = optuna.create_study(storage=storage, study_name="birthsim-tune", load_if_exists=True)
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(
+            f"{path} is no list of trials ({error!r}); allowed: what birthsim-tune wrote, or another --out"
+        ) from error
+    known = study.user_attrs or setting
+    for key, value in setting.items():
+        if known.get(key) != value:
+            raise ValueError(f"{path} has {key} = {known.get(key)!r}; allowed: {value!r}, or another --out")
+        study.set_user_attr(key, value)
+    return study
+
+
+def complete(study: Study) -> list[FrozenTrial]:
+    """The trials that have a cost; an interrupted one has none and says nothing."""
+    from optuna.trial import TrialState
+
+    return study.get_trials(states=(TrialState.COMPLETE,))
+
+
 def search(
-    name: str, rig: Parameters, bounds: Bounds, start: Gains, sensors: tuple[str, ...], lanes: int, seed: int, count: int,
-    trials: list[Trial], own: dict[str, Any],
-) -> Iterator[Trial]:  # fmt: skip
-    """The trials that ``trials`` lack of ``count``, one by one."""
-    trials = list(trials)
-    while len(trials) < count:
-        gains = proposal(trials, start, bounds, seed)
-        parts = costs(make_controller(name, rig, **gains), rig, sensors, lanes, **own)
-        trials.append(Trial(gains, sum(parts.values()), parts))
-        yield trials[-1]
+    study: Study, name: str, rig: Parameters, start: Gains, bounds: Bounds, sensors: tuple[str, ...], lanes: int, seed: int,
+    count: int, own: dict[str, Any],
+) -> Iterator[None]:  # fmt: skip
+    """Run the trials that the study lacks of ``count``, one by one."""
+    from optuna.distributions import BaseDistribution, FloatDistribution
+    from optuna.samplers import TPESampler
+
+    ranges: dict[str, BaseDistribution] = {
+        gain: FloatDistribution(low, high, log=low > 0) for gain, (low, high) in bounds.items()
+    }
+    while (done := len(complete(study))) < count:
+        if done == 0:
+            study.enqueue_trial(start)
+        # A sampler of its own for each trial: what it proposes depends on the seed and the complete trials alone, so that an
+        # interrupted search goes on as if it had not been interrupted.
+        own_seed = int(np.random.SeedSequence([seed, done]).generate_state(1)[0])
+        study.sampler = TPESampler(seed=own_seed, n_startup_trials=RANDOM, constant_liar=False)
+        trial = study.ask(ranges)
+        parts = costs(make_controller(name, rig, **trial.params), rig, sensors, lanes, **own)
+        trial.set_user_attr("parts", parts)
+        study.tell(trial, sum(parts.values()))
+        yield
 
 
 def main() -> None:
@@ -186,25 +192,8 @@ def main() -> None:
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)
     add_set(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for trials.json and gains.json")
+    parser.add_argument("--out", type=Path, required=True, help="folder for trials.journal, trials.json and gains.json")
     run(parser, _tune)
-
-
-def _stored(path: Path, setting: dict[str, Any]) -> list[Trial]:
-    """The trials of an earlier run with the same setting."""
-    if not path.is_file():
-        return []
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        trials = [Trial(**trial) for trial in content["trials"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(
-            f"{path} is no list of trials ({error}); allowed: what birthsim-tune wrote, or another --out"
-        ) from error
-    for key, value in setting.items():
-        if content.get(key) != value:
-            raise ValueError(f"{path} has {key} = {content.get(key)!r}; allowed: {value!r}, or another --out")
-    return trials
 
 
 def _tune(arguments: argparse.Namespace) -> None:
@@ -219,33 +208,35 @@ def _tune(arguments: argparse.Namespace) -> None:
     }  # fmt: skip
     check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
     print(described(rig, True))
-    path = arguments.out / "trials.json"
-    trials = _stored(path, setting)[: arguments.trials]
-    make_folder(arguments.out)
-    bar = tqdm(total=arguments.trials, initial=len(trials), desc=f"tuning {controller}", unit=" trials", leave=False)
+    study = open_study(arguments.out, setting)
+    kept = len(complete(study)[: arguments.trials])
+    bar = tqdm(total=arguments.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
     try:
         numbers = (arguments.lanes, arguments.seed, arguments.trials)
-        for trial in search(controller, rig, bounds, start, sensors, *numbers, trials, own):
-            trials.append(trial)
-            write_json(path, {**setting, "trials": [vars(one) for one in trials]})
-            bar.set_postfix_str(f"best {min(one.cost for one in trials):.3g} mm", refresh=False)
+        for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
+            bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
             bar.update()
     except KeyboardInterrupt:
-        if not trials:
+        if not (kept := len(complete(study))):
             raise
-        print(f"interrupted: {len(trials)} of {arguments.trials} trials are kept; the same command carries on")
+        print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
     finally:
         bar.close()
-    best = min(trials, key=lambda trial: trial.cost)
+    trials = [
+        {"gains": trial.params, "cost": trial.value, "parts": trial.user_attrs["parts"]}
+        for trial in complete(study)[: arguments.trials]
+    ]
+    first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
     place = {"trial": trials.index(best), "trials": len(trials)}
-    write_json(arguments.out / "gains.json", {**setting, **vars(best), **place})
+    write_json(arguments.out / "trials.json", {**setting, "trials": trials})
+    write_json(arguments.out / "gains.json", {**setting, **best, **place})
     print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
     print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
-    for part, value in {**best.parts, "sum": best.cost}.items():
-        before = trials[0].cost if part == "sum" else trials[0].parts[part]
-        print(f"{part:28}{before:12.4g}{value:12.4g}")
+    for part, value in best["parts"].items():
+        print(f"{part:28}{first['parts'][part]:12.4g}{value:12.4g}")
+    print(f"{'sum':28}{first['cost']:12.4g}{best['cost']:12.4g}")
     print(f"\n{'gain':28}{'start':>12}{'best':>12}{'lowest':>12}{'highest':>12}")
-    for gain, value in best.gains.items():
+    for gain, value in best["gains"].items():
         print(f"{gain:28}{start[gain]:12.4g}{value:12.4g}{bounds[gain][0]:12.4g}{bounds[gain][1]:12.4g}")
     print(f"\nwritten to {arguments.out}/: gains.json, trials.json")
 

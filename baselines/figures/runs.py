@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.bench.evaluation import TRACE, Evaluation
+from baselines.files import whole_file
 from birthsim_env.physics.lanes import Array
 
 DARK, MIDDLE, ACCENT, LIGHT = "#1b2a41", "#b23a0a", "#3f9e6a", "#8fb2dc"
@@ -72,7 +73,9 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     paths = [folder / f"{name}.{kind}" for kind in ("png", "svg")]
     with plt.rc_context({"svg.hashsalt": name}):
         for path in paths:
-            figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+            with whole_file(path) as file:
+                kind = path.suffix[1:]
+                figure.savefig(file, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
     plt.close(figure)
     return paths
 

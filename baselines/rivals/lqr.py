@@ -7,7 +7,8 @@ and of u over ``RATE_TOLERANCE``. Tolerances are those at the end effector: leng
 cylinder 1. Its gains are scheduled with kappa at the reference pose. dF/dt goes to the valves as in the paper, with its
 regulation of the pneumatic stiffness.
 
-The gains are what these commands printed (with ideal, then with lab), the second starting from what the first had found:
+These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna. The
+second started from what the first had found:
     birthsim-tune --controller lqr --trials 75 --seed 0 --sensors ideal --out out/first
     birthsim-tune --controller lqr --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
@@ -21,7 +22,7 @@ from scipy.linalg import solve_continuous_are
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
 from birthsim_env.physics import control_model
 from birthsim_env.physics import lanes as at
@@ -113,11 +114,12 @@ def command(
             integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
 
 
-class LinearQuadratic(Follower):
+class LinearQuadratic(TrackingController):
     """LQR with integral action about the compliant motion (this module).
 
-    Arguments are those of ``Follower``, with the gains integral_tolerance (m s), position_tolerance (m), speed_tolerance (m/s)
-    and force_tolerance (N): what counts as much as a force that changes by ``RATE_TOLERANCE``; friction_share; dead_zone.
+    Arguments are those of ``TrackingController``, with the gains integral_tolerance (m s), position_tolerance (m),
+    speed_tolerance (m/s) and force_tolerance (N): what counts as much as a force that changes by ``RATE_TOLERANCE``;
+    friction_share; dead_zone.
     """
 
     KERNEL = staticmethod(command)

@@ -7,7 +7,8 @@ within what the supply can give. F and the setpoint of the pneumatic stiffness (
     F = Pp Sp - Pn Sn,   K = k (Pp Sp/Lp + Pn Sn/Ln),
 and each chamber's flow is (6) solved for dP/dt = b (P* - P): proportional, with the piston's speed compensated.
 
-The gains are what these commands printed (with ideal, then with lab), the second starting from what the first had found:
+These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna. The
+second started from what the first had found:
     birthsim-tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/first
     birthsim-tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
@@ -17,7 +18,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from baselines.rivals.feedforward import FORCE1, KAPPA
-from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import driving_flows
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
@@ -57,7 +58,7 @@ def command(
     joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, bandwidth: float,
     damping: float, integral_rate: float, pressure_gain: float, zone: float, integral: Array, fresh: Array, openings: Array,
 ) -> None:  # fmt: skip
-    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), N, on. The signals are those of ``Follower``."""
+    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), N, on. The signals are those of ``TrackingController``."""
     index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
     low, high = p[at.ATMOSPHERE], p[at.SUPPLY]
     for cylinder in range(2):
@@ -86,11 +87,11 @@ def command(
             integral[cylinder, i] = carried_on(summed, rate, period, up, un)
 
 
-class PositionPID(Follower):
+class PositionPID(TrackingController):
     """Position PID with a pressure loop inside (this module), following the compliant motion.
 
-    Arguments are those of ``Follower``, with the gains bandwidth: w, 1/s, of the position loop; damping: zeta, of the speed
-    error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_share; dead_zone.
+    Arguments are those of ``TrackingController``, with the gains bandwidth: w, 1/s, of the position loop; damping: zeta,
+    of the speed error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_share; dead_zone.
     """
 
     KERNEL = staticmethod(command)

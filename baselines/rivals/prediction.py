@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.rivals.follower import LEAST_LENGTH
+from baselines.rivals.tracking import LEAST_LENGTH
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.parameters import Cylinder, Parameters
 

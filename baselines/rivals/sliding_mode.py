@@ -9,7 +9,7 @@ make ds/dt = -h sat(s/layer): the layer is reached in (|s| - layer)/h, inside s 
 at the end effector (kappa s of cylinder 1). h must beat 3 r times the acceleration by which the model is wrong. dF/dt goes to
 the valves as in the paper, with its regulation of the pneumatic stiffness.
 
-The gains are what these commands printed (with ideal, then with lab):
+These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna:
     birthsim-tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
 """
 
@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.follower import LEAST_LENGTH, Follower, beyond, carried_on
+from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
 from birthsim_env.physics import control_model
 from birthsim_env.physics import lanes as at
@@ -32,7 +32,7 @@ def command(
     joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, r: float,
     reaching: float, inside: float, zone: float, c4: float, integral: Array, fresh: Array, openings: Array,
 ) -> None:  # fmt: skip
-    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on. The signals are those of ``Follower``."""
+    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on. The signals are those of ``TrackingController``."""
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
@@ -57,10 +57,10 @@ def command(
             integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
 
 
-class SlidingMode(Follower):
+class SlidingMode(TrackingController):
     """Third-order sliding mode about the compliant motion (this module).
 
-    Arguments are those of ``Follower``, with the gains surface_rate: r, 1/s, at which errors decay on the surface;
+    Arguments are those of ``TrackingController``, with the gains surface_rate: r, 1/s, at which errors decay on the surface;
     reaching_rate: h, m/s3, at which the boundary layer is approached; layer_rate: b, 1/s, at which s decays inside, so that
     the layer is h/b thick; friction_share; dead_zone.
     """

@@ -8,9 +8,7 @@ from pathlib import Path
 from baselines.commands.shared import run
 from birthsim_env.physics.parameters import load_parameters
 from birthsim_live.commands.serving import add_address, need_server, serve
-from birthsim_live.rig.session import Session
 from birthsim_live.server.addresses import listen
-from birthsim_live.server.live_desk import LiveDesk
 
 
 def main() -> None:
@@ -30,12 +28,16 @@ def main() -> None:
 
 def _live(arguments: argparse.Namespace) -> None:
     need_server()
+    # After that: both need pydantic, which comes with the extra only.
+    from birthsim_live.rig.session import Session
+    from birthsim_live.server.live_hub import LiveHub
+
     with listen(arguments.host, arguments.port) as listening:
         session = Session(load_parameters(arguments.parameters))
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
-        desk = LiveDesk(session, arguments.record_dir)
-        serve(desk, listening, arguments.host, "birthsim-live", arguments.record_dir)
+        hub = LiveHub(session, arguments.record_dir)
+        serve(hub, listening, arguments.host, "birthsim-live", arguments.record_dir)
 
 
 if __name__ == "__main__":

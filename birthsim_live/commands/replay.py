@@ -10,7 +10,6 @@ from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.server.addresses import listen
-from birthsim_live.server.replay_desk import ReplayDesk
 
 
 def main() -> None:
@@ -26,10 +25,13 @@ def main() -> None:
 
 def _replay(arguments: argparse.Namespace) -> None:
     need_server()
+    # After that: it needs pydantic, which comes with the extra only.
+    from birthsim_live.server.replay_hub import ReplayHub
+
     with listen(arguments.host, arguments.port) as listening:
         recording = load_recording(arguments.file)
         title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
-        serve(ReplayDesk(Player(recording)), listening, arguments.host, title)
+        serve(ReplayHub(Player(recording)), listening, arguments.host, title)
 
 
 if __name__ == "__main__":

@@ -6,9 +6,12 @@ import argparse
 import contextlib
 import socket
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
-from birthsim_live.server.desk import Desk
+
+if TYPE_CHECKING:
+    from birthsim_live.server.hub import Hub
 
 LARGEST = 1 << 20
 """Bytes of a message that is still answered by an error; a larger one closes the socket."""
@@ -42,8 +45,8 @@ def need_server() -> None:
         raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
 
 
-def serve(desk: Desk, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
-    """Serve a desk on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
+def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
+    """Serve a hub on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
     import uvicorn
 
     from birthsim_live.server.app import create_app
@@ -57,7 +60,7 @@ def serve(desk: Desk, listening: socket.socket, host: str, title: str, recording
             "recordings; there is no password and no encryption. Pages must be opened by exactly this name.",
             flush=True,
         )
-    app = create_app(desk, LOOPBACK if loopback else (host,), recordings)
+    app = create_app(hub, LOOPBACK if loopback else (host,), recordings)
     options = uvicorn.Config(
         app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
@@ -66,5 +69,5 @@ def serve(desk: Desk, listening: socket.socket, host: str, title: str, recording
         with contextlib.suppress(KeyboardInterrupt):
             uvicorn.Server(options).run(sockets=[listening])
     finally:
-        # After a second interrupt the server leaves without closing the desk.
-        desk.finish()
+        # After a second interrupt the server leaves without closing the hub.
+        hub.finish()

@@ -8,13 +8,13 @@ from baselines.admittance.controller import AdmittanceBackstepping
 from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
-from baselines.rivals.follower import Follower
+from baselines.rivals.tracking import TrackingController
 from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_live.rig.settings import RESIDUAL
 
-DAMPED = (BacksteppingController, AdmittanceBackstepping, Follower)
+DAMPED = (BacksteppingController, AdmittanceBackstepping, TrackingController)
 """Laws that can be told to damp more."""
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import birthsim_env
+from baselines.files import whole_file
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_live.rig.frames import COLUMNS, FIELDS
@@ -85,10 +86,8 @@ class Recorder:
             "interval": self._interval,
             "events": self._events,
         }
-        partial = self.path.with_suffix(".partial")
-        with partial.open("wb") as file:
+        with whole_file(self.path) as file:
             np.savez_compressed(file, rows=np.array(self._rows), header=np.array(json.dumps(header)))
-        partial.replace(self.path)
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class Session:
 
     def shown_settings(self) -> dict[str, Any]:
         """The settings as the page shows them: with the scenario's setpoints where they hold."""
-        shown = {name: getattr(self.settings, name) for name in Settings.__dataclass_fields__}
+        shown = self.settings.model_dump()
         if self.settings.stiffness_source == "scenario":
             shown.update(self._scenario_setpoints())
         return {**shown, "damping_applies": has_damping(self.controller)}

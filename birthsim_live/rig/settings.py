@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
 from baselines.registry import CONTROLLERS, controller_names
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
@@ -50,8 +50,13 @@ def sliders(rig: Parameters) -> dict[str, Slider]:
     }
 
 
-@dataclass(frozen=True)
-class Settings:
+class Strict(BaseModel):
+    """What the page sends: nothing is converted, nothing is left over."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class Settings(Strict):
     """What is set. Numbers are those of ``sliders``; ``scenario_force`` keeps or drops the scenario's own hand, and
     ``stiffness_source`` says whether the stiffness setpoints are the scenario's or the sliders'."""
 
@@ -60,7 +65,7 @@ class Settings:
     valves: str = "two_valves"
     sensors: str = "ideal"
     scenario_force: bool = False
-    stiffness_source: str = "scenario"
+    stiffness_source: Literal["scenario", "sliders"] = "scenario"
     Kclx: float = 2000.0
     Kcly: float = 2000.0
     Kpneu1: float = 4600.0
@@ -106,43 +111,55 @@ class Choices:
             "controller": tuple(choice["name"] for choice in self.controllers if "missing" not in choice),
             "valves": VALVE_LAYOUTS,
             "sensors": tuple(SENSORS),
-            "stiffness_source": ("scenario", "sliders"),
         }
+        ranges = {name: Annotated[float, within(one.min, one.max, one.unit)] for name, one in self.sliders.items()}
+        words = {name: Annotated[str, AfterValidator(self._word(name))] for name in self.words}
+        defaults = default_settings(rig)
+        fields: Any = {name: (kind, getattr(defaults, name)) for name, kind in {**ranges, **words}.items()}
+        self._model = create_model("Checked", __base__=Settings, **fields)
 
     def checked(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """``changes`` with numbers as floats; ``ValueError`` naming the setting, its value and what is allowed."""
-        return {name: self._checked(name, value) for name, value in changes.items()}
+        try:
+            return self._model.model_validate(dict(changes)).model_dump(exclude_unset=True)
+        except ValidationError as error:
+            raise ValueError(refusal(error, ", ".join(Settings.model_fields))) from None
 
-    def _checked(self, name: str, value: Any) -> Any:
-        if name in self.sliders:
-            return in_range(name, value, self.sliders[name])
-        if name == "scenario_force":
-            if not isinstance(value, bool):
-                raise ValueError(f"{name} = {shown(value)}; allowed: true or false")
-            return value
-        if name not in self.words:
-            allowed = (*self.words, "scenario_force", *self.sliders)
-            raise ValueError(f"unknown setting {shown(name)}; allowed: {', '.join(allowed)}")
-        if not (isinstance(value, str) and value in self.words[name]):
-            missing = {choice["name"]: choice.get("missing") for choice in self.controllers}
-            if name == "controller" and isinstance(value, str) and missing.get(value):
-                raise ValueError(f"controller = {value!r} is not installed; allowed after: {missing[value]}")
-            raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(self.words[name])}")
+    def _word(self, name: str) -> Callable[[str], str]:
+        def check(word: str) -> str:
+            if word not in self.words[name]:
+                missing = {choice["name"]: choice.get("missing") for choice in self.controllers}
+                raise ValueError(f"after {missing[word]}" if missing.get(word) else ", ".join(self.words[name]))
+            return word
+
+        return check
+
+
+def within(low: float, high: float, unit: str = "") -> AfterValidator:
+    """A pydantic check that a number is from ``low`` to ``high``."""
+
+    def check(value: float) -> float:
+        if not low <= value <= high:
+            raise ValueError(f"{low:g} to {high:g} {unit}".rstrip())
         return value
 
-
-def in_range(name: str, value: Any, slider: Slider) -> float:
-    """``value`` as a float, or a ``ValueError`` with the slider's range."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not (number and math.isfinite(value) and slider.min <= value <= slider.max):
-        raise ValueError(f"{name} = {shown(value)}; allowed: {slider.min:g} to {slider.max:g} {slider.unit}")
-    return float(value)
+    return AfterValidator(check)
 
 
-def shown(value: Any) -> str:
-    """``value`` for an error message, shortened."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < 1e15 else "a huge whole number"
-    return text if len(text) <= 60 else text[:57] + "..."
+def refusal(error: ValidationError, names: str = "without it") -> str:
+    """What is wrong first, with its value and what is allowed; ``names`` are those allowed where one is unknown."""
+    first = error.errors(include_url=False)[0]
+    name, value, allowed = ".".join(map(str, first["loc"])), repr(first["input"]), first["msg"]
+    match first["type"]:
+        case "json_invalid":
+            return f"message is no JSON ({allowed}); allowed: a JSON object with a type"
+        case "missing":
+            return f"{name} is missing; allowed: a message with it"
+        case "extra_forbidden":
+            return f"{name[:60]} is unknown; allowed: {names}"
+    for start in ("Value error, ", "Input should be "):
+        allowed = allowed.removeprefix(start)
+    return f"{name or 'message'} = {value if len(value) <= 60 else value[:57] + '...'}; allowed: {allowed}"
 
 
 def merged(settings: Settings, changes: Mapping[str, Any], setpoints: Mapping[str, float]) -> Settings:
@@ -161,7 +178,7 @@ def merged(settings: Settings, changes: Mapping[str, Any], setpoints: Mapping[st
         changes.setdefault("stiffness_source", "scenario")
     if changes.get("stiffness_source") == "sliders" and settings.stiffness_source == "scenario":
         changes = {**setpoints, **changes}
-    return dataclasses.replace(settings, **changes)
+    return settings.model_copy(update=changes)
 
 
 def combined(pending: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

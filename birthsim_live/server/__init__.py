@@ -1,1 +1,1 @@
-"""The web server, its messages, and what the windows of the page share."""
+"""The web server, its messages, and what all clients share."""

@@ -17,8 +17,8 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from birthsim_live.server.addresses import LOOPBACK
-from birthsim_live.server.desk import Desk
-from birthsim_live.server.windows import Window
+from birthsim_live.server.clients import Client
+from birthsim_live.server.hub import Hub
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 
@@ -31,7 +31,7 @@ HEADERS = {
 }
 
 
-class Doorkeeper:
+class OriginMiddleware:
     """Lets in only what asks for one of the ``hosts`` by name, and of browsers only the page's own origin."""
 
     def __init__(self, app: ASGIApp, hosts: Collection[str]) -> None:
@@ -80,16 +80,16 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-def create_app(desk: Desk, hosts: Collection[str] = LOOPBACK, recordings: Path | None = None) -> ASGIApp:
-    """The application of a desk for requests to ``hosts``; finished recordings are given out from ``recordings``."""
+def create_app(hub: Hub, hosts: Collection[str] = LOOPBACK, recordings: Path | None = None) -> ASGIApp:
+    """The application of a hub for requests to ``hosts``; finished recordings are given out from ``recordings``."""
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        await desk.open()
+        await hub.open()
         try:
             yield
         finally:
-            await desk.close()
+            await hub.close()
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
 
@@ -106,23 +106,23 @@ def create_app(desk: Desk, hosts: Collection[str] = LOOPBACK, recordings: Path |
     @app.websocket("/ws")
     async def socket(socket: WebSocket) -> None:
         await socket.accept()
-        window = Window(socket.send_text)
-        sending = asyncio.create_task(window.send_all())
+        client = Client(socket.send_text)
+        sending = asyncio.create_task(client.send_all())
         try:
-            await desk.join(window)
+            await hub.join(client)
             while True:
                 message = await socket.receive()
                 if message["type"] == "websocket.disconnect":
                     break
-                await desk.receive(window, message["text"] if message.get("text") is not None else message["bytes"])
+                await hub.receive(client, message["text"] if message.get("text") is not None else message["bytes"])
         except WebSocketDisconnect:
             pass
         finally:
-            desk.leave(window)
+            hub.leave(client)
             sending.cancel()
             # However a socket broke, it is closed.
             with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending
 
     app.mount("/static", StaticFiles(directory=PAGE), name="static")
-    return Doorkeeper(app, hosts)
+    return OriginMiddleware(app, hosts)

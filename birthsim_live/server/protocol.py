@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
 
-from baselines.files import finite
+from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import to_json
+
 from birthsim_live.rig.clock import SLOWEST
-from birthsim_live.rig.settings import shown
+from birthsim_live.rig.settings import Strict, refusal, within
 
 VERSION = 1
 
@@ -20,68 +19,77 @@ LONGEST = 16 * 1024
 FARTHEST = 10.0
 """m; assumed: no pointer is further from the rig's origin."""
 
+Coordinate = Annotated[float, within(-FARTHEST, FARTHEST, "m")]
+Count = Annotated[int, Field(ge=0, lt=2**53)]
 
-@dataclass(frozen=True)
-class Drag:
+
+class Drag(Strict):
     """The person's hand is at ``position``, m; ``id`` counts the page's drags."""
 
-    position: tuple[float, float]
-    id: int
+    type: Literal["drag"] = "drag"
+    position: tuple[Coordinate, Coordinate]
+    id: Count
 
 
-@dataclass(frozen=True)
-class Release:
+class Release(Strict):
     """The hand lets go."""
 
+    type: Literal["release"] = "release"
 
-@dataclass(frozen=True)
-class Set:
+
+class Set(Strict):
     """Settings to change; names and values are not checked yet."""
 
-    settings: Mapping[str, Any]
+    type: Literal["set"] = "set"
+    settings: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Pause:
+class Pause(Strict):
     """Stand still or go on."""
 
+    type: Literal["pause"] = "pause"
     paused: bool
 
 
-@dataclass(frozen=True)
-class Speed:
+class Speed(Strict):
     """Times real time."""
 
-    speed: float
+    type: Literal["speed"] = "speed"
+    speed: Annotated[float, within(SLOWEST, 1.0, "times real time")]
 
 
-@dataclass(frozen=True)
-class Reset:
+class Reset(Strict):
     """Start the scenario anew."""
 
+    type: Literal["reset"] = "reset"
 
-@dataclass(frozen=True)
-class Record:
+
+class Record(Strict):
     """Begin or end a recording."""
 
+    type: Literal["record"] = "record"
     on: bool
 
 
-@dataclass(frozen=True)
-class Seek:
+class Seek(Strict):
     """Go to ``time``, s, of a recording."""
 
-    time: float
+    type: Literal["seek"] = "seek"
+    time: Annotated[float, within(0.0, 1e6, "s")]
 
 
-@dataclass(frozen=True)
-class Ping:
+class Ping(Strict):
     """Asks for a pong with the same ``id``."""
 
-    id: Any
+    type: Literal["ping"] = "ping"
+    id: Count
 
 
 Message = Drag | Release | Set | Pause | Speed | Reset | Record | Seek | Ping
+
+KINDS = ", ".join(kind.__name__.lower() for kind in get_args(Message))
+
+_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
 def parse(text: str | bytes) -> Message:
@@ -92,95 +100,17 @@ def parse(text: str | bytes) -> Message:
     if size > LONGEST:
         raise ValueError(f"message has {size} bytes; allowed: up to {LONGEST}")
     try:
-        content = json.loads(text, parse_constant=_no_constant)
-    except RecursionError:
-        raise ValueError("message is nested too deeply; allowed: a JSON object of plain fields") from None
-    except ValueError as error:
-        raise ValueError(f"message is no JSON ({error}); allowed: a JSON object with a type") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"message = {shown(content)}; allowed: a JSON object with a type")
-    kind = content.pop("type", None)
-    if not (isinstance(kind, str) and kind in _FIELDS):
-        raise ValueError(f"type = {shown(kind)}; allowed: {', '.join(_FIELDS)}")
-    make, fields = _FIELDS[kind]
-    if set(content) != set(fields):
-        found = ", ".join(map(shown, content)) or "nothing"
-        raise ValueError(f"{kind} has the fields {found}; allowed: exactly {', '.join(fields) or 'none'}")
-    return make(**{name: check(f"{kind}.{name}", content[name]) for name, check in fields.items()})
+        return _MESSAGES.validate_json(text)
+    except ValidationError as error:
+        untyped = error.errors()[0]["type"].startswith("union_tag")
+        raise ValueError(f"message has no known type; allowed: {KINDS}" if untyped else refusal(error)) from None
 
 
 def encode(message: Mapping[str, Any]) -> str:
     """A message as JSON; what is not finite becomes null."""
-    return json.dumps(finite(dict(message)), allow_nan=False, separators=(",", ":"))
+    return to_json(message, inf_nan_mode="null").decode()
 
 
 def error(text: str) -> dict[str, str]:
     """The answer to what was wrong."""
     return {"type": "error", "message": text}
-
-
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
-
-
-def _number(name: str, value: Any, low: float, high: float, unit: str) -> float:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    # Whole numbers may be too large for a float; comparing them needs none.
-    if not (number and low <= value <= high and math.isfinite(value)):
-        raise ValueError(f"{name} = {shown(value)}; allowed: {low:g} to {high:g}{unit}")
-    return float(value)
-
-
-def _point(name: str, value: Any) -> tuple[float, float]:
-    if not (isinstance(value, list) and len(value) == 2):
-        raise ValueError(f"{name} = {shown(value)}; allowed: [x, y] in m")
-    x, y = (_number(f"{name}[{k}]", number, -FARTHEST, FARTHEST, " m") for k, number in enumerate(value))
-    return x, y
-
-
-def _count(name: str, value: Any) -> int:
-    if not (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53):
-        raise ValueError(f"{name} = {shown(value)}; allowed: a whole number from 0 to 2^53 - 1")
-    return value
-
-
-def _truth(name: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError(f"{name} = {shown(value)}; allowed: true or false")
-    return value
-
-
-def _object(name: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise ValueError(f"{name} = {shown(value)}; allowed: an object, setting -> value")
-    return value
-
-
-def _speed(name: str, value: Any) -> float:
-    return _number(name, value, SLOWEST, 1.0, " times real time")
-
-
-def _instant(name: str, value: Any) -> float:
-    return _number(name, value, 0.0, 1e6, " s")
-
-
-def _label(name: str, value: Any) -> Any:
-    if isinstance(value, str) and len(value) <= 64:
-        return value
-    if isinstance(value, str):
-        raise ValueError(f"{name} = {shown(value)}; allowed: up to 64 characters, or a number")
-    return _number(name, value, -(2.0**53), 2.0**53, "")
-
-
-_FIELDS: dict[str, tuple[Callable[..., Message], dict[str, Callable[[str, Any], Any]]]] = {
-    "drag": (Drag, {"position": _point, "id": _count}),
-    "release": (Release, {}),
-    "set": (Set, {"settings": _object}),
-    "pause": (Pause, {"paused": _truth}),
-    "speed": (Speed, {"speed": _speed}),
-    "reset": (Reset, {}),
-    "record": (Record, {"on": _truth}),
-    "seek": (Seek, {"time": _instant}),
-    "ping": (Ping, {"id": _label}),
-}
-"""Type -> the message and its fields, each with its check."""

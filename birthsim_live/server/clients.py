@@ -1,4 +1,4 @@
-"""Windows of the page: what waits to be sent to each, so that a slow one holds up nobody."""
+"""Clients of the page: what waits to be sent to each, so that a slow one holds up nobody."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from birthsim_live.server.protocol import encode
 
 ANSWERS = 32
-"""Answers (errors, pongs) that wait for a window; a window that floods loses its oldest."""
+"""Answers (errors, pongs) that wait for a client; a client that floods loses its oldest."""
 
 
-class Window:
-    """One browser window. Of each kind of news only the newest waits, and one frame."""
+class Client:
+    """One window of a browser. Of each kind of news only the newest waits, and one frame."""
 
     def __init__(self, send: Callable[[str], Awaitable[None]]) -> None:
         self._send = send
@@ -31,7 +31,7 @@ class Window:
         self._ready.set()
 
     def answer(self, message: Mapping[str, Any]) -> None:
-        """Send an answer to what this window sent."""
+        """Send an answer to what this client sent."""
         self._answers.append(encode(message))
         self._ready.set()
 

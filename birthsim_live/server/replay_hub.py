@@ -1,4 +1,4 @@
-"""The desk of a recording: pause, slow motion, seek."""
+"""The hub of a recording: pause, slow motion, seek."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.settings import Choices
 from birthsim_live.server import protocol
-from birthsim_live.server.desk import Desk
-from birthsim_live.server.windows import Window
+from birthsim_live.server.clients import Client
+from birthsim_live.server.hub import Hub
 
 
-class ReplayDesk(Desk):
-    """All windows see one recording."""
+class ReplayHub(Hub):
+    """All clients see one recording."""
 
     mode = "replay"
 
@@ -26,7 +26,7 @@ class ReplayDesk(Desk):
             self._player.seek(0.0)
         super().pause(paused)
 
-    async def act(self, window: Window, message: protocol.Message) -> None:
+    async def act(self, client: Client, message: protocol.Message) -> None:
         match message:
             case protocol.Seek(time=time):
                 await self.ask(lambda: self._seek(time))

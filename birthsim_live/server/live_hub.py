@@ -1,4 +1,4 @@
-"""The desk of a rig in motion: drags, settings, resets and recordings."""
+"""The hub of a rig in motion: drags, settings, resets and recordings."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from birthsim_live.rig.recording import Recorder
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import combined
 from birthsim_live.server import protocol
-from birthsim_live.server.desk import Desk
-from birthsim_live.server.windows import Window
+from birthsim_live.server.clients import Client
+from birthsim_live.server.hub import Hub
 
 
-class LiveDesk(Desk):
-    """All windows see and push the rig of one session; recordings go to ``folder``."""
+class LiveHub(Hub):
+    """All clients see and push the rig of one session; recordings go to ``folder``."""
 
     mode = "live"
 
@@ -31,9 +31,9 @@ class LiveDesk(Desk):
         super().__init__(session, session.rig, session.choices)
         self.folder = folder
         self._session = session
-        self._holder: Window | None = None
+        self._holder: Client | None = None
         self._pending: dict[str, Any] = {}
-        self._askers: set[Window] = set()
+        self._askers: set[Client] = set()
         self._wake, self._idle = asyncio.Event(), asyncio.Event()
         self._idle.set()
         self._settling: asyncio.Task[None] | None = None
@@ -59,20 +59,20 @@ class LiveDesk(Desk):
             recorder.save()
             print(f"recording finished: {recorder.path}", flush=True)
 
-    def leave(self, window: Window) -> None:
-        super().leave(window)
-        self._askers.discard(window)
-        self._release(window)
+    def leave(self, client: Client) -> None:
+        super().leave(client)
+        self._askers.discard(client)
+        self._release(client)
 
-    async def act(self, window: Window, message: protocol.Message) -> None:
+    async def act(self, client: Client, message: protocol.Message) -> None:
         match message:
             case protocol.Drag(position=position, id=identity):
-                self._holder = window
+                self._holder = client
                 self._session.hands.hold = Hold(np.array(position), identity)
             case protocol.Release():
-                self._release(window)
+                self._release(client)
             case protocol.Set(settings=settings):
-                self._set(window, settings)
+                self._set(client, settings)
             case protocol.Reset():
                 await self._idle.wait()
                 await self.ask(self._reset)
@@ -108,17 +108,17 @@ class LiveDesk(Desk):
             "path": {"type": "path", "points": self._path},
         }
 
-    def _release(self, window: Window) -> None:
-        if self._holder is window:
+    def _release(self, client: Client) -> None:
+        if self._holder is client:
             self._holder = self._session.hands.hold = None
 
     def _reset(self) -> None:
         self._session.reset()
         self.clock.restart()
 
-    def _set(self, window: Window, settings: Mapping[str, Any]) -> None:
+    def _set(self, client: Client, settings: Mapping[str, Any]) -> None:
         self._pending = combined(self._pending, self._session.choices.checked(settings))
-        self._askers.add(window)
+        self._askers.add(client)
         self._idle.clear()
         self._wake.set()
 
@@ -134,8 +134,8 @@ class LiveDesk(Desk):
             except Exception as error:
                 if not isinstance(error, ValueError):
                     LOG.exception("settings %s", changes)
-                for window in askers:
-                    window.answer(protocol.error(str(error)))
+                for client in askers:
+                    client.answer(protocol.error(str(error)))
             if not self._pending:
                 self._idle.set()
 

@@ -1,4 +1,4 @@
-"""What all windows share: one clock, its news, and what they ask for."""
+"""What all clients share: one clock, its news, and what they ask for."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from birthsim_live.rig.clock import Clock, Source
 from birthsim_live.rig.hand import DRAG_LIMIT
 from birthsim_live.rig.settings import Choices
 from birthsim_live.server import protocol
+from birthsim_live.server.clients import Client
 from birthsim_live.server.shapes import shapes
-from birthsim_live.server.windows import Window
 
 T = TypeVar("T")
 
@@ -26,15 +26,15 @@ EDGE = 33
 """Points along each long edge of the workspace."""
 
 
-class Desk(ABC):
-    """All windows' messages in, news out. It lives in the event loop, its source in the clock's thread."""
+class Hub(ABC):
+    """All clients' messages in, news out. It lives in the event loop, its source in the clock's thread."""
 
     mode: str
 
     def __init__(self, source: Source, rig: Parameters, choices: Choices) -> None:
         self.clock = Clock(source, self._from_clock)
         self._surroundings = surroundings(rig, choices)
-        self._windows: set[Window] = set()
+        self._clients: set[Client] = set()
         self._told: dict[str, Any] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -51,42 +51,42 @@ class Desk(ABC):
         """What ``close`` does, outside the event loop; once is enough."""
         self.clock.stop()
 
-    async def join(self, window: Window) -> None:
-        """Tell a new window everything, and from then on the news."""
+    async def join(self, client: Client) -> None:
+        """Tell a new client everything, and from then on the news."""
         loop = asyncio.get_running_loop()
         # From the clock's thread, like all news: what changes meanwhile comes after, not before.
-        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, window, self.news()))
+        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, client, self.news()))
 
-    def _welcome(self, window: Window, news: dict[str, dict[str, Any]]) -> None:
-        if window.closed:
+    def _welcome(self, client: Client, news: dict[str, dict[str, Any]]) -> None:
+        if client.closed:
             return
         hello = {"type": "hello", "protocol": protocol.VERSION, "mode": self.mode, **self._surroundings}
         hello["settings"], hello["state"] = news["settings"]["settings"], news["state"]
-        window.tell("hello", protocol.encode(hello))
+        client.tell("hello", protocol.encode(hello))
         for kind, message in news.items():
-            window.tell(kind, protocol.encode(message))
-        self._windows.add(window)
+            client.tell(kind, protocol.encode(message))
+        self._clients.add(client)
 
-    def leave(self, window: Window) -> None:
-        """Forget a closed window."""
-        window.closed = True
-        self._windows.discard(window)
+    def leave(self, client: Client) -> None:
+        """Forget a closed client."""
+        client.closed = True
+        self._clients.discard(client)
 
-    async def receive(self, window: Window, text: str | bytes) -> None:
-        """Act on what a window has sent; what is wrong is answered by an error."""
+    async def receive(self, client: Client, text: str | bytes) -> None:
+        """Act on what a client has sent; what is wrong is answered by an error."""
         try:
             message = protocol.parse(text)
             match message:
                 case protocol.Ping(id=identity):
-                    window.answer({"type": "pong", "id": identity})
+                    client.answer({"type": "pong", "id": identity})
                 case protocol.Pause(paused=paused):
                     await self.ask(lambda: self.pause(paused))
                 case protocol.Speed(speed=speed):
                     await self.ask(lambda: self.clock.set_speed(speed))
                 case _:
-                    await self.act(window, message)
+                    await self.act(client, message)
         except (ValueError, OSError) as error:
-            window.answer(protocol.error(str(error)))
+            client.answer(protocol.error(str(error)))
 
     async def ask(self, action: Callable[[], T]) -> T:
         """Let the clock's thread do something; its result."""
@@ -97,12 +97,12 @@ class Desk(ABC):
         self.clock.pause(paused)
 
     @abstractmethod
-    async def act(self, window: Window, message: protocol.Message) -> None:
-        """Act on a message that is not common to all desks."""
+    async def act(self, client: Client, message: protocol.Message) -> None:
+        """Act on a message that is not common to all hubs."""
 
     @abstractmethod
     def news(self) -> dict[str, dict[str, Any]]:
-        """In the clock's thread: kind -> message, of all that a window must know beside the frames."""
+        """In the clock's thread: kind -> message, of all that a client must know beside the frames."""
 
     def _from_clock(self, frame: dict[str, Any]) -> None:
         texts = []
@@ -115,15 +115,15 @@ class Desk(ABC):
             self._loop.call_soon_threadsafe(self._publish, texts, shown)
 
     def announce(self, message: dict[str, Any]) -> None:
-        """Send a message to every window, in the event loop."""
-        for window in self._windows:
-            window.answer(message)
+        """Send a message to every client, in the event loop."""
+        for client in self._clients:
+            client.answer(message)
 
     def _publish(self, texts: list[tuple[str, str]], frame: str) -> None:
-        for window in self._windows:
+        for client in self._clients:
             for kind, text in texts:
-                window.tell(kind, text)
-            window.show(frame)
+                client.tell(kind, text)
+            client.show(frame)
 
 
 def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:

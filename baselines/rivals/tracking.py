@@ -35,7 +35,7 @@ def carried_on(integral: float, rate: float, period: float, opening_p: float, op
     return integral if max(abs(opening_p), abs(opening_n)) >= 1.0 else integral + period * rate
 
 
-class Follower(ABC):
+class TrackingController(ABC):
     """A loop round each piston that follows the compliant motion of ``Admittance`` and knows the forces that it needs.
 
     Arguments:
