@@ -14,13 +14,8 @@ from birthsim_env.loop.rows import (
     ASKED,
     FEEDFORWARD,
     OPENING,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
     REFERENCE,
-    TIME,
-    USER_FORCE,
-    VELOCITY,
+    fill_measurement,
 )
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference, one_lane
@@ -109,7 +104,8 @@ class StagedController:
             placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
         self._told[:] = told_of(lanes, believed_force, believed_rate, damping_factor)
-        fill_seen(self._seen, measurement, reference)
+        fill_measurement(self._seen, measurement)
+        self._seen[REFERENCE:ASKED] = self._seen[ASKED:] = reference.rows
         if self._loop.run():
             self.explain(measurement, reference)
         return self._openings.copy()
@@ -117,11 +113,3 @@ class StagedController:
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""
         return []
-
-
-def fill_seen(rows: Array, measurement: Measurement, reference: Reference) -> None:
-    """Write signals over N lanes into the first rows of what is seen, as far as ``ASKED`` and its reference."""
-    rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
-    rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
-    rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
-    rows[REFERENCE:ASKED] = rows[ASKED:] = reference.rows

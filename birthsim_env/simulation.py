@@ -7,13 +7,13 @@ all periods of a policy step are one call; the loop stops only for what a user h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.loop import MixedLoop
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
@@ -21,17 +21,14 @@ from birthsim_env.loop.rows import (
     IMPACT,
     MOTION,
     OPENING,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
     REFERENCE,
     SHOWN,
     SINCE_JUMP,
     STATE,
     TICK,
     TIME,
-    USER_FORCE,
-    VELOCITY,
+    fill_measurement,
+    measurement_of,
 )
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, plant_stage
@@ -50,6 +47,8 @@ from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant, checked
 from birthsim_env.physics.strength import require_carried
+
+Part = Stage | Callable[[int], None]
 
 CHECKS = 64
 """Instants of a new episode at which its reference is checked against the workspace."""
@@ -99,23 +98,23 @@ class Simulation:
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
         self._ranges, self._begun = ranges, False
-        self._loops: list[Loop | Callable[[], None]] = []
-        self._look: list[Loop | Callable[[], None]] = []
-        self._closing: Loop | None = None
+        self._sampled, self._opens = self.sensors.sampled, actuation
+        self._loop: MixedLoop | None = None
+        self._look: MixedLoop | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the loops, which know addresses."""
-        return {**self.__dict__, "_loops": [], "_look": [], "_closing": None}
+        return {**self.__dict__, "_loop": None, "_look": None}
 
     @property
     def time(self) -> Array:
         """s since each lane's episode began, (N,)."""
-        return self._seen[TIME].copy()
+        return np.array(self._seen[TIME])
 
     @property
     def ticks(self) -> NDArray[np.int64]:
         """Control periods since each lane's episode began, (N,)."""
-        return self._tick[0].astype(np.int64)
+        return np.array(self._tick[0], dtype=np.int64)
 
     @property
     def motion(self) -> Array:
@@ -130,7 +129,7 @@ class Simulation:
     @property
     def since_jump(self) -> Array:
         """s since force or stiffness setpoint jumped, (N,)."""
-        return self._since[0].copy()
+        return np.array(self._since[0])
 
     @property
     def openings(self) -> Array:
@@ -145,11 +144,7 @@ class Simulation:
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now."""
-        rows = self._seen[:REFERENCE].copy()
-        return Measurement(
-            rows[TIME], rows[POSITION:VELOCITY], rows[POSITION_TIME], rows[VELOCITY:POSITION_TIME], rows[PRESSURE:USER_FORCE],
-            rows[USER_FORCE:REFERENCE], self.sensors.sampled,
-        )  # fmt: skip
+        return measurement_of(self._seen, self._sampled)
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
@@ -189,91 +184,66 @@ class Simulation:
         end_effector_motion(self.plant.state, self.plant.lane_parameters, self._motion)
         self._assemble()
         self._samples = self._samples[:0]
-        for part in self._look:
-            self._run(part, 1)
+        self._run(self._look, 1)
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
+        if self._loop is None or self._opens is not self.actuation:
+            self._assemble()
         self.action[:] = actions
         self.actuation.accept(actions)
         self.impacts[:] = 0.0
-        if not self._loops:
-            self._assemble()
-        if self._closing is None:
-            self._run(self._loops[0], self.periods)
-            return
-        for period in range(self.periods):
-            for part in self._loops:
-                if period == 0 or part != self._ask or self.actuation.every_period:
-                    self._run(part, 1)
-        self._run(self._closing, 1)
+        self._run(self._loop, self.periods)
 
-    def _run(self, part: Loop | Callable[[], None], periods: int) -> None:
-        if not isinstance(part, Loop):
-            part()
-        elif part.run(periods, self.threads):
-            self.actuation.explain(self.measurement, self.reference)
+    def _run(self, loop: MixedLoop | None, periods: int) -> None:
+        if loop is not None and loop.run(periods, self.threads):
+            self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
 
     def _assemble(self) -> None:
-        """Bring the loops up to the parts: what is compiled and stands side by side runs in one call."""
-        looking: list[Stage | Callable[[], None]] = [
-            *self._compiled(self.trajectory, "sample", self._follow),
-            *self._compiled(self.stiffness, "sample", self._set),
-            *self._compiled(self.user_force, "force", self._push),
-        ]
-        rate, sensors = self.user_force.jump_rate, self.sensors.stage()
-        acting: list[Stage | Callable[[], None]] = [*self._acting(), plant_stage(self.period)]
-        stages = [*acting, *looking, jump_stage(self.period, rate, self._jumps, begins=False), sensors]
-        alone = all(isinstance(stage, Stage) for stage in stages)
-        self._loops = self._join(stages, self.closing if alone else ())
-        self._closing = None if alone else self._join([], self.closing)[0]
-        self._look = self._join([*looking, jump_stage(self.period, rate, self._jumps, begins=True), sensors])
-
-    def _acting(self) -> list[Stage | Callable[[], None]]:
-        compiled = getattr(self.actuation, "stages", None)
-        return [*compiled(self.plant.num_envs, self.sensors.sampled)] if compiled else [self._ask]
-
-    @staticmethod
-    def _compiled(part: Any, method: str, instead: Callable[[], None]) -> list[Stage | Callable[[], None]]:
-        """The stage of a part, unless a class that derives from a compiled one has changed ``method``."""
-        for kind in type(part).__mro__:
-            if "stage" in vars(kind):
-                return [part.stage()]
-            if method in vars(kind):
-                break
-        return [instead]
-
-    def _join(self, stages: list[Stage | Callable[[], None]], closing: Sequence[Stage] = ()) -> list[Loop | Callable[[], None]]:
-        plant, lanes = self.plant, self.plant.num_envs
+        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
+        plant, lanes, actuation = self.plant, self.plant.num_envs, self.actuation
+        self._opens, self._sampled = actuation, self.sensors.sampled
+        if len(self.action) != actuation.size:
+            self.action = np.zeros((actuation.size, lanes))
         world = [(plant.lane_parameters, 0), (plant.state, STATE), (self.impacts, IMPACT), (self._motion, MOTION)]
         world += [(self._force, FORCE), (self._since, SINCE_JUMP), (self._tick, TICK)]
         seen = [(self._seen, 0), (self.action, ACTION), (self._openings, OPENING)]
-        shown = getattr(self.actuation, "shown", None)
-        if shown is not None:
-            seen.append((shown, SHOWN))
-        loops: list[Loop | Callable[[], None]] = []
-        waiting: list[Stage] = []
-        for stage in stages:
-            if isinstance(stage, Stage):
-                waiting.append(stage)
-                continue
-            if waiting:
-                loops.append(Loop(lanes, world, seen, waiting))
-            loops.append(stage)
-            waiting = []
-        # The last of them, the sensors, are always compiled.
-        return [*loops, Loop(lanes, world, seen, waiting, closing)]
+        if hasattr(actuation, "shown"):
+            seen.append((actuation.shown, SHOWN))
+        acting = getattr(actuation, "stages", None)
+        acts: list[Part] = [*acting(lanes, self.sensors.sampled)] if acting else [self._ask]
+        looks: list[Part] = [
+            self._compiled(self.trajectory, "sample", self._follow),
+            self._compiled(self.stiffness, "sample", self._set),
+            self._compiled(self.user_force, "force", self._push),
+        ]
+        senses = self._compiled(self.sensors, "measure", self._measure)
+        counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
+        self._loop = MixedLoop(lanes, world, seen, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
+        self._look = MixedLoop(lanes, world, seen, [*looks, begins, senses])
 
-    def _ask(self) -> None:
-        self._openings[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+    @staticmethod
+    def _compiled(part: Any, method: str, instead: Part) -> Part:
+        """The stage of a part, unless a class that derives from a compiled one has changed ``method``."""
+        for kind in type(part).__mro__:
+            if "stage" in vars(kind):
+                stage: Stage = part.stage()
+                return stage
+            if method in vars(kind):
+                break
+        return instead
 
-    def _follow(self) -> None:
+    def _ask(self, period: int) -> None:
+        if period == 0 or self.actuation.every_period:
+            self._openings[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+
+    def _follow(self, _: int) -> None:
         self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)
 
-    def _set(self) -> None:
+    def _set(self, _: int) -> None:
         self._seen[REFERENCE + 8 : ASKED] = self.stiffness.sample(self.time)
 
-    def _push(self) -> None:
+    def _push(self, _: int) -> None:
         self._sample += 1
         if self._sample >= len(self._samples):
             # A hand that does not feel the rig is asked for a policy step at once.
@@ -282,6 +252,11 @@ class Simulation:
             self._samples = forces_of(self.user_force, times, self._motion[:2].copy(), self._motion[2:].copy()).copy()
             self._sample = 0
         self._force[:] = self._samples[self._sample]
+
+    def _measure(self, _: int) -> None:
+        now = self.sensors.measure(self.ticks, self.time, self.motion, self.plant.pressures, self.force)
+        fill_measurement(self._seen, now)
+        self._sampled = now.sampled
 
     def reference_at(self, time: Array) -> Reference:
         """What is asked for at ``time`` (N,) of the present episodes, s."""

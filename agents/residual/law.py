@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import carray
 
 from agents.residual import authority, unexplained
 from agents.residual.settings import NO_LAW, ResidualSettings
@@ -40,7 +39,7 @@ from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import PARAMETERS, Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
@@ -152,7 +151,7 @@ def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane
     s, about = block(seen, SEEN), numbers(constants, len(CONSTANTS) + PARAMETERS)
     p, size, sampled, period = about[len(CONSTANTS) :], int(about[SIZE]), about[SAMPLED] > 0.0, about[PERIOD]
     m = block(memory, PISTONS + int(about[OBSERVER]))[:, :n]
-    own = carray(scratch(17), (17, BLOCK))[:, :n]
+    own = scratch(17)[:, :n]
     joints, disturbance, told, nothing, moving = own[:4], own[4:6], own[6:13], own[13:15], own[15]
     for i in range(n):
         nothing[0, i], nothing[1, i], moving[i] = 0.0, 0.0, 1.0

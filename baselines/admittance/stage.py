@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numba import carray
-
 from baselines.admittance import law as admittance_law
 from baselines.estimation import admittance, chamber_observer, disturbance_observer, reference_friction
 from baselines.estimation.awareness import MOVING_SPEED, unseen_forces
@@ -24,7 +22,7 @@ from birthsim_env.loop.rows import (
     VELOCITY,
 )
 from birthsim_env.loop.stage import block, numbers, scratch
-from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import PARAMETERS
 
 ADMITTANCE, BRISTLES, CHAMBERS, JOINTS, LAW = 0, 5, 7, 20, 24
@@ -52,7 +50,7 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     s, about = block(seen, SEEN), numbers(constants, NUMBERS + PARAMETERS)
     p, period, g, sampled = about[NUMBERS:], about[PERIOD], about[GAIN:NUMBERS], about[SAMPLED] > 0.0
     m = block(memory, PISTONS + int(about[ROWS]))[:, :n]
-    own = carray(scratch(17), (17, BLOCK))[:, :n]
+    own = scratch(17)[:, :n]
     motion, believed, disturbance, unseen = own[:8], own[8:10], own[10:12], own[12:14]
     rest, moving, force, missed = own[14:16], own[16], s[USER_FORCE:REFERENCE, :n], 0
     target, told = s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n]

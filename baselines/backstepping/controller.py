@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import carray
 
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
@@ -31,7 +30,7 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.signals import Mask, Measurement, Reference
-from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.lanes import PARAMETERS, Array
@@ -69,9 +68,9 @@ def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane
     noise, m; options of the law; the rig."""
     s, about = block(seen, SEEN), numbers(constants, 4 + backstepping_law.OPTIONS + PARAMETERS)
     options, p = about[4 : 4 + backstepping_law.OPTIONS], about[4 + backstepping_law.OPTIONS :]
-    joints, rows = carray(scratch(4), (4, BLOCK)), int(about[0])
+    joints, rows = scratch(4), int(about[0])
     if rows > 0:
-        nothing = carray(scratch(3), (3, BLOCK))
+        nothing = scratch(3)
         for i in range(n):
             nothing[0, i], nothing[1, i], nothing[2, i] = 0.0, 0.0, 1.0
         m = block(memory, rows)

@@ -7,16 +7,16 @@ the number of lanes nor that of threads changes a bit.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import groupby
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import SEEN, WORLD
-from birthsim_env.loop.stage import TABLE, Stage, address_of, pointer
+from birthsim_env.loop.stage import TABLE, Stage, address_of, carray, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compilation import BLOCK, kernel
 from birthsim_env.physics.lanes import Array
@@ -121,3 +121,39 @@ class Loop:
         waiting = [pool.submit(_run, *arguments, edges[k], edges[k + 1]) for k in range(1, parts)]
         missed = _run(*arguments, edges[0], edges[1])
         return int(missed + sum(one.result() for one in waiting))
+
+
+class MixedLoop:
+    """Stages, and a user's own Python among them, for which the loop stops: it is called with the number of the period.
+
+    Arguments as for ``Loop``. Where all is compiled, all periods are one call.
+    """
+
+    def __init__(
+        self,
+        lanes: int,
+        world: Sequence[Place],
+        seen: Sequence[Place],
+        parts: Sequence[Stage | Callable[[int], None]],
+        closing: Sequence[Stage] = (),
+    ) -> None:
+        groups = [(kind, list(group)) for kind, group in groupby(parts, lambda part: isinstance(part, Stage))]
+        self._stops = not all(kind for kind, _ in groups)
+        self._pieces: list[Loop | Callable[[int], None]] = []
+        for kind, group in groups:
+            stages = [part for part in group if isinstance(part, Stage)]
+            self._pieces += [Loop(lanes, world, seen, stages, () if self._stops else closing)] if kind else group  # type: ignore[arg-type]
+        self._closing = Loop(lanes, world, seen, (), closing)
+
+    def run(self, periods: int = 1, threads: int = 1) -> int:
+        """Run ``periods`` control periods; returns how many lanes and periods a stage could not serve."""
+        if not self._stops:
+            return sum(piece.run(periods, threads) for piece in self._pieces if isinstance(piece, Loop))
+        missed = 0
+        for period in range(periods):
+            for piece in self._pieces:
+                if isinstance(piece, Loop):
+                    missed += piece.run(1, threads)
+                else:
+                    piece(period)
+        return missed + self._closing.run(1, threads)

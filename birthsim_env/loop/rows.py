@@ -6,8 +6,8 @@ state stand at the beginning of the world, in the order of ``physics.lanes``.
 
 from __future__ import annotations
 
-from birthsim_env.parts.signals import REFERENCES
-from birthsim_env.physics.lanes import PARAMETERS, STATES
+from birthsim_env.parts.signals import REFERENCES, Measurement
+from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 
 STATE = PARAMETERS
 IMPACT = STATE + STATES
@@ -51,3 +51,19 @@ SHOWN = OPENING + 4
 """What an actuation shows of its memory to a policy."""
 SEEN = SHOWN + MOST_SHOWN
 """Rows of what is seen."""
+
+
+def fill_measurement(rows: Array, measurement: Measurement) -> None:
+    """Write a measurement over N lanes into the first rows of what is seen, (REFERENCE or more, N)."""
+    rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
+    rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
+    rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
+
+
+def measurement_of(rows: Array, sampled: bool) -> Measurement:
+    """The measurement in a copy of the first rows of what is seen."""
+    seen = rows[:REFERENCE].copy()
+    return Measurement(
+        seen[TIME], seen[POSITION:VELOCITY], seen[POSITION_TIME], seen[VELOCITY:POSITION_TIME], seen[PRESSURE:USER_FORCE],
+        seen[USER_FORCE:], sampled,
+    )  # fmt: skip

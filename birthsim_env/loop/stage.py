@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
 from birthsim_env.physics.compilation import BLOCK, helper
@@ -28,40 +30,60 @@ TABLE = 5
 """Whole numbers that describe a table: its address and up to four dimensions."""
 
 
-@intrinsic
-def pointer(context: Any, address: Any, kind: Any) -> Any:
-    """Pointer to numbers of the type ``kind`` (a Numba type) at an address."""
-    target = types.CPointer(kind.dtype)
+if TYPE_CHECKING:
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(target))
+    def carray(place: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+        """The array of a shape at a place in memory."""
 
-    return target(address, kind), generate
+    def pointer(address: int, kind: type) -> Any:
+        """Pointer to numbers of ``kind`` at an address."""
 
+    def call(address: int, *arguments: int) -> int:
+        """Call the stage at an address."""
 
-@intrinsic
-def call(context: Any, address: Any, *arguments: Any) -> Any:
-    """Call the stage at an address."""
-    signature = types.int64(types.int64, types.StarArgTuple.from_types(arguments))
+    def scratch(rows: int) -> Array:
+        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
 
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        number = ir.IntType(64)
-        function = builder.inttoptr(given[0], ir.FunctionType(number, [number] * ARGUMENTS).as_pointer())
-        values = [builder.extract_value(given[1], k) for k in range(ARGUMENTS)]
-        return builder.call(function, values)
+else:
+    from numba import carray
 
-    return signature, generate
+    @intrinsic
+    def pointer(context, address, kind):
+        """Pointer to numbers of ``kind`` at an address."""
+        target = types.CPointer(kind.dtype)
 
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(target))
 
-@intrinsic(prefer_literal=True)
-def scratch(context: Any, rows: Any) -> Any:
-    """Pointer to a block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
-    size = rows.literal_value * BLOCK
+        return target(address, kind), generate
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return cgutils.alloca_once(builder, ir.DoubleType(), size=size)
+    @intrinsic
+    def call(context, address, *arguments):
+        """Call the stage at an address."""
+        signature = types.int64(types.int64, types.StarArgTuple.from_types(arguments))
 
-    return types.CPointer(types.float64)(rows), generate
+        def generate(context, builder, signature, given):
+            number = ir.IntType(64)
+            function = builder.inttoptr(given[0], ir.FunctionType(number, [number] * ARGUMENTS).as_pointer())
+            return builder.call(function, [builder.extract_value(given[1], k) for k in range(ARGUMENTS)])
+
+        return signature, generate
+
+    @intrinsic(prefer_literal=True)
+    def scratch(context, rows):
+        """A block of ``rows`` rows, a constant, on the stack of the stage that asks for it."""
+        array = types.Array(types.float64, 2, "C")
+
+        def generate(context, builder, signature, arguments):
+            shape = (rows.literal_value, BLOCK)
+            data = cgutils.alloca_once(builder, ir.DoubleType(), size=shape[0] * BLOCK)
+            number = partial(context.get_constant, types.intp)
+            made = make_array(array)(context, builder)
+            strides = [number(8 * BLOCK), number(8)]
+            populate_array(made, data, [number(size) for size in shape], strides, number(8), None)
+            return made._getvalue()
+
+        return array(rows), generate
 
 
 @helper

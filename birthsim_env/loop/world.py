@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray
 
 from birthsim_env.loop.rows import (
     FORCE,
@@ -20,7 +19,7 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.compilation import BLOCK, kernel
+from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 
@@ -29,8 +28,8 @@ from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Constants: control period, s; integration steps in it."""
     w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
-    dx, total = carray(scratch(STATES), (STATES, BLOCK)), carray(scratch(STATES), (STATES, BLOCK))
-    trial, x, u = carray(scratch(STATES), (STATES, BLOCK)), w[STATE : STATE + STATES], s[OPENING : OPENING + 4]
+    dx, total = scratch(STATES), scratch(STATES)
+    trial, x, u = scratch(STATES), w[STATE : STATE + STATES], s[OPENING : OPENING + 4]
     p, hit = w[:PARAMETERS], w[IMPACT : IMPACT + 2]
     steps = int(about[1])
     dynamics.integrate(x, u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, hit, dx, total, trial, n)

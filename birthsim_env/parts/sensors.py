@@ -10,7 +10,6 @@ import math
 from typing import Any, Protocol
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import (
@@ -30,7 +29,7 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
 from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import PRESSURES, Array
 from birthsim_env.physics.parameters import Electronics
 
@@ -130,7 +129,7 @@ def _lab_stage(world: int, seen: int, memory: int, constants: int, tables: int, 
     w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 5)
     keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
     queue, shown, velocity = table3(tables, 1)[:, :, mine], table2(tables, 2)[:, mine], table2(tables, 3)[:, mine]
-    pressures = carray(scratch(4), (4, BLOCK))
+    pressures = scratch(4)
     for chamber in range(4):
         for i in range(n):
             pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray
 
 from birthsim_env.loop.rows import FORCE, SEEN, TIME
-from birthsim_env.loop.stage import Stage, block, pointer, table1, table3
+from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
 from birthsim_env.parts.seeding import Range, draw
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import BLOCK, helper, kernel
