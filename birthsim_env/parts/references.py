@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
@@ -27,6 +27,7 @@ class Trajectory:
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
