@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from birthsim_env.parts.references import minimum_jerk
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.user_forces import AlternatingSteps, UserForce
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
@@ -58,10 +58,12 @@ class Sine(_Waves):
     def __init__(self, amplitude: Range = 20.0, frequency: Range = 1.0, angle: Range = 0.0) -> None:
         self.amplitude, self.frequency, self.angle = amplitude, frequency, angle
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         size, rate, angle = draw(self.amplitude, rng), 2 * math.pi * draw(self.frequency, rng), draw(self.angle, rng)
-        self._own[:, 0, 0, lane] = size * exact.cosine(angle), size * exact.sine(angle)
-        self._own[:, 0, 1, lane] = rate
+        x, y = exact.direction(angle)
+        put(self._own[:, 0, 0], lane, (size * x, size * y))
+        put(self._own[:, 0, 1], lane, (rate, rate))
 
 
 class Noise(_Waves):
@@ -74,10 +76,12 @@ class Noise(_Waves):
             raise ValueError(f"band = {band!r}; allowed: 0 < low < high (Hz)")
         self.rms, self.band = rms, band
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         low, high = self.band
         # One frequency in each of equal parts of the band: none is missing, and no two lanes repeat each other.
-        parts = low + (high - low) * (np.arange(self.waves) + rng.uniform(size=(2, self.waves))) / self.waves
+        wave = np.arange(self.waves).reshape(-1, *[1] * np.ndim(lane))
+        parts = low + (high - low) * (wave + rng.uniform(size=(2, self.waves))) / self.waves
         self._own[:, :, 0, lane] = draw(self.rms, rng) / math.sqrt(self.waves)
         self._own[:, :, 1, lane] = 2 * math.pi * parts
         self._own[:, :, 2, lane] = rng.uniform(0, 2 * math.pi, (2, self.waves))
@@ -157,12 +161,14 @@ class Guided(UserForce):
         self._points: Array = np.zeros((POINTS, 2, num_envs))
         self._state: Array = np.full((7, num_envs), np.inf)
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         mass, spring = draw(self.mass, rng), draw(self.stiffness, rng)
-        self._own[:, lane] = mass, spring, 2 * self.DAMPING * math.sqrt(mass * spring), draw(self.lasts, rng)
+        put(self._own, lane, (mass, spring, 2 * self.DAMPING * np.sqrt(mass * spring), draw(self.lasts, rng)))
         for point in self._points:
             size, angle = draw(self.reach, rng), rng.uniform(0, 2 * math.pi)
-            point[:, lane] = size * exact.cosine(angle), size * exact.sine(angle)
+            x, y = exact.direction(angle)
+            put(point, lane, (size * x, size * y))
         self._state[6, lane] = np.inf  # it takes hold of the end effector wherever that is
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:

@@ -6,7 +6,9 @@ start of every episode.
 
 from __future__ import annotations
 
+import copy
 import math
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,6 +40,18 @@ class Trajectory:
         )
 
 
+class _Planned(Trajectory):
+    """A trajectory that follows from a few numbers per lane, ``_own`` (rows, N)."""
+
+    _own: Array
+
+    def some(self, lanes: Any) -> Self:
+        """The same for lanes (L,) alone."""
+        few = copy.copy(self)
+        few._own = self._own.take(lanes, axis=1)
+        return few
+
+
 @kernel
 def _circle(time: Array, own: Array, rows: Array) -> None:
     """``own`` (4, N): centre x, y (m), radius (m), angular speed (rad/s)."""
@@ -50,7 +64,7 @@ def _circle(time: Array, own: Array, rows: Array) -> None:
         rows[6, i], rows[7, i] = w * w * w * sine, -w * w * w * cosine
 
 
-class Circle(Trajectory):
+class Circle(_Planned):
     """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
 
     def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
@@ -59,11 +73,13 @@ class Circle(Trajectory):
         self.centre, self.radius, self.period = centre, radius, period
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((4, num_envs))
+        self._own = np.zeros((4, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        self._own[:, lane] = (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng))
+        put(self._own, lane, (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng)))
 
+    @vectorised
     def sample(self, time: Array) -> Array:
         rows = np.empty((8, time.shape[0]))
         _circle(time, self._own, rows)
@@ -111,7 +127,7 @@ def _path(time: Array, own: Array, rows: Array) -> None:
         rows[6, i], rows[7, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
 
 
-class Path(Trajectory):
+class Path(_Planned):
     """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
 
     ``start`` (x, y) in m, ``heading`` in rad from x, ``length`` of the line and ``radius`` of the arc in m, ``angle`` of the
@@ -138,12 +154,14 @@ class Path(Trajectory):
         self.begins, self.ends = begins, ends
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((8, num_envs))
+        self._own = np.zeros((8, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         numbers = (*self.start, self.heading, self.length, self.radius, self.angle)
-        self._own[:, lane] = (*(draw(number, rng) for number in numbers), self.begins, self.ends)
+        put(self._own, lane, (*(draw(number, rng) for number in numbers), self.begins, self.ends))
 
+    @vectorised
     def sample(self, time: Array) -> Array:
         rows = np.empty((8, time.shape[0]))
         _path(time, self._own, rows)

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.parts.seeding import vectorised
 from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
@@ -30,6 +31,7 @@ class IdealSensors:
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         pass
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
@@ -115,6 +117,7 @@ class LabSensors:
         self._keys = np.zeros(num_envs, dtype=np.uint64)
         self._velocity: Array = np.zeros((2, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)

@@ -6,10 +6,12 @@ A user's own force derives from ``UserForce`` and implements ``force``. The buil
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, served, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
@@ -35,6 +37,7 @@ class UserForce:
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
@@ -75,16 +78,44 @@ def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> Non
             forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
 
 
-def _checked_knots(name: str, knots: list[tuple[float, float, float]]) -> Array:
-    """Knots as an array (M, 3), or a ``ValueError`` that names them."""
-    try:
-        array = np.array(knots, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    shaped = array.ndim == 2 and array.shape[1] == 3
-    if not shaped or not np.isfinite(array).all() or (np.diff(array[:, 0]) < 0).any():
+@kernel
+def _possible(columns: Array) -> bool:
+    """Whether the knots (M, 3, L) are finite, and later ones have later times."""
+    wrong = 0
+    for k in range(columns.shape[0]):
+        for i in range(columns.shape[2]):
+            size = abs(columns[k, 0, i]) + abs(columns[k, 1, i]) + abs(columns[k, 2, i])
+            late = columns[max(k - 1, 0), 0, i] <= columns[k, 0, i]
+            wrong += 0 if late and size < math.inf else 1
+    return wrong == 0
+
+
+@kernel
+def _write(columns: Array, lanes: NDArray[np.int64], knots: Array) -> None:
+    """Copies ``columns`` (M, 3, L) into the lanes (L,) of ``knots`` (M or more, 3, N)."""
+    for k in range(columns.shape[0]):
+        for row in range(3):
+            for i in range(lanes.shape[0]):
+                knots[k, row, lanes[i]] = columns[k, row, i]
+
+
+def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+    """Knots as an array (M, 3, L), or a ``ValueError`` that names them; their entries are numbers or (L,)."""
+    if isinstance(knots, np.ndarray) and knots.shape[1:] == (3, lanes):
+        columns = knots
+    else:
+        try:
+            columns = np.empty((len(knots), 3, lanes))
+            for rows, knot in zip(columns, knots, strict=True):
+                put(rows, slice(None), knot)
+        except (TypeError, ValueError):
+            columns = np.empty((0, 3, lanes))
+    if len(columns) == 0 or not _possible(columns):
+        if len(columns) > 0 and lanes > 1:
+            wrong = next(lane for lane in range(lanes) if not _possible(columns[:, :, [lane]].copy()))
+            knots = [tuple(knot) for knot in columns[:, :, wrong].tolist()]
         raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
-    return array
+    return columns
 
 
 class ForceProfile(UserForce):
@@ -94,6 +125,7 @@ class ForceProfile(UserForce):
         self._fixed = knots or [(0.0, 0.0, 0.0)]
         _checked_knots("knots", self._fixed)
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         """(time, Fx, Fy) of one episode, s and N, with increasing times."""
         return self._fixed
@@ -102,13 +134,15 @@ class ForceProfile(UserForce):
         self._knots: Array = np.zeros((1, 3, num_envs))
         self._counts = np.ones(num_envs)
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        knots = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(rng))
-        missing = len(knots) - len(self._knots)
-        if missing > 0:
-            self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
-        self._knots[: len(knots), :, lane] = knots
-        self._counts[lane] = len(knots)
+        for one, own in served(self.knots, lane, rng):
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), np.size(one))
+            missing = len(columns) - len(self._knots)
+            if missing > 0:
+                self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
+            _write(columns, np.atleast_1d(one), self._knots)
+            self._counts[one] = len(columns)
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
@@ -129,6 +163,7 @@ class AlternatingSteps(ForceProfile):
         super().__init__()
         self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
@@ -153,11 +188,11 @@ class Ramp(ForceProfile):
             raise ValueError(f"angle = {angle!r}; allowed: a number or (low, high) in rad, or 'axes'")
         self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         size = draw(self.amplitude, rng)
-        angle = rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng)
-        x, y = size * exact.cosine(angle), size * exact.sine(angle)
-        return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, x, y)]
+        x, y = exact.direction(rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng))
+        return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, size * x, size * y)]
 
 
 class Pulls(ForceProfile):
@@ -182,26 +217,35 @@ class Pulls(ForceProfile):
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         now = self.begins
         for sizes in self.sizes:
-            size, rate, angle = draw(sizes, rng), draw(self.rate, rng), draw(self.angle, rng)
-            x, y = size * exact.cosine(angle), size * exact.sine(angle)
-            top = now + size / rate
+            size, rate = draw(sizes, rng), draw(self.rate, rng)
+            along, across = exact.direction(draw(self.angle, rng))
+            x, y, top = size * along, size * across, now + size / rate
             knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
             now = top + self.hold + self.release + self.pause
         return knots
 
 
 @kernel
-def _contraction(time: Array, lasts: float, size: float, share: float, bumps: int, force: Array) -> None:
-    """Writes the force (M,), N, of one contraction at ``time`` (M,), s; it carries 1 - ``share``, so that the sum with its
-    ``bumps`` pushes peaks near ``size``."""
+def _contraction(
+    time: Array, begins: float, lasts: float, size: Array, share: Array, bumps: NDArray[np.int64], along: Array, knots: Array
+) -> None:
+    """Fills ``knots`` (M, 3, L) with one contraction of each lane at ``time`` (M,), s since it ``begins``.
+
+    It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,).
+    """
     for k in range(time.shape[0]):
         middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
-        contraction, push = exact.sine(math.pi * time[k] / lasts), exact.sine(math.pi * bumps * middle)
-        force[k] = size * ((1.0 - share) * contraction * contraction + share * push * push)
+        contraction = exact.sine(math.pi * time[k] / lasts)
+        for i in range(size.shape[0]):
+            push = exact.sine(math.pi * bumps[i] * middle)
+            force = size[i] * ((1.0 - share[i]) * contraction * contraction + share[i] * push * push)
+            knots[k, 0, i] = begins + time[k]
+            knots[k, 1, i], knots[k, 2, i] = force * along[0], force * along[1]
 
 
 class Contractions(ForceProfile):
@@ -226,16 +270,18 @@ class Contractions(ForceProfile):
         self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
         self.heading = heading
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         time = np.arange(0.0, self.lasts, self.GRID)
-        knots = []
-        for k in range(self.count):
+        drawn = []
+        for _ in range(self.count):
             size, share = draw(self.amplitude, rng), draw(self.push, rng)
-            bumps = int(rng.integers(self.pushes[0], self.pushes[1] + 1))
-            force = np.empty_like(time)
-            _contraction(time, self.lasts, size, share, bumps, force)
-            knots += [
-                (k * self.lasts + float(t), float(f) * exact.cosine(self.heading), float(f) * exact.sine(self.heading))
-                for t, f in zip(time, force, strict=True)
-            ]
-        return [*knots, (self.count * self.lasts, 0.0, 0.0)]
+            drawn.append((size, share, rng.integers(self.pushes[0], self.pushes[1] + 1)))
+        lanes = np.shape([bumps for _, _, bumps in drawn[:1]])[1:]
+        columns = np.zeros((self.count * len(time) + 1, 3, *(lanes or (1,))))
+        along = np.array(exact.direction(self.heading))
+        for k, numbers in enumerate(drawn):
+            piece = columns[k * len(time) : (k + 1) * len(time)]
+            _contraction(time, k * self.lasts, self.lasts, *(np.full(columns.shape[2], one) for one in numbers), along, piece)
+        columns[-1, 0] = self.count * self.lasts
+        return columns if lanes else [tuple(knot) for knot in columns[:, :, 0].tolist()]  # type: ignore[return-value]
