@@ -6,6 +6,7 @@ A lane's stream is PCG64 (O'Neill 2014: 128-bit congruential steps, "XSL RR" out
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
@@ -174,7 +175,7 @@ class Streams:
     def uniform(self, low: float = 0.0, high: float = 1.0, size: int | tuple[int, ...] = ()) -> Array:
         """Numbers in [low, high), (*size, L)."""
         shape = (size,) if isinstance(size, int) else size
-        drawn = np.empty((int(np.prod(shape)), len(self._seeds)))
+        drawn = np.empty((math.prod(shape), len(self._seeds)))
         _uniform(self._state, float(low), float(high) - float(low), drawn)
         return drawn.reshape(*shape, -1)
 

@@ -79,43 +79,44 @@ def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> Non
 
 
 @kernel
-def _possible(columns: Array) -> bool:
-    """Whether the knots (M, 3, L) are finite, and later ones have later times."""
+def _write(columns: Array, lanes: NDArray[np.int64], knots: Array) -> bool:
+    """Copies ``columns`` (M, 3, L) into the lanes (L,) of ``knots`` (M or more, 3, N).
+
+    Returns whether there are any, all are finite, and none comes before the one that stands before it.
+    """
     wrong = 0
     for k in range(columns.shape[0]):
-        for i in range(columns.shape[2]):
-            size = abs(columns[k, 0, i]) + abs(columns[k, 1, i]) + abs(columns[k, 2, i])
-            late = columns[max(k - 1, 0), 0, i] <= columns[k, 0, i]
-            wrong += 0 if late and size < math.inf else 1
-    return wrong == 0
+        for i in range(lanes.shape[0]):
+            time, x, y = columns[k, 0, i], columns[k, 1, i], columns[k, 2, i]
+            knots[k, 0, lanes[i]], knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = time, x, y
+            late = columns[max(k - 1, 0), 0, i] <= time
+            wrong += 0 if late and abs(time) < math.inf and abs(x) < math.inf and abs(y) < math.inf else 1
+    return columns.shape[0] > 0 and wrong == 0
 
 
-@kernel
-def _write(columns: Array, lanes: NDArray[np.int64], knots: Array) -> None:
-    """Copies ``columns`` (M, 3, L) into the lanes (L,) of ``knots`` (M or more, 3, N)."""
-    for k in range(columns.shape[0]):
-        for row in range(3):
-            for i in range(lanes.shape[0]):
-                knots[k, row, lanes[i]] = columns[k, row, i]
-
-
-def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
-    """Knots as an array (M, 3, L), or a ``ValueError`` that names them; their entries are numbers or (L,)."""
+def _columns(knots: Any, lanes: int) -> Array:
+    """Knots as an array (M, 3, L), from one or from triples whose entries are numbers or (L,); (0, 3, L) if they are neither."""
     if isinstance(knots, np.ndarray) and knots.shape[1:] == (3, lanes):
-        columns = knots
-    else:
-        try:
-            columns = np.empty((len(knots), 3, lanes))
-            for rows, knot in zip(columns, knots, strict=True):
-                put(rows, slice(None), knot)
-        except (TypeError, ValueError):
-            columns = np.empty((0, 3, lanes))
-    if len(columns) == 0 or not _possible(columns):
-        if len(columns) > 0 and lanes > 1:
-            wrong = next(lane for lane in range(lanes) if not _possible(columns[:, :, [lane]].copy()))
-            knots = [tuple(knot) for knot in columns[:, :, wrong].tolist()]
-        raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
+        return knots
+    try:
+        columns = np.empty((len(knots), 3, lanes))
+        for rows, knot in zip(columns, knots, strict=True):
+            put(rows, slice(None), knot)
+    except (TypeError, ValueError):
+        return np.empty((0, 3, lanes))
     return columns
+
+
+def _possible(columns: Array) -> bool:
+    return _write(columns, np.arange(columns.shape[2]), np.empty_like(columns))
+
+
+def _refusal(name: str, knots: Any, columns: Array) -> ValueError:
+    """The error that names impossible knots; of several lanes, those of the first whose ``columns`` (M, 3, L) are impossible."""
+    if columns.shape[2] > 1:
+        wrong = (lane for lane in range(columns.shape[2]) if not _possible(columns[:, :, [lane]].copy()))
+        knots = [tuple(knot) for knot in columns[:, :, next(wrong)].tolist()]
+    return ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
 
 
 class ForceProfile(UserForce):
@@ -123,7 +124,9 @@ class ForceProfile(UserForce):
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         self._fixed = knots or [(0.0, 0.0, 0.0)]
-        _checked_knots("knots", self._fixed)
+        columns = _columns(self._fixed, 1)
+        if not _possible(columns):
+            raise _refusal("knots", self._fixed, columns)
 
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
@@ -137,11 +140,13 @@ class ForceProfile(UserForce):
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         for one, own in served(self.knots, lane, rng):
-            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), np.size(one))
+            knots, lanes = self.knots(own), np.atleast_1d(one)
+            columns = _columns(knots, len(lanes))
             missing = len(columns) - len(self._knots)
             if missing > 0:
                 self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
-            _write(columns, np.atleast_1d(one), self._knots)
+            if not _write(columns, lanes, self._knots):
+                raise _refusal(f"{type(self).__name__}.knots(rng)", knots, columns)
             self._counts[one] = len(columns)
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
@@ -238,11 +243,15 @@ def _contraction(
 
     It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,).
     """
+    least = bumps.min()
+    pushes = np.empty(bumps.max() - least + 1)
     for k in range(time.shape[0]):
         middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
         contraction = exact.sine(math.pi * time[k] / lasts)
+        for more in range(pushes.shape[0]):
+            pushes[more] = exact.sine(math.pi * (least + more) * middle)
         for i in range(size.shape[0]):
-            push = exact.sine(math.pi * bumps[i] * middle)
+            push = pushes[bumps[i] - least]
             force = size[i] * ((1.0 - share[i]) * contraction * contraction + share[i] * push * push)
             knots[k, 0, i] = begins + time[k]
             knots[k, 1, i], knots[k, 2, i] = force * along[0], force * along[1]
@@ -278,10 +287,10 @@ class Contractions(ForceProfile):
             size, share = draw(self.amplitude, rng), draw(self.push, rng)
             drawn.append((size, share, rng.integers(self.pushes[0], self.pushes[1] + 1)))
         lanes = np.shape([bumps for _, _, bumps in drawn[:1]])[1:]
-        columns = np.zeros((self.count * len(time) + 1, 3, *(lanes or (1,))))
+        columns = np.empty((self.count * len(time) + 1, 3, *(lanes or (1,))))
         along = np.array(exact.direction(self.heading))
         for k, numbers in enumerate(drawn):
             piece = columns[k * len(time) : (k + 1) * len(time)]
             _contraction(time, k * self.lasts, self.lasts, *(np.full(columns.shape[2], one) for one in numbers), along, piece)
-        columns[-1, 0] = self.count * self.lasts
+        columns[-1, 0], columns[-1, 1:] = self.count * self.lasts, 0.0
         return columns if lanes else [tuple(knot) for knot in columns[:, :, 0].tolist()]  # type: ignore[return-value]
