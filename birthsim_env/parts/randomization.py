@@ -105,7 +105,7 @@ def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generato
 
 
 def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lanes: int) -> Array:
-    """``parameter_column`` of what ``draw_parameters`` gives each lane, (PARAMETERS, num_lanes); ``ranges`` are checked ones."""
+    """``parameter_column`` of what ``draw_parameters`` gives each lane, (PARAMETERS, num_lanes); ``ranges`` are checked."""
     drawn = _drawn(ranges, streams)
     rig = copy.copy(nominal)
     for name, values in drawn.items():

@@ -25,7 +25,7 @@ POOL = 4
 """32-bit words of entropy that a ``SeedSequence`` keeps."""
 
 HIGH, LOW, STEP_HIGH, STEP_LOW, SPARE = range(5)
-"""Rows of the state (5, N): the 128-bit number, the increment, and half a draw that waits (bit 32 says whether there is one)."""
+"""Rows of the state (5, N): the 128-bit number, the increment, and half a draw that waits, with bit 32 set."""
 
 
 def _powers(first: int, factor: int, count: int) -> Words:
@@ -77,14 +77,14 @@ def _advance(state: States, i: int) -> None:
 def _next64(state: States, i: int) -> np.uint64:
     _advance(state, i)
     word, turn = state[HIGH, i] ^ state[LOW, i], state[HIGH, i] >> np.uint64(58)
-    return (word >> turn) | (word << ((np.uint64(64) - turn) & np.uint64(63)))
+    return np.uint64((word >> turn) | (word << ((np.uint64(64) - turn) & np.uint64(63))))
 
 
 @helper
 def _next32(state: States, i: int) -> np.uint64:
     """The lower half of 64 bits, and the next time their upper half."""
     if state[SPARE, i] != np.uint64(0):
-        waiting = state[SPARE, i] & _HALF
+        waiting = np.uint64(state[SPARE, i] & _HALF)
         state[SPARE, i] = np.uint64(0)
         return waiting
     word = _next64(state, i)
@@ -185,7 +185,8 @@ class Streams:
         Raises ``ValueError`` for others.
         """
         first, beyond = (0, low) if high is None else (low, high)
-        count, drawn = int(beyond) - int(first), np.full(len(self._seeds), first, dtype=dtype)
+        count = int(beyond) - int(first)
+        drawn: NDArray[Any] = np.full(len(self._seeds), first, dtype=dtype)
         if first == 0 and count == 2**64 and drawn.dtype == np.uint64:
             _words64(self._state, drawn)
         elif not 0 < count < 2**32:

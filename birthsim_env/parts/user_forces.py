@@ -78,45 +78,24 @@ def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> Non
             forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
 
 
-@kernel
-def _write(columns: Array, lanes: NDArray[np.int64], knots: Array) -> bool:
-    """Copies ``columns`` (M, 3, L) into the lanes (L,) of ``knots`` (M or more, 3, N).
+def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+    """Knots as an array (M, 3, L), or a ``ValueError`` that names them, of the first lane that is wrong.
 
-    Returns whether there are any, all are finite, and none comes before the one that stands before it.
+    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,).
     """
-    wrong = 0
-    for k in range(columns.shape[0]):
-        for i in range(lanes.shape[0]):
-            time, x, y = columns[k, 0, i], columns[k, 1, i], columns[k, 2, i]
-            knots[k, 0, lanes[i]], knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = time, x, y
-            late = columns[max(k - 1, 0), 0, i] <= time
-            wrong += 0 if late and abs(time) < math.inf and abs(x) < math.inf and abs(y) < math.inf else 1
-    return columns.shape[0] > 0 and wrong == 0
-
-
-def _columns(knots: Any, lanes: int) -> Array:
-    """Knots as an array (M, 3, L), from one or from triples whose entries are numbers or (L,); (0, 3, L) if they are neither."""
-    if isinstance(knots, np.ndarray) and knots.shape[1:] == (3, lanes):
-        return knots
     try:
         columns = np.empty((len(knots), 3, lanes))
         for rows, knot in zip(columns, knots, strict=True):
             put(rows, slice(None), knot)
     except (TypeError, ValueError):
-        return np.empty((0, 3, lanes))
+        columns = np.empty((0, 3, lanes))
+    late = columns[1:, 0] < columns[:-1, 0]
+    if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
+        if lanes > 1:
+            wrong = late.any(axis=0) | ~np.isfinite(columns).all(axis=(0, 1))
+            knots = [tuple(knot) for knot in columns[:, :, int(wrong.argmax())].tolist()]
+        raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
     return columns
-
-
-def _possible(columns: Array) -> bool:
-    return _write(columns, np.arange(columns.shape[2]), np.empty_like(columns))
-
-
-def _refusal(name: str, knots: Any, columns: Array) -> ValueError:
-    """The error that names impossible knots; of several lanes, those of the first whose ``columns`` (M, 3, L) are impossible."""
-    if columns.shape[2] > 1:
-        wrong = (lane for lane in range(columns.shape[2]) if not _possible(columns[:, :, [lane]].copy()))
-        knots = [tuple(knot) for knot in columns[:, :, next(wrong)].tolist()]
-    return ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
 
 
 class ForceProfile(UserForce):
@@ -124,9 +103,7 @@ class ForceProfile(UserForce):
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
         self._fixed = knots or [(0.0, 0.0, 0.0)]
-        columns = _columns(self._fixed, 1)
-        if not _possible(columns):
-            raise _refusal("knots", self._fixed, columns)
+        _checked_knots("knots", self._fixed)
 
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
@@ -140,13 +117,13 @@ class ForceProfile(UserForce):
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         for one, own in served(self.knots, lane, rng):
-            knots, lanes = self.knots(own), np.atleast_1d(one)
-            columns = _columns(knots, len(lanes))
+            lanes = np.atleast_1d(one)
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes))
             missing = len(columns) - len(self._knots)
             if missing > 0:
                 self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
-            if not _write(columns, lanes, self._knots):
-                raise _refusal(f"{type(self).__name__}.knots(rng)", knots, columns)
+            for rows, values in zip(self._knots, columns, strict=False):
+                put(rows, lanes, values)
             self._counts[one] = len(columns)
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
@@ -237,11 +214,13 @@ class Pulls(ForceProfile):
 
 @kernel
 def _contraction(
-    time: Array, begins: float, lasts: float, size: Array, share: Array, bumps: NDArray[np.int64], along: Array, knots: Array
-) -> None:
-    """Fills ``knots`` (M, 3, L) with one contraction of each lane at ``time`` (M,), s since it ``begins``.
+    time: Array, lasts: float, size: Array, share: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
+    knots: Array,
+) -> None:  # fmt: skip
+    """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
 
-    It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,).
+    It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
+    a unit vector.
     """
     least = bumps.min()
     pushes = np.empty(bumps.max() - least + 1)
@@ -250,11 +229,10 @@ def _contraction(
         contraction = exact.sine(math.pi * time[k] / lasts)
         for more in range(pushes.shape[0]):
             pushes[more] = exact.sine(math.pi * (least + more) * middle)
-        for i in range(size.shape[0]):
+        for i in range(lanes.shape[0]):
             push = pushes[bumps[i] - least]
             force = size[i] * ((1.0 - share[i]) * contraction * contraction + share[i] * push * push)
-            knots[k, 0, i] = begins + time[k]
-            knots[k, 1, i], knots[k, 2, i] = force * along[0], force * along[1]
+            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
 
 
 class Contractions(ForceProfile):
@@ -278,19 +256,43 @@ class Contractions(ForceProfile):
         super().__init__()
         self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
         self.heading = heading
+        for name, value in (("amplitude", amplitude), ("push", push), ("heading", heading)):
+            if not isinstance(value, tuple) and not math.isfinite(value):
+                raise ValueError(f"{name} = {value!r}; allowed: a finite number, or (low, high) where it is drawn")
+
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        table = self._table(1)
+        self._contract(table, np.zeros(1, dtype=np.int64), rng)
+        return [tuple(knot) for knot in table[:, :, 0].tolist()]
+
+    def prepare(self, num_envs: int) -> None:
+        self._knots = self._table(num_envs)
+        self._counts = np.full(num_envs, float(len(self._knots)))
 
     @vectorised
-    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        time = np.arange(0.0, self.lasts, self.GRID)
-        drawn = []
-        for _ in range(self.count):
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        if type(self).knots is Contractions.knots:
+            self._contract(self._knots, np.atleast_1d(lane), rng)
+        else:
+            super().begin(lane, rng)
+
+    @property
+    def _time(self) -> Array:
+        """Since a contraction began, s, (M,)."""
+        return np.arange(0.0, self.lasts, self.GRID)
+
+    def _table(self, lanes: int) -> Array:
+        """Knots (M, 3, N) without forces; their times are the same in all lanes and episodes."""
+        times = [begins + self._time for begins in self.lasts * np.arange(self.count)]
+        table = np.zeros((self.count * len(self._time) + 1, 3, lanes))
+        table[:, 0] = np.concatenate([*times, [self.count * self.lasts]])[:, None]
+        return table
+
+    def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
+        """Draw the forces of the lanes (L,) of a table of knots."""
+        time, along = self._time, np.array(exact.direction(self.heading))
+        for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
             size, share = draw(self.amplitude, rng), draw(self.push, rng)
-            drawn.append((size, share, rng.integers(self.pushes[0], self.pushes[1] + 1)))
-        lanes = np.shape([bumps for _, _, bumps in drawn[:1]])[1:]
-        columns = np.empty((self.count * len(time) + 1, 3, *(lanes or (1,))))
-        along = np.array(exact.direction(self.heading))
-        for k, numbers in enumerate(drawn):
-            piece = columns[k * len(time) : (k + 1) * len(time)]
-            _contraction(time, k * self.lasts, self.lasts, *(np.full(columns.shape[2], one) for one in numbers), along, piece)
-        columns[-1, 0], columns[-1, 1:] = self.count * self.lasts, 0.0
-        return columns if lanes else [tuple(knot) for knot in columns[:, :, 0].tolist()]  # type: ignore[return-value]
+            bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
+            drawn = (np.full(len(lanes), number) for number in (size, share, bumps))
+            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]

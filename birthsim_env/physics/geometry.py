@@ -157,7 +157,7 @@ def well_inside(x: float, y: float, p: Array) -> bool:
     sine, cosine = x / r2, -y / r2
     r4 = length_r4(sine, cosine, p[D_SQUARES], p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
     spare = min(p[HALF_L1] - abs(r4 - p[K1]), p[HALF_L2] - abs(r2 - p[K2]))
-    return min(spare, p[COS_GAMMA3] * cosine + p[SIN_GAMMA3] * sine) > MARGIN
+    return bool(min(spare, p[COS_GAMMA3] * cosine + p[SIN_GAMMA3] * sine) > MARGIN)
 
 
 def jacobian(piston: ArrayLike, parameters: Parameters) -> Array:
