@@ -114,7 +114,7 @@ class Simulation:
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))
         pistons_at(np.concatenate([start, speed]), self.nominal, joints)
-        own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
+        own = self.plant.lane_parameters.take(chosen, axis=1)
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
         self._look()
 
