@@ -82,9 +82,11 @@ class Noise(_Waves):
         # One frequency in each of equal parts of the band: none is missing, and no two lanes repeat each other.
         wave = np.arange(self.waves).reshape(-1, *[1] * np.ndim(lane))
         parts = low + (high - low) * (wave + rng.uniform(size=(2, self.waves))) / self.waves
-        self._own[:, :, 0, lane] = draw(self.rms, rng) / math.sqrt(self.waves)
-        self._own[:, :, 1, lane] = 2 * math.pi * parts
-        self._own[:, :, 2, lane] = rng.uniform(0, 2 * math.pi, (2, self.waves))
+        size, phases = draw(self.rms, rng) / math.sqrt(self.waves), rng.uniform(0, 2 * math.pi, (2, self.waves))
+        for axis, own in enumerate(self._own):
+            put(own[:, 0], lane, [size] * self.waves)
+            put(own[:, 1], lane, 2 * math.pi * parts[axis])
+            put(own[:, 2], lane, phases[axis])
 
 
 CALM = 1.0

@@ -134,8 +134,8 @@ def _joined(words: Words, k: int, i: int) -> np.uint64:
 @kernel
 def _uniform(state: States, low: float, span: float, drawn: Array) -> None:
     """``drawn`` (M, N): M numbers of every lane, with 53 random bits each."""
-    for i in range(drawn.shape[1]):
-        for k in range(drawn.shape[0]):
+    for k in range(drawn.shape[0]):
+        for i in range(drawn.shape[1]):
             drawn[k, i] = low + span * ((_next64(state, i) >> np.uint64(11)) * (1.0 / 9007199254740992.0))
 
 
