@@ -33,25 +33,23 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
-from birthsim_env.parts.randomization import Ranges, draw_parameters
+from birthsim_env.parts.courses import checked_start
+from birthsim_env.parts.randomization import Ranges, draw_columns
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.seeding import STREAMS, stream
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.user_forces import UserForce, forces_of
+from birthsim_env.parts.worlds import begin, worlds
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.plant import Plant, checked
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.strength import require_carried
 
 Part = Stage | Callable[[int], None]
-
-CHECKS = 64
-"""Instants of a new episode at which its reference is checked against the workspace."""
 
 
 class Simulation:
@@ -155,20 +153,20 @@ class Simulation:
         leaves the workspace within ``duration`` s, a position outside it, and at first for a rig that cannot carry its weight.
         """
         chosen = np.flatnonzero(lanes)
-        for lane in chosen.tolist():
-            world = {name: stream(seeds[lane], int(episodes[lane]), name) for name in STREAMS}
+        for block, streams in worlds(chosen, seeds, episodes):
             if self._ranges:
-                drawn = draw_parameters(self.parameters, self._ranges, world["parameters"])
-                self.plant.lane_parameters[:, lane] = parameter_column(drawn)
-            self.trajectory.begin(lane, world["reference"])
-            self.user_force.begin(lane, world["user_force"])
-            self.stiffness.begin(lane, world["stiffness"])
-            self.sensors.begin(lane, world["sensors"])
+                columns = draw_columns(self.parameters, self._ranges, streams["parameters"], len(block))
+                self.plant.lane_parameters[:, block] = columns
+            begin(self.trajectory, block, streams["reference"])
+            begin(self.user_force, block, streams["user_force"])
+            begin(self.stiffness, block, streams["stiffness"])
+            begin(self.sensors, block, streams["sensors"])
         self.actuation.begin(lanes)
         self._tick[:, lanes], self._seen[TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
         self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
-        self._check_reference(chosen, duration)
-        rows = self.reference_at(np.zeros(len(lanes))).rows[:, chosen]
+        rows = checked_start(
+            self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters, self.nominal
+        )  # fmt: skip
         start, speed = rows[0:2], rows[2:4]
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))
@@ -179,7 +177,7 @@ class Simulation:
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))
         pistons_at(np.concatenate([start, speed]), self.nominal, joints)
-        own = np.ascontiguousarray(self.plant.lane_parameters[:, chosen])
+        own = self.plant.lane_parameters.take(chosen, axis=1)
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
         end_effector_motion(self.plant.state, self.plant.lane_parameters, self._motion)
         self._assemble()
@@ -264,37 +262,3 @@ class Simulation:
         rows[:8] = self.trajectory.sample(time)
         rows[8:] = self.stiffness.sample(time)
         return Reference(rows)
-
-    def _check_reference(self, chosen: NDArray[np.intp], duration: float) -> None:
-        lanes = self.ticks.shape[0]
-        instants = np.linspace(0.0, duration, CHECKS)
-        points, asked = np.empty((2, CHECKS, len(chosen))), np.empty((7, CHECKS, len(chosen)))
-        for k, instant in enumerate(instants):
-            time = np.full(lanes, instant)
-            points[:, k] = checked("reference.sample(time)", self.trajectory.sample(time), (8, lanes), "SI")[:2, chosen]
-            asked[:, k] = checked("stiffness.sample(time)", self.stiffness.sample(time), (7, lanes), "SI")[:, chosen]
-
-        def first(wrong: Any) -> tuple[int, float]:
-            k = int(wrong.any(axis=1).argmax())
-            return k, float(instants[k])
-
-        soft = (asked[:4] <= 0).any(axis=0)
-        if soft.any():
-            k, instant = first(soft)
-            raise ValueError(f"stiffness.sample(time = {instant:g} s) = {asked[:4, k].min():g} N/m; allowed: more than 0")
-        kx, ky, kxy = asked[0], asked[1], asked[6]
-        coupled = kxy**2 >= kx * ky
-        if coupled.any():
-            k, instant = first(coupled)
-            raise ValueError(
-                f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy[k]).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
-            )
-        # Of all instants at once, and only where that fails of each, to name it.
-        try:
-            inverse_geometry(points, self.parameters)
-        except ValueError:
-            for k, instant in enumerate(instants):
-                try:
-                    inverse_geometry(points[:, k], self.parameters)
-                except ValueError as error:
-                    raise ValueError(f"reference at {instant:.3g} s: {error}") from error

@@ -13,7 +13,7 @@ import numpy as np
 from birthsim_env.loop.rows import MOTION, SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Stage, block, numbers, table2, table3, table4
 from birthsim_env.parts.references import minimum_jerk
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.user_forces import AlternatingSteps, UserForce, force_block
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
@@ -71,10 +71,12 @@ class Sine(_Waves):
     def __init__(self, amplitude: Range = 20.0, frequency: Range = 1.0, angle: Range = 0.0) -> None:
         self.amplitude, self.frequency, self.angle = amplitude, frequency, angle
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         size, rate, angle = draw(self.amplitude, rng), 2 * math.pi * draw(self.frequency, rng), draw(self.angle, rng)
-        self._own[:, 0, 0, lane] = size * exact.cosine(angle), size * exact.sine(angle)
-        self._own[:, 0, 1, lane] = rate
+        x, y = exact.direction(angle)
+        put(self._own[:, 0, 0], lane, (size * x, size * y))
+        put(self._own[:, 0, 1], lane, (rate, rate))
 
 
 class Noise(_Waves):
@@ -87,13 +89,17 @@ class Noise(_Waves):
             raise ValueError(f"band = {band!r}; allowed: 0 < low < high (Hz)")
         self.rms, self.band = rms, band
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         low, high = self.band
         # One frequency in each of equal parts of the band: none is missing, and no two lanes repeat each other.
-        parts = low + (high - low) * (np.arange(self.waves) + rng.uniform(size=(2, self.waves))) / self.waves
-        self._own[:, :, 0, lane] = draw(self.rms, rng) / math.sqrt(self.waves)
-        self._own[:, :, 1, lane] = 2 * math.pi * parts
-        self._own[:, :, 2, lane] = rng.uniform(0, 2 * math.pi, (2, self.waves))
+        wave = np.arange(self.waves).reshape(-1, *[1] * np.ndim(lane))
+        parts = low + (high - low) * (wave + rng.uniform(size=(2, self.waves))) / self.waves
+        size, phases = draw(self.rms, rng) / math.sqrt(self.waves), rng.uniform(0, 2 * math.pi, (2, self.waves))
+        for axis, own in enumerate(self._own):
+            put(own[:, 0], lane, [size] * self.waves)
+            put(own[:, 1], lane, 2 * math.pi * parts[axis])
+            put(own[:, 2], lane, phases[axis])
 
 
 CALM = 1.0
@@ -180,12 +186,14 @@ class Guided(UserForce):
         self._points: Array = np.zeros((POINTS, 2, num_envs))
         self._state: Array = np.full((7, num_envs), np.inf)
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         mass, spring = draw(self.mass, rng), draw(self.stiffness, rng)
-        self._own[:, lane] = mass, spring, 2 * self.DAMPING * math.sqrt(mass * spring), draw(self.lasts, rng)
+        put(self._own, lane, (mass, spring, 2 * self.DAMPING * np.sqrt(mass * spring), draw(self.lasts, rng)))
         for point in self._points:
             size, angle = draw(self.reach, rng), rng.uniform(0, 2 * math.pi)
-            point[:, lane] = size * exact.cosine(angle), size * exact.sine(angle)
+            x, y = exact.direction(angle)
+            put(point, lane, (size * x, size * y))
         self._state[6, lane] = np.inf  # it takes hold of the end effector wherever that is
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 from collections.abc import Mapping
@@ -9,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.parts.streams import Streams
+from birthsim_env.physics.lanes import Array, parameter_columns
 from birthsim_env.physics.parameters import Parameters, field_of, least_dead_volume
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -17,6 +20,12 @@ SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "me
 """Sections and fields in which lanes cannot differ: workspace, clock, sensors and the limit of an episode are those of the
 nominal rig."""
 
+
+WORST_AT_LEAST = ("mechanics.mass", "friction.sign_speed", "chambers.dead_volume", "air.supply_pressure")
+"""Fields whose least values are the hardest on a rig; of all others, the largest are."""
+
+BORES = ("cylinder1.piston_diameter", "cylinder2.piston_diameter")
+"""Wide ones ask for dead volume, narrow ones for thin rods."""
 
 KNOWN = 0.2
 """Share of a figure by which it may be off where a rig's owner has described it; assumed."""
@@ -79,15 +88,38 @@ def checked_ranges(ranges: Ranges, nominal: Parameters) -> dict[str, tuple[float
         checked[name] = (low, high)
         nominal.replace({name: low})
         nominal.replace({name: high})
-    # The lightest mass with the most friction is what the integration bears worst.
-    worst = {name: bounds[0] if name == "mechanics.mass" else bounds[1] for name, bounds in checked.items()}
-    try:
-        nominal.replace(worst)
-    except ValueError as error:
-        raise ValueError(f"randomize: some of the rigs drawn are impossible: {error}") from None
+    # Whatever is checked of several fields together grows or falls with each: two rigs are the worst of all that can be drawn.
+    for thinnest in (False, True):
+        least = (*WORST_AT_LEAST, *BORES) if thinnest else WORST_AT_LEAST
+        worst = {name: low if name in least else high for name, (low, high) in checked.items()}
+        try:
+            nominal.replace(worst)
+        except ValueError as error:
+            raise ValueError(f"randomize: some of the rigs drawn are impossible: {error}") from None
     return checked
 
 
 def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generator) -> Parameters:
     """``nominal`` with every field in ``ranges`` drawn uniformly, independently, in the order of the names."""
-    return nominal.replace({name: float(rng.uniform(*ranges[name])) for name in sorted(ranges)})
+    return nominal.replace(_drawn(ranges, rng))
+
+
+def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lanes: int) -> Array:
+    """``parameter_column`` of what ``draw_parameters`` gives each lane, (PARAMETERS, num_lanes); ``ranges`` are checked."""
+    drawn = _drawn(ranges, streams)
+    rig = copy.copy(nominal)
+    for name, values in drawn.items():
+        section, _, own = name.partition(".")
+        if getattr(rig, section) is getattr(nominal, section):
+            object.__setattr__(rig, section, copy.copy(getattr(rig, section)))
+        # Past the checks of one rig: ``checked_ranges`` has refused what they could refuse.
+        object.__setattr__(getattr(rig, section), own, values)
+    if "chambers.dead_volume" not in drawn:
+        bore, before = (np.maximum(one.cylinder1.area_p, one.cylinder2.area_p) for one in (rig, nominal))
+        object.__setattr__(rig, "chambers", copy.copy(rig.chambers))
+        object.__setattr__(rig.chambers, "dead_volume", bore / before * nominal.chambers.dead_volume)
+    return parameter_columns(rig, num_lanes)
+
+
+def _drawn(ranges: Ranges, rng: Any) -> dict[str, Any]:
+    return {name: rng.uniform(*ranges[name]) for name in sorted(ranges)}

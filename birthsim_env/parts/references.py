@@ -6,13 +6,15 @@ start of every episode.
 
 from __future__ import annotations
 
+import copy
 import math
+from typing import Any, Self
 
 import numpy as np
 
 from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, table2
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
@@ -29,6 +31,7 @@ class Trajectory:
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
@@ -37,6 +40,18 @@ class Trajectory:
         raise NotImplementedError(
             f"{type(self).__name__}.sample(time) is missing; it returns x, y and three derivatives, (8, N)"
         )
+
+
+class _Planned(Trajectory):
+    """A trajectory that follows from a few numbers per lane, ``_own`` (rows, N)."""
+
+    _own: Array
+
+    def some(self, lanes: Any) -> Self:
+        """The same for lanes (L,) alone."""
+        few = copy.copy(self)
+        few._own = self._own.take(lanes, axis=1)
+        return few
 
 
 @kernel
@@ -58,7 +73,7 @@ def _circle_stage(world: int, seen: int, memory: int, constants: int, tables: in
     return 0
 
 
-class Circle(Trajectory):
+class Circle(_Planned):
     """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
 
     def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
@@ -67,11 +82,13 @@ class Circle(Trajectory):
         self.centre, self.radius, self.period = centre, radius, period
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((4, num_envs))
+        self._own = np.zeros((4, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        self._own[:, lane] = (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng))
+        put(self._own, lane, (*self.centre, draw(self.radius, rng), 2 * math.pi / draw(self.period, rng)))
 
+    @vectorised
     def sample(self, time: Array) -> Array:
         rows = np.empty((8, time.shape[0]))
         _circle(time, self._own, rows)
@@ -130,7 +147,7 @@ def _path_stage(world: int, seen: int, memory: int, constants: int, tables: int,
     return 0
 
 
-class Path(Trajectory):
+class Path(_Planned):
     """A straight line, then an arc, at minimum jerk along the whole; at rest before ``begins`` and after ``ends``.
 
     ``start`` (x, y) in m, ``heading`` in rad from x, ``length`` of the line and ``radius`` of the arc in m, ``angle`` of the
@@ -157,12 +174,14 @@ class Path(Trajectory):
         self.begins, self.ends = begins, ends
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((8, num_envs))
+        self._own = np.zeros((8, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         numbers = (*self.start, self.heading, self.length, self.radius, self.angle)
-        self._own[:, lane] = (*(draw(number, rng) for number in numbers), self.begins, self.ends)
+        put(self._own, lane, (*(draw(number, rng) for number in numbers), self.begins, self.ends))
 
+    @vectorised
     def sample(self, time: Array) -> Array:
         rows = np.empty((8, time.shape[0]))
         _path(time, self._own, rows)

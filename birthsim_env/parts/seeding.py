@@ -6,9 +6,12 @@ Episode ``e`` of a lane seeded ``s`` depends on s and e alone, never on what hap
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 STREAMS = ("parameters", "reference", "user_force", "stiffness", "sensors")
 
@@ -46,5 +49,35 @@ def draw(value: Range, rng: np.random.Generator) -> float:
             low, high = math.nan, math.nan
         if not -math.inf < low <= high < math.inf:
             raise ValueError(f"range {value!r}; allowed: a number or (low, high), finite and ordered")
-        return float(rng.uniform(low, high))
+        return rng.uniform(low, high)
     return float(value)
+
+
+def vectorised(method: F) -> F:
+    """Marks a method ``begin(lane, rng)``, ``knots(rng)`` or ``sample(time)`` of a part that serves many lanes in one call.
+
+    It is typed as for one lane. ``begin`` and ``knots`` then also get lanes (L,) and their ``Streams``, so that what they draw
+    is (L,). A part whose ``sample`` is marked has ``some(lanes)``. A user's own method is not marked, also where it takes the
+    place of a marked one: it is called lane by lane, with NumPy's generator.
+    """
+    method.vectorised = True  # type: ignore[attr-defined]
+    return method
+
+
+def is_vectorised(method: Callable[..., Any]) -> bool:
+    """Whether ``method`` of a part is marked by ``vectorised``."""
+    return getattr(method, "vectorised", False)
+
+
+def served(method: Callable[..., Any], lane: Any, rng: Any) -> Iterator[tuple[Any, Any]]:
+    """The lanes and streams with which ``method`` is to be called: one lane as it is, several at once or one by one."""
+    if np.ndim(lane) == 0 or is_vectorised(method):
+        yield lane, rng
+    else:
+        yield from zip(lane.tolist(), rng.generators(), strict=True)
+
+
+def put(rows: Iterable[Any], lane: Any, values: Iterable[Any]) -> None:
+    """Writes a number, or one per lane, into each of ``rows`` (R, N): into one lane or lanes (L,)."""
+    for row, value in zip(rows, values, strict=True):
+        row[lane] = value

@@ -27,6 +27,7 @@ from birthsim_env.loop.rows import (
     WORLD,
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
+from birthsim_env.parts.seeding import vectorised
 from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
@@ -58,6 +59,7 @@ class IdealSensors:
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         pass
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
@@ -168,6 +170,7 @@ class LabSensors:
         self._keys = np.zeros(num_envs, dtype=np.uint64)
         self._velocity: Array = np.zeros((2, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)

@@ -3,15 +3,17 @@ stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, Self
 
 import numpy as np
 
 from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, numbers, table3
 from birthsim_env.parts.references import minimum_jerk
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
 
@@ -61,6 +63,7 @@ class StiffnessSchedule:
         self._starts: Array = np.array(self.times, dtype=np.float64)
         self._values: Array = np.zeros((len(self.times), 5, num_envs))
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
         for phase in range(len(self.times)):
@@ -68,8 +71,15 @@ class StiffnessSchedule:
             y = x if self.closed_loop_y is None else draw(self.closed_loop_y[phase], rng)
             pneumatic = draw(self.pneumatic1[phase], rng), draw(self.pneumatic2[phase], rng)
             across = 0.0 if self.closed_loop_xy is None else draw(self.closed_loop_xy[phase], rng)
-            self._values[phase, :, lane] = (x, y, *pneumatic, across)
+            put(self._values[phase], lane, (x, y, *pneumatic, across))
 
+    def some(self, lanes: Any) -> Self:
+        """The same for lanes (L,) alone."""
+        few = copy.copy(self)
+        few._values = self._values.take(lanes, axis=2)
+        return few
+
+    @vectorised
     def sample(self, time: Array) -> Array:
         """Setpoints (7, N) at ``time`` (N,), s."""
         rows = np.empty((7, time.shape[0]))

@@ -6,12 +6,14 @@ A user's own force derives from ``UserForce`` and implements ``force``. The buil
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import FORCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
-from birthsim_env.parts.seeding import Range, draw
+from birthsim_env.parts.seeding import Range, draw, put, served, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.lanes import Array
@@ -37,6 +39,7 @@ class UserForce:
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
         """Start a new episode in one lane."""
 
@@ -91,16 +94,24 @@ def _knots_stage(world: int, seen: int, memory: int, constants: int, tables: int
     return 0
 
 
-def _checked_knots(name: str, knots: list[tuple[float, float, float]]) -> Array:
-    """Knots as an array (M, 3), or a ``ValueError`` that names them."""
+def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+    """Knots as an array (M, 3, L), or a ``ValueError`` that names them, of the first lane that is wrong.
+
+    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,).
+    """
     try:
-        array = np.array(knots, dtype=np.float64)
+        columns = np.empty((len(knots), 3, lanes))
+        for rows, knot in zip(columns, knots, strict=True):
+            put(rows, slice(None), knot)
     except (TypeError, ValueError):
-        array = np.empty(0)
-    shaped = array.ndim == 2 and array.shape[1] == 3
-    if not shaped or not np.isfinite(array).all() or (np.diff(array[:, 0]) < 0).any():
+        columns = np.empty((0, 3, lanes))
+    late = columns[1:, 0] < columns[:-1, 0]
+    if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
+        if lanes > 1:
+            wrong = late.any(axis=0) | ~np.isfinite(columns).all(axis=(0, 1))
+            knots = [tuple(knot) for knot in columns[:, :, int(wrong.argmax())].tolist()]
         raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
-    return array
+    return columns
 
 
 class ForceProfile(UserForce):
@@ -110,6 +121,7 @@ class ForceProfile(UserForce):
         self._fixed = knots or [(0.0, 0.0, 0.0)]
         _checked_knots("knots", self._fixed)
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         """(time, Fx, Fy) of one episode, s and N, with increasing times."""
         return self._fixed
@@ -118,13 +130,17 @@ class ForceProfile(UserForce):
         self._knots: Array = np.zeros((1, 3, num_envs))
         self._counts = np.ones(num_envs)
 
+    @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
-        knots = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(rng))
-        missing = len(knots) - len(self._knots)
-        if missing > 0:
-            self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
-        self._knots[: len(knots), :, lane] = knots
-        self._counts[lane] = len(knots)
+        for one, own in served(self.knots, lane, rng):
+            lanes = np.atleast_1d(one)
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes))
+            missing = len(columns) - len(self._knots)
+            if missing > 0:
+                self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
+            for rows, values in zip(self._knots, columns, strict=False):
+                put(rows, lanes, values)
+            self._counts[one] = len(columns)
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
@@ -149,6 +165,7 @@ class AlternatingSteps(ForceProfile):
         super().__init__()
         self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
@@ -173,11 +190,11 @@ class Ramp(ForceProfile):
             raise ValueError(f"angle = {angle!r}; allowed: a number or (low, high) in rad, or 'axes'")
         self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         size = draw(self.amplitude, rng)
-        angle = rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng)
-        x, y = size * exact.cosine(angle), size * exact.sine(angle)
-        return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, x, y)]
+        x, y = exact.direction(rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng))
+        return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, size * x, size * y)]
 
 
 class Pulls(ForceProfile):
@@ -202,26 +219,40 @@ class Pulls(ForceProfile):
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 
+    @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         now = self.begins
         for sizes in self.sizes:
-            size, rate, angle = draw(sizes, rng), draw(self.rate, rng), draw(self.angle, rng)
-            x, y = size * exact.cosine(angle), size * exact.sine(angle)
-            top = now + size / rate
+            size, rate = draw(sizes, rng), draw(self.rate, rng)
+            along, across = exact.direction(draw(self.angle, rng))
+            x, y, top = size * along, size * across, now + size / rate
             knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
             now = top + self.hold + self.release + self.pause
         return knots
 
 
 @kernel
-def _contraction(time: Array, lasts: float, size: float, share: float, bumps: int, force: Array) -> None:
-    """Writes the force (M,), N, of one contraction at ``time`` (M,), s; it carries 1 - ``share``, so that the sum with its
-    ``bumps`` pushes peaks near ``size``."""
+def _contraction(
+    time: Array, lasts: float, size: Array, share: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
+    knots: Array,
+) -> None:  # fmt: skip
+    """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
+
+    It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
+    a unit vector.
+    """
+    least = bumps.min()
+    pushes = np.empty(bumps.max() - least + 1)
     for k in range(time.shape[0]):
         middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
-        contraction, push = exact.sine(math.pi * time[k] / lasts), exact.sine(math.pi * bumps * middle)
-        force[k] = size * ((1.0 - share) * contraction * contraction + share * push * push)
+        contraction = exact.sine(math.pi * time[k] / lasts)
+        for more in range(pushes.shape[0]):
+            pushes[more] = exact.sine(math.pi * (least + more) * middle)
+        for i in range(lanes.shape[0]):
+            push = pushes[bumps[i] - least]
+            force = size[i] * ((1.0 - share[i]) * contraction * contraction + share[i] * push * push)
+            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
 
 
 class Contractions(ForceProfile):
@@ -245,17 +276,43 @@ class Contractions(ForceProfile):
         super().__init__()
         self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
         self.heading = heading
+        for name, value in (("amplitude", amplitude), ("push", push), ("heading", heading)):
+            if not isinstance(value, tuple) and not math.isfinite(value):
+                raise ValueError(f"{name} = {value!r}; allowed: a finite number, or (low, high) where it is drawn")
 
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        time = np.arange(0.0, self.lasts, self.GRID)
-        knots = []
-        for k in range(self.count):
+        table = self._table(1)
+        self._contract(table, np.zeros(1, dtype=np.int64), rng)
+        return [tuple(knot) for knot in table[:, :, 0].tolist()]
+
+    def prepare(self, num_envs: int) -> None:
+        self._knots = self._table(num_envs)
+        self._counts = np.full(num_envs, float(len(self._knots)))
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        if type(self).knots is Contractions.knots:
+            self._contract(self._knots, np.atleast_1d(lane), rng)
+        else:
+            super().begin(lane, rng)
+
+    @property
+    def _time(self) -> Array:
+        """Since a contraction began, s, (M,)."""
+        return np.arange(0.0, self.lasts, self.GRID)
+
+    def _table(self, lanes: int) -> Array:
+        """Knots (M, 3, N) without forces; their times are the same in all lanes and episodes."""
+        times = [begins + self._time for begins in self.lasts * np.arange(self.count)]
+        table = np.zeros((self.count * len(self._time) + 1, 3, lanes))
+        table[:, 0] = np.concatenate([*times, [self.count * self.lasts]])[:, None]
+        return table
+
+    def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
+        """Draw the forces of the lanes (L,) of a table of knots."""
+        time, along = self._time, np.array(exact.direction(self.heading))
+        for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
             size, share = draw(self.amplitude, rng), draw(self.push, rng)
-            bumps = int(rng.integers(self.pushes[0], self.pushes[1] + 1))
-            force = np.empty_like(time)
-            _contraction(time, self.lasts, size, share, bumps, force)
-            knots += [
-                (k * self.lasts + float(t), float(f) * exact.cosine(self.heading), float(f) * exact.sine(self.heading))
-                for t, f in zip(time, force, strict=True)
-            ]
-        return [*knots, (self.count * self.lasts, 0.0, 0.0)]
+            bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
+            drawn = (np.full(len(lanes), number) for number in (size, share, bumps))
+            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]

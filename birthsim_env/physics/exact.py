@@ -9,10 +9,12 @@ said (`tests/test_exact.py`). Sources: argument reduction of Cody and Waite (198
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compilation import helper, kernel
 
 PI = 3.141592653589793
 LOG2_E = 1.4426950408889634
@@ -58,6 +60,21 @@ def sine(x: float) -> float:
 def cosine(x: float) -> float:
     """cos(x), x in rad; beyond 1e6 the error grows."""
     return _turn(x, 1.0)
+
+
+def direction(angle: Any) -> tuple[Any, Any]:
+    """cos and sin of an angle, rad, a number or an array (L,)."""
+    if np.ndim(angle) == 0:
+        return cosine(float(angle)), sine(float(angle))
+    rows = np.empty((2, len(angle)))
+    _directions(angle, rows)
+    return rows[0], rows[1]
+
+
+@kernel
+def _directions(angle: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+    for i in range(angle.shape[0]):
+        rows[0, i], rows[1, i] = cosine(angle[i]), sine(angle[i])
 
 
 @helper

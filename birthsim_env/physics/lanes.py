@@ -7,6 +7,7 @@ over lanes with unit stride.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,11 +109,23 @@ def parameter_column(parameters: Parameters) -> Array:
     1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
     equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed.
     """
+    return np.array(_rows(parameters), dtype=np.float64)
+
+
+def parameter_columns(parameters: Parameters, num_lanes: int) -> Array:
+    """``parameter_column`` of lanes (PARAMETERS, num_lanes); fields of ``parameters`` but geometry may be (num_lanes,)."""
+    columns = np.empty((PARAMETERS, num_lanes))
+    for row, value in zip(columns, _rows(parameters), strict=True):
+        row[:] = value
+    return columns
+
+
+def _rows(parameters: Parameters) -> tuple[Any, ...]:
     g, c1, c2, m = parameters.geometry, parameters.cylinder1, parameters.cylinder2, parameters.mechanics
     f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
     fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction
     conductance = v.sonic_conductance
-    values = (
+    return (
         *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.sine(g.gamma3), exact.cosine(g.gamma3)),
         *(g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
         *(m.mass, m.gravity, m.stop_stiffness, m.stop_damping),
@@ -128,13 +141,12 @@ def parameter_column(parameters: Parameters) -> Array:
         *(a.reference_temperature / a.temperature, 1 / a.supply_pressure, 1 / a.atmospheric_pressure),
         *(1 / v.time_constant, 1 / f.sign_speed, 1 / m.mass),
     )
-    return np.array(values, dtype=np.float64)
 
 
 def parameter_array(parameters: Parameters | Sequence[Parameters], num_lanes: int) -> Array:
     """Parameters of all lanes, (PARAMETERS, num_lanes): one rig for all, or a sequence with one per lane."""
     if isinstance(parameters, Parameters):
-        return np.repeat(parameter_column(parameters)[:, None], num_lanes, axis=1)
+        return parameter_columns(parameters, num_lanes)
     if len(parameters) != num_lanes:
         raise ValueError(
             f"parameters has {len(parameters)} entries; allowed: one Parameters, or one for each of {num_lanes} lanes"

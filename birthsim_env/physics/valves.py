@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from birthsim_env.physics.compilation import helper
 
 LINEAR_RATIO = 0.99
@@ -20,7 +22,8 @@ slope at equal pressures would be infinite."""
 def laminar_slope(critical: float) -> float:
     """-dpsi/dx above ``LINEAR_RATIO``."""
     edge = (LINEAR_RATIO - critical) / (1.0 - critical)
-    return math.sqrt(1.0 - edge * edge) / (1.0 - LINEAR_RATIO)
+    slope: float = np.sqrt(1.0 - edge * edge) / (1.0 - LINEAR_RATIO)
+    return slope
 
 
 @helper

@@ -1,0 +1,109 @@
+"""The check of new episodes: what is asked for stays finite, reachable and stiff from their beginning to their end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.seeding import is_vectorised
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.geometry import inverse_geometry, well_inside
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import checked
+
+CHECKS = 64
+"""Instants of a new episode at which its reference is checked."""
+
+
+def checked_start(
+    trajectory: Trajectory,
+    stiffness: StiffnessSchedule,
+    lanes: NDArray[np.intp],
+    num_envs: int,
+    duration: float,
+    rig: Parameters,
+    nominal: Array,
+) -> Array:
+    """What is asked of ``lanes`` (L,) as their episodes begin, rows of a ``Reference``, (15, L).
+
+    Raises ``ValueError`` where it is not finite, leaves the workspace of ``rig``, or is no stiffness, within ``duration`` s.
+    ``nominal`` (PARAMETERS,) is the rig's column.
+    """
+    motion = _sampler("reference", trajectory, 8, lanes, num_envs)
+    setpoints = _sampler("stiffness", stiffness, 7, lanes, num_envs)
+    start = np.concatenate([motion(0.0), setpoints(0.0)])
+    instants = np.linspace(0.0, duration, CHECKS)
+    if not all(_is_plain(motion(instant), setpoints(instant), nominal) for instant in instants):
+        _explain(trajectory, stiffness, lanes, num_envs, instants, rig)
+    return start
+
+
+def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[float], Array]:
+    """What gives the rows (size, L) of a part at an instant, s; where the part can do that, of these lanes alone."""
+    if is_vectorised(part.sample):
+        few = part.some(lanes)
+        return lambda instant: few.sample(np.full(len(lanes), instant))
+    return lambda instant: _of_all(name, part, size, num_envs, instant).take(lanes, axis=1)
+
+
+def _of_all(name: str, part: Any, size: int, num_envs: int, instant: float) -> Array:
+    return checked(f"{name}.sample(time)", part.sample(np.full(num_envs, instant)), (size, num_envs), "SI")
+
+
+@kernel
+def _is_plain(motion: Array, setpoints: Array, p: Array) -> bool:
+    """Whether no lane of ``motion`` (8, L) and ``setpoints`` (7, L) is anywhere near what the check refuses."""
+    doubtful = 0
+    for i in range(motion.shape[1]):
+        size = 0.0
+        for row in range(8):
+            size += abs(motion[row, i])
+        for row in range(7):
+            size += abs(setpoints[row, i])
+        kx, ky, kxy = setpoints[0, i], setpoints[1, i], setpoints[6, i]
+        soft = min(min(kx, ky), min(setpoints[2, i], setpoints[3, i])) <= 0.0 or kxy * kxy >= kx * ky
+        doubtful += 0 if size < math.inf and not soft and well_inside(motion[0, i], motion[1, i], p) else 1
+    return doubtful == 0
+
+
+def _explain(
+    trajectory: Trajectory,
+    stiffness: StiffnessSchedule,
+    lanes: NDArray[np.intp],
+    num_envs: int,
+    instants: Array,
+    rig: Parameters,
+) -> None:
+    """Raises ``ValueError`` with what is wrong first, if anything is."""
+    points, asked = np.empty((2, CHECKS, len(lanes))), np.empty((7, CHECKS, len(lanes)))
+    for k, instant in enumerate(instants):
+        points[:, k] = _of_all("reference", trajectory, 8, num_envs, instant)[:2, lanes]
+        asked[:, k] = _of_all("stiffness", stiffness, 7, num_envs, instant)[:, lanes]
+
+    def first(wrong: Any) -> tuple[int, float]:
+        k = int(wrong.any(axis=1).argmax())
+        return k, float(instants[k])
+
+    soft = (asked[:4] <= 0).any(axis=0)
+    if soft.any():
+        k, instant = first(soft)
+        raise ValueError(f"stiffness.sample(time = {instant:g} s) = {asked[:4, k].min():g} N/m; allowed: more than 0")
+    kx, ky, kxy = asked[0], asked[1], asked[6]
+    coupled = kxy**2 >= kx * ky
+    if coupled.any():
+        k, instant = first(coupled)
+        raise ValueError(
+            f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy[k]).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
+        )
+    for k, instant in enumerate(instants):
+        try:
+            inverse_geometry(points[:, k], rig)
+        except ValueError as error:
+            raise ValueError(f"reference at {instant:.3g} s: {error}") from error
