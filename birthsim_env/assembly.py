@@ -14,6 +14,7 @@ from gymnasium import spaces
 
 from birthsim_env import observation
 from birthsim_env.drawing.rendering import checked_size
+from birthsim_env.loop.loop import available_threads
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
 from birthsim_env.parts.randomization import checked_ranges, documented_ranges
@@ -96,6 +97,7 @@ def assemble(
     duration: float | None = None,
     actuation: Actuation | None = None,
     picture_size: tuple[int, int] = (640, 480),
+    num_threads: int | None = None,
     **unknown: Any,
 ) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed, and
@@ -125,6 +127,7 @@ def assemble(
         sensors,
         chosen,
         policy_periods(policy_period, rig),
+        threads_for(num_envs, num_threads),
     )
     limit = observation.LIMIT
     names = (*(f"last action: {name}" for name in chosen.names), *chosen.memory_names)
@@ -140,6 +143,15 @@ def assemble(
         spaces.Box(-1.0, 1.0, (chosen.size,), np.float32),
         (*(str(entry) for entry in observation.ENTRIES), *names),
     )
+
+
+def threads_for(num_envs: int, num_threads: int | None) -> int:
+    """``num_threads`` if that is a whole number of at least 1; for None, one for one lane and else all that there are."""
+    if num_threads is None:
+        return available_threads() if num_envs > 1 else 1
+    if isinstance(num_threads, bool) or not isinstance(num_threads, (int, np.integer)) or num_threads < 1:
+        raise ValueError(f"num_threads = {num_threads!r}; allowed: None or a whole number >= 1")
+    return int(num_threads)
 
 
 def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Sequence[str] = ()) -> None:
@@ -163,9 +175,12 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
         shape = (size,) if num_envs == 1 else (num_envs, size)
         shown = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
         raise ValueError(f"action has shape {shown}; allowed: {shape}, in [-1, 1]")
-    extreme = np.abs(array).max()
+    # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
+    columns = np.array(array.T, order="C")
+    extreme = np.abs(columns).max()
+    if extreme <= 1.0:
+        return columns
     if not extreme <= 1.0 + ROUNDING:
         lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0 + ROUNDING))[0])
         raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1")
-    # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
-    return np.array(array.T.clip(-1.0, 1.0), order="C")
+    return np.clip(columns, -1.0, 1.0)

@@ -96,6 +96,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `stiffness`: a `StiffnessSchedule` of your own.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
+    - `num_threads`: that share the lanes of a vector environment, the same bits with any number; default: one in a single
+      environment, else all processors, at most `OMP_NUM_THREADS`.
     - `actuation`: an object of your own between action and valves (`birthsim_env.parts.actuation.Actuation`) instead of a mode.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`, in real time; `picture_size`: (width, height) in px, (640, 480).
       `gymnasium.wrappers.RecordVideo` needs `pip install 'birthsim[video]'`; its videos play in real time too.

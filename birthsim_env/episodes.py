@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import observation, reward
+from birthsim_env import reward
 from birthsim_env.assembly import Setup
 from birthsim_env.drawing.scene import Scene
-from birthsim_env.info import describe
+from birthsim_env.outcome import Outcome
 from birthsim_env.parts.seeding import lane_seeds
 from birthsim_env.parts.signals import Mask
 from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
-from birthsim_env.success import Success
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer
@@ -34,15 +33,24 @@ class Episodes:
         self.elapsed: NDArray[np.int64] = np.zeros(lanes, dtype=np.int64)
         self._numbers: NDArray[np.int64] = np.full(lanes, -1, dtype=np.int64)
         self._seeds: list[int] = []
-        self._action: Array = np.zeros((self.action_size, lanes))
-        self._moved: Array = np.zeros((4, lanes))
-        self._success = Success(lanes)
+        self._outcome = Outcome(
+            lanes, self.simulation.nominal, self.action_size, len(setup.actuation.memory_names), setup.policy_period,
+            self.simulation.period, self.simulation.parameters.mechanics.impact_speed,
+        )  # fmt: skip
+        beginning, closing = self._outcome.stages()
+        self.simulation.beginning, self.simulation.closing = [beginning], [closing]
         self._renderer: Renderer | None = None
         self._path: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the renderer, whose surfaces belong to this process; another is made when it is asked for."""
         return {**self.__dict__, "_renderer": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """The simulation's copies of what closes a policy step are those of the outcome."""
+        self.__dict__.update(state)
+        beginning, closing = self._outcome.stages()
+        self.simulation.beginning, self.simulation.closing = [beginning], [closing]
 
     @property
     def duration(self) -> float:
@@ -61,49 +69,32 @@ class Episodes:
         if not again:
             self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
-        self._action[:, lanes] = 0.0
-        self._success.begin(lanes)
+        self._outcome.begin(lanes)
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
-        # It starts on the target, however hard the hand pushes: all that the push asks for comes little by little.
-        given = self.simulation.reference.compliant_target(self.simulation.force) - self.simulation.reference.position
-        self._moved[:, lanes] = np.concatenate([given, given])[:, lanes]
         self._path = None
 
     def step(self, actions: Array) -> tuple[Array, dict[str, Array], NDArray[np.bool_]]:
         """One policy step; returns rewards (N,), their terms and which lanes have left the physical range."""
         if not self._seeds:
             raise RuntimeError("step() before reset(): call reset(seed=...) first")
-        simulation = self.simulation
-        simulation.step(actions)
+        self.simulation.step(actions)
         self.elapsed += 1
-        # Half a control period less: the clock of a jump counts in sums of them.
-        jumped = simulation.since_jump < self._setup.policy_period - 0.5 * simulation.period
-        terms, failed = reward.assess(
-            simulation.plant.state, simulation.motion, simulation.reference.rows, simulation.force, jumped, self._moved,
-            actions, self._action, simulation.impacts, simulation.parameters.mechanics.impact_speed, self._setup.policy_period,
-        )  # fmt: skip
-        self._success.add(
-            simulation.motion, simulation.reference.rows, simulation.force, simulation.since_jump, failed
-        )  # fmt: skip
-        self._action = actions
+        terms = self._outcome.terms.copy()
+        failed = self._outcome.ends[0] > 0.0
         return terms.sum(axis=0), dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
 
     @property
     def success(self) -> NDArray[np.bool_]:
         """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
-        return self._success.now
+        return np.asarray(self._outcome.ends[1] > 0.0)
 
     def observation(self) -> NDArray[np.float32]:
         """Observations of all lanes now, (N, size)."""
-        simulation = self.simulation
-        seen = simulation.measurement
-        memory = simulation.actuation.memory()
-        beside = np.concatenate([self._action, memory]) if len(memory) else self._action
-        return observation.observe(seen, simulation.reference, beside, simulation.nominal)
+        return self._outcome.seen.copy()
 
     def describe(self) -> Array:
         """The fields of ``info`` of all lanes now."""
-        return describe(self.simulation)
+        return self._outcome.rows.copy()
 
     def render(self, mode: str, lanes: int) -> tuple[Any, ...] | None:
         """Frames (H, W, 3) of the first ``lanes`` lanes, or None once the first is shown in a window."""

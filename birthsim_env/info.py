@@ -9,7 +9,6 @@ from birthsim_env.physics import control_model, dynamics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
-from birthsim_env.simulation import Simulation
 
 FIELDS = {
     "time": (1, "s since the episode began"),
@@ -40,7 +39,7 @@ _SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _S
 
 
 @kernel
-def _describe(
+def describe(
     time: Array,
     since: Array,
     state: Array,
@@ -51,6 +50,7 @@ def _describe(
     p: Array,
     rows: Array,
 ) -> None:
+    """Writes all fields of N lanes, ``rows`` (ROWS, N), in the order of ``FIELDS``; parameters ``p`` (PARAMETERS, N)."""
     for i in range(state.shape[1]):
         rows[0, i], rows[1, i] = time[i], since[i]
         given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
@@ -85,17 +85,6 @@ def _describe(
         )
 
 
-def describe(simulation: Simulation) -> Array:
-    """All fields of all lanes, (ROWS, N), in the order of ``FIELDS``."""
-    plant = simulation.plant
-    rows = np.empty((ROWS, plant.num_envs))
-    _describe(
-        simulation.time, simulation.since_jump, plant.state, simulation.motion, simulation.reference.rows, simulation.force,
-        simulation.impacts, plant.lane_parameters, rows,
-    )  # fmt: skip
-    return rows
-
-
 def vector_info(rows: Array) -> dict[str, Array]:
     """Name -> (N,) for single values, (N, size) for several."""
     return {
@@ -107,7 +96,8 @@ def vector_info(rows: Array) -> dict[str, Array]:
 def single_info(rows: Array) -> dict[str, float | Array]:
     """Name -> number or array (size,) of the first lane."""
     column = rows[:, 0]
+    values = column.tolist()
     return {
-        name: float(column[part.start]) if size == 1 else column[part]
+        name: values[part.start] if size == 1 else column[part]
         for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)
     }

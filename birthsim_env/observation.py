@@ -56,14 +56,15 @@ ENTRIES = (
     Entry("target acceleration y", "m/s2", 0.5),
 )
 SIZE = len(ENTRIES)
-_SCALES = np.array([entry.scale for entry in ENTRIES])
+SCALES = np.array([entry.scale for entry in ENTRIES])
 
 
 @kernel
-def _observe(
-    position: Array, velocity: Array, pressures: Array, reference: Array, force: Array, action: Array, p: Array, scales: Array,
-    rows: NDArray[np.float32],
+def look(
+    position: Array, velocity: Array, pressures: Array, reference: Array, force: Array, action: Array, shown: Array, p: Array,
+    scales: Array, rows: NDArray[np.float32],
 ) -> None:  # fmt: skip
+    """Writes observations, ``rows`` (N, SIZE + M + S), see ``observe``; then ``action`` (M, N), ``shown`` (S, N)."""
     motion, joints, seen = np.empty((4, 1)), np.empty((4, 1)), np.empty(scales.shape[0])
     for i in range(position.shape[1]):
         motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
@@ -101,6 +102,8 @@ def _observe(
             rows[i, k] = max(-LIMIT, min(LIMIT, seen[k] / scales[k]))
         for k in range(action.shape[0]):
             rows[i, scales.shape[0] + k] = action[k, i]
+        for k in range(shown.shape[0]):
+            rows[i, scales.shape[0] + action.shape[0] + k] = shown[k, i]
 
 
 def observe(seen: Measurement, reference: Reference, beside: Array, nominal: Array) -> NDArray[np.float32]:
@@ -110,5 +113,8 @@ def observe(seen: Measurement, reference: Reference, beside: Array, nominal: Arr
     describes it: a policy does not know what randomisation drew.
     """
     rows = np.empty((seen.position.shape[1], SIZE + beside.shape[0]), dtype=np.float32)
-    _observe(seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, beside, nominal, _SCALES, rows)
+    nothing = np.empty((0, beside.shape[1]))
+    look(
+        seen.position, seen.velocity, seen.pressures, reference.rows, seen.user_force, beside, nothing, nominal, SCALES, rows
+    )  # fmt: skip
     return rows

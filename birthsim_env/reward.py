@@ -12,9 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from birthsim_env.parts.signals import compliance
 from birthsim_env.physics import exact
 from birthsim_env.physics import lanes as at
@@ -53,10 +50,16 @@ REWARD_TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_e
 
 
 @kernel
-def _assess(
-    state: Array, motion: Array, reference: Array, force: Array, jumped: NDArray[np.bool_], moved: Array, action: Array,
-    last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: NDArray[np.bool_],
+def assess(
+    state: Array, motion: Array, reference: Array, force: Array, jumped: Array, moved: Array, action: Array,
+    last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: Array,
 ) -> None:  # fmt: skip
+    """Writes reward ``terms`` (5, N) in the order of ``REWARD_TERMS``, and 1 in lanes (N,) that have left the physical range.
+
+    ``force`` (2, N), N, is the hand's; ``jumped`` (N,) is 1 where it or a stiffness setpoint jumped within this policy
+    ``period``, s. ``moved`` (4, N), m, is carried on: what the hand has moved the compliant target by, and how much of that is
+    not asked for yet. ``action`` and ``last_action`` (size, N).
+    """
     steps, kept = period / 0.01, exact.exp(-period / GIVING_WAY)
     unit = steps / LARGEST_COST
     for i in range(state.shape[1]):
@@ -64,7 +67,7 @@ def _assess(
         error, speed = 0.0, 0.0
         for axis in range(2):
             change = given[axis] - moved[axis, i]
-            owed = kept * (moved[2 + axis, i] + (change if jumped[i] else 0.0))
+            owed = kept * (moved[2 + axis, i] + (change if jumped[i] > 0.0 else 0.0))
             asked = given[axis] - owed
             rate = (asked - moved[axis, i] + moved[2 + axis, i]) / period
             error += abs(motion[axis, i] - reference[axis, i] - asked)
@@ -82,27 +85,9 @@ def _assess(
         for k in (at.TP1, at.TN1, at.TP2, at.TN2):
             inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
         inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
-        failed[i] = not inside or max(impacts[0, i], impacts[1, i]) > impact_speed
+        failed[i] = 1.0 if not inside or max(impacts[0, i], impacts[1, i]) > impact_speed else 0.0
         terms[0, i] = steps
         terms[1, i] = -unit * cost
         terms[2, i] = -unit * HUNTING_COST * hunting
         terms[3, i] = -unit * EFFORT_COST * effort / action.shape[0]
         terms[4, i] = -unit * ACTION_CHANGE_COST * turned / action.shape[0]
-
-
-def assess(
-    state: Array, motion: Array, reference: Array, force: Array, jumped: NDArray[np.bool_], moved: Array, action: Array,
-    last_action: Array, impacts: Array, impact_speed: float, policy_period: float,
-) -> tuple[Array, NDArray[np.bool_]]:  # fmt: skip
-    """Reward terms (5, N) in the order of ``REWARD_TERMS``, and which lanes (N,) have left the physical range.
-
-    ``force`` (2, N), N, is the hand's; ``jumped`` (N,) tells where it or a stiffness setpoint jumped within this policy period.
-    ``moved`` (4, N), m, is carried on: what the hand has moved the compliant target by, and how much of that is not asked for
-    yet. ``action`` and ``last_action`` (size, N).
-    """
-    lanes = state.shape[1]
-    terms, failed = np.empty((len(REWARD_TERMS), lanes)), np.empty(lanes, dtype=np.bool_)
-    _assess(
-        state, motion, reference, force, jumped, moved, action, last_action, impacts, impact_speed, policy_period, terms, failed
-    )
-    return terms, failed

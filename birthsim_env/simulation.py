@@ -59,7 +59,8 @@ class Simulation:
     episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``force`` (2, N) the hand's, N; ``reference`` and
     ``measurement``; ``since_jump`` (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded;
     ``impacts`` (2, N) m/s, the fastest collision of each piston with an end stop during the last step. ``period`` is that of
-    control, s, and ``periods`` how many of them make a policy step. ``closing`` stages run at the end of a policy step.
+    control, s, and ``periods`` how many of them make a policy step. ``beginning`` and
+    ``closing`` stages run where episodes begin, and at the end of a policy step.
     ``threads`` share the lanes.
     """
 
@@ -86,6 +87,7 @@ class Simulation:
             part.prepare(num_envs)
         self.period = parameters.electronics.control_period
         self.periods, self.threads = periods, threads
+        self.beginning: list[Stage] = []
         self.closing: list[Stage] = []
         self.action: Array = np.zeros((actuation.size, num_envs))
         self._tick, self._since = np.zeros((1, num_envs)), np.zeros((1, num_envs))
@@ -218,7 +220,7 @@ class Simulation:
         senses = self._compiled(self.sensors, "measure", self._measure)
         counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
         self._loop = MixedLoop(lanes, world, seen, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
-        self._look = MixedLoop(lanes, world, seen, [*looks, begins, senses])
+        self._look = MixedLoop(lanes, world, seen, [*looks, begins, senses], self.beginning)
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Part) -> Part:

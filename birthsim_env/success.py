@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from birthsim_env.parts.signals import Mask, compliance
+from birthsim_env.parts.signals import compliance
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
 
@@ -19,10 +16,14 @@ SUCCESS_ERROR = 1e-3
 
 
 @kernel
-def _add(
-    motion: Array, reference: Array, force: Array, since: Array, failed: NDArray[np.bool_], tally: Array,
-    success: NDArray[np.bool_],
+def add(
+    motion: Array, reference: Array, force: Array, since: Array, failed: Array, tally: Array, success: Array
 ) -> None:  # fmt: skip
+    """Takes one policy step: carries ``tally`` (4, N) on and writes ``success`` (N,), 1 where an episode is successful so far.
+
+    The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump (``since`` (N,), s), or over all
+    of them before there is such a step. An episode that has ``failed`` (N,) is none.
+    """
     for i in range(since.shape[0]):
         given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         x, y = motion[0, i] - reference[0, i] - given[0], motion[1, i] - reference[1, i] - given[1]
@@ -32,26 +33,5 @@ def _add(
                 tally[row, i] += x * x + y * y
                 tally[row + 1, i] += 1.0
         row = 2 if tally[3, i] > 0.0 else 0
-        success[i] = not failed[i] and math.sqrt(tally[row, i] / tally[row + 1, i]) < SUCCESS_ERROR
-
-
-class Success:
-    """Whether the episodes of N lanes are successful so far, ``now`` (N,).
-
-    The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump, or over all of them before
-    there is such a step. An episode that has failed is none.
-    """
-
-    def __init__(self, lanes: int) -> None:
-        self._tally: Array = np.zeros((4, lanes))
-        self.now: NDArray[np.bool_] = np.zeros(lanes, dtype=np.bool_)
-
-    def begin(self, lanes: Mask) -> None:
-        """Start anew in the lanes of a mask (N,)."""
-        self._tally[:, lanes] = 0.0
-        self.now = self.now & ~lanes
-
-    def add(self, motion: Array, reference: Array, force: Array, since: Array, failed: NDArray[np.bool_]) -> None:
-        """Take one policy step: motion (4, N), reference rows, user force (2, N) N, s since a jump and who has failed (N,)."""
-        self.now = np.empty_like(failed)
-        _add(motion, reference, force, since, failed, self._tally, self.now)
+        good = failed[i] == 0.0 and math.sqrt(tally[row, i] / tally[row + 1, i]) < SUCCESS_ERROR
+        success[i] = 1.0 if good else 0.0

@@ -84,17 +84,18 @@ def assess(lanes=1, policy_period=0.01, **changes):
         "motion": rows[:4].copy(),
         "reference": rows,
         "force": np.zeros((2, lanes)),
-        "jumped": np.zeros(lanes, dtype=bool),
+        "jumped": np.zeros(lanes),
         "moved": np.zeros((4, lanes)),
         "action": np.zeros((2, lanes)),
         "last_action": np.zeros((2, lanes)),
         "impacts": np.zeros((2, lanes)),
         "impact_speed": 0.1,
-        "policy_period": policy_period,
+        "period": policy_period,
     }
     for name, change in changes.items():
         given[name] = change(given[name]) if callable(change) else np.asarray(change, dtype=given[name].dtype)
-    terms, failed = reward.assess(**given)
+    terms, failed = np.empty((len(TERMS), lanes)), np.empty(lanes)
+    reward.assess(*given.values(), terms, failed)
     return dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
 
 

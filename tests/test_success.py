@@ -8,7 +8,7 @@ import pytest
 
 from baselines.registry import make_controller
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.success import Success
+from birthsim_env.success import add
 
 CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
 
@@ -34,16 +34,16 @@ def test_it_is_the_settled_error_so_far(name, kept):
 
 
 def test_a_lost_episode_is_no_success_and_the_next_one_begins_anew():
-    success, zero = Success(2), np.zeros((2, 2))
+    tally, now, zero = np.zeros((4, 2)), np.zeros(2), np.zeros((2, 2))
     reference = np.zeros((15, 2))
     reference[8:10] = 2000.0
     motion, since = np.zeros((4, 2)), np.ones(2)
-    success.add(motion, reference, zero, since, np.array([True, False]))
-    np.testing.assert_array_equal(success.now, [False, True])
+    add(motion, reference, zero, since, np.array([1.0, 0.0]), tally, now)
+    np.testing.assert_array_equal(now, [0, 1])
     motion[0] = 0.1
-    success.add(motion, reference, zero, since, np.zeros(2, dtype=bool))
-    assert not success.now.any()
-    success.begin(np.array([True, False]))
+    add(motion, reference, zero, since, np.zeros(2), tally, now)
+    assert not now.any()
+    tally[:, 0] = 0.0
     motion[0] = 0.9e-3
-    success.add(motion, reference, zero, since, np.zeros(2, dtype=bool))
-    np.testing.assert_array_equal(success.now, [True, False])
+    add(motion, reference, zero, since, np.zeros(2), tally, now)
+    np.testing.assert_array_equal(now, [1, 0])

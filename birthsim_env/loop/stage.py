@@ -113,6 +113,13 @@ def table2(tables: int, k: int) -> Array:
 
 
 @helper
+def singles(tables: int, k: int) -> NDArray[np.float32]:
+    """Table ``k`` of two dimensions and single precision."""
+    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
+    return carray(pointer(about[k * TABLE], np.float32), (about[k * TABLE + 1], about[k * TABLE + 2]))
+
+
+@helper
 def table3(tables: int, k: int) -> Array:
     """Table ``k`` of three dimensions."""
     about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))

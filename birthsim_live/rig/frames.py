@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.info import describe, single_info
+from birthsim_env.info import ROWS, describe, single_info
 from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
@@ -45,7 +45,10 @@ LEAST_FORCE, LEAST_GIVEN = 5.0, 1e-4
 
 def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
     """The present instant as a row (COLUMNS,)."""
-    info = single_info(describe(simulation))
+    now, plant, rows = simulation, simulation.plant, np.empty((ROWS, 1))
+    rig = plant.lane_parameters
+    describe(now.time, now.since_jump, plant.state, now.motion, now.reference.rows, now.force, now.impacts, rig, rows)
+    info = single_info(rows)
     hold = hands.hold
     pointer = (math.nan, math.nan) if hold is None else hold.position
     parts: Sequence[Any] = (

@@ -1,0 +1,174 @@
+"""The closed loop: compiled stages, stops for a user's Python, lanes, threads, processes and copies, all to the last bit."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents  # noqa: F401  registers the residual environments
+from birthsim_env import StiffnessSchedule, Trajectory, UserForce
+from birthsim_env.loop.loop import Loop, available_threads
+from birthsim_env.parts.actuation import ValveActuation
+from birthsim_env.parts.references import Circle
+from birthsim_env.parts.sensors import SENSORS, IdealSensors
+from birthsim_env.parts.user_forces import AlternatingSteps
+
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+
+
+def course(env, steps=25, seed=3):
+    """States, observations, rewards and info of a run under random actions."""
+    rng, (first, info) = np.random.default_rng(0), env.reset(seed=seed)
+    found = [first, *info.values()]
+    for _ in range(steps):
+        actions = rng.uniform(-0.2, 0.2, env.action_space.shape).astype(np.float32)
+        observation, reward, terminated, truncated, info = env.step(actions)
+        found += [observation, reward, terminated, truncated, env.unwrapped.simulation.plant.state.copy()]
+        found += [np.asarray(value) for name, value in info.items() if "final" not in name]
+    return found
+
+
+def assert_same(one, other):
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+class OwnCircle(Circle):
+    """The same circle, asked in Python."""
+
+    def sample(self, time):
+        return super().sample(time)
+
+
+class OwnSteps(AlternatingSteps):
+    def force(self, time, position, velocity):
+        return super().force(time, position, velocity)
+
+
+class OwnSchedule(StiffnessSchedule):
+    def sample(self, time):
+        return super().sample(time)
+
+
+class OwnValves(ValveActuation):
+    """Without stages the loop stops for it."""
+
+    stages = None
+
+
+class OwnSensors(IdealSensors):
+    def measure(self, *seen):
+        return super().measure(*seen)
+
+
+def schedule(kind=StiffnessSchedule):
+    return kind((0.0, 0.1), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {"reference": OwnCircle()},
+        {"user_force": OwnSteps(repeats=1)},
+        {"stiffness": schedule(OwnSchedule)},
+        {"actuation": OwnValves("two_valves")},
+        {"sensors": "own"},
+        {"reference": OwnCircle(), "stiffness": schedule(OwnSchedule), "actuation": OwnValves("two_valves")},
+    ],
+    ids=lambda own: "+".join(own),
+)
+def test_a_stop_for_a_users_python_changes_no_bit(own, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", OwnSensors)
+    compiled = {"reference": Circle(), "user_force": AlternatingSteps(repeats=1), "stiffness": schedule()}
+    one, other = (gymnasium.make_vec(CIRCLE, num_envs=3, **arguments) for arguments in (compiled, {**compiled, **own}))
+    assert_same(course(one), course(other))
+    pieces = [len(env.unwrapped.simulation._loop._pieces) for env in (one, other)]
+    assert pieces[0] == 1 < pieces[1], "what is compiled is one piece; a user's part stands between others"
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
+def test_threads_change_no_bit(name, sensors):
+    runs = [
+        course(gymnasium.make_vec(name, num_envs=100, num_threads=threads, sensors=sensors, randomize=True), 12)
+        for threads in (1, 2, 3, 50)
+    ]
+    for other in runs[1:]:
+        assert_same(runs[0], other)
+
+
+def test_threads_are_all_that_there_are_unless_one_says_so(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    usable = available_threads()
+    assert gymnasium.make_vec(CIRCLE, num_envs=2).unwrapped.simulation.threads == usable >= 1
+    assert gymnasium.make(CIRCLE).unwrapped.simulation.threads == 1
+    assert gymnasium.make_vec(CIRCLE, num_envs=2, num_threads=7).unwrapped.simulation.threads == 7
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert gymnasium.make_vec(CIRCLE, num_envs=2).unwrapped.simulation.threads == 1
+    for wrong in (0, -1, 1.5, "2", True):
+        with pytest.raises(ValueError, match="num_threads"):
+            gymnasium.make_vec(CIRCLE, num_envs=2, num_threads=wrong)
+
+
+def _child(connection, env):
+    connection.send(course(env, 5))
+    connection.close()
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system does not fork")
+def test_a_fork_has_threads_of_its_own():
+    env = gymnasium.make_vec(CIRCLE, num_envs=70, num_threads=3)
+    expected = course(env, 5)
+    here, there = multiprocessing.get_context("fork").Pipe()
+    process = multiprocessing.get_context("fork").Process(target=_child, args=(there, env))
+    process.start()
+    assert here.poll(120), "the child hangs"
+    assert_same(here.recv(), expected)
+    process.join()
+    assert process.exitcode == 0
+
+
+@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["deepcopy", "pickle"])
+def test_a_copy_in_the_middle_of_an_episode_goes_on_alone(name, copied):
+    env = gymnasium.make(name, sensors="lab", randomize=True).unwrapped
+    env.reset(seed=1)
+    size = env.action_space.shape
+    for k in range(10):
+        env.step(np.full(size, 0.1 * (-1) ** k, np.float32))
+    other = copied(env)
+    before = env.simulation.plant.state.copy()
+    ahead = [other.step(np.full(size, 0.1, np.float32))[0] for _ in range(10)]
+    np.testing.assert_array_equal(env.simulation.plant.state, before)
+    np.testing.assert_array_equal([env.step(np.full(size, 0.1, np.float32))[0] for _ in range(10)], ahead)
+
+
+def test_what_was_handed_out_stays_as_it_was():
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=0.001)
+    observation, info = env.reset(seed=0)
+    simulation = env.unwrapped.simulation
+    kept = [observation, *info.values(), simulation.motion, simulation.time, simulation.force, simulation.reference.rows]
+    kept += [simulation.measurement.position, simulation.measurement.pressures]
+    before = copy.deepcopy(kept)
+    for _ in range(3):
+        env.step(np.full((2, 4), 0.5, np.float32))
+    for now, then in zip(kept, before, strict=True):
+        np.testing.assert_array_equal(now, then)
+
+
+def test_an_array_that_does_not_fit_is_refused():
+    for wrong in (np.zeros((2, 3)), np.zeros((2, 4), dtype=np.float32), np.zeros((4, 2)).T, np.zeros(4)):
+        with pytest.raises(ValueError, match="allowed: float64"):
+            Loop(4, [(wrong, 0)], [], [])
+
+
+def test_a_users_part_says_what_it_lacks():
+    for part, name in ((Trajectory(), "reference"), (UserForce(), "user_force")):
+        with pytest.raises(NotImplementedError, match="is missing"):
+            gymnasium.make(CIRCLE, **{name: part}).reset(seed=0)
