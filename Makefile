@@ -112,7 +112,7 @@ scores: $(READY)
 	cp $(OUT)/scores/scores.md docs/
 
 scratch: $(READY)
-	$(BIN)/python examples/learning_curves.py --env BirthSIM/Circle-v1 BirthSIM/Probe-v1 --out $(OUT)/scratch
+	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
 	cp $(OUT)/scratch/scratch.png docs/
 
 moving: $(READY)

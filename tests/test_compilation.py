@@ -41,7 +41,7 @@ def package(tmp_path):
     for name in (
         "physics/compilation",
         "parts/signals",
-        *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "exact")),
+        *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "exact", "valves")),
     ):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
