@@ -208,8 +208,13 @@ class Simulation:
         world = [(plant.lane_parameters, 0), (plant.state, STATE), (self.impacts, IMPACT), (self._motion, MOTION)]
         world += [(self._force, FORCE), (self._since, SINCE_JUMP), (self._tick, TICK)]
         seen = [(self._seen, 0), (self.action, ACTION), (self._openings, OPENING)]
-        if hasattr(actuation, "shown"):
-            seen.append((actuation.shown, SHOWN))
+        if actuation.memory_names:
+            # A user's own actuation is asked what it shows; a compiled one writes it.
+            own = getattr(actuation, "shown", None)
+            self._shown = np.zeros((len(actuation.memory_names), lanes)) if own is None else own
+            if own is None:
+                self._shown[:] = actuation.memory()
+            seen.append((self._shown, SHOWN))
         acting = getattr(actuation, "stages", None)
         acts: list[Part] = [*acting(lanes, self.sensors.sampled)] if acting else [self._ask]
         looks: list[Part] = [
@@ -236,6 +241,8 @@ class Simulation:
     def _ask(self, period: int) -> None:
         if period == 0 or self.actuation.every_period:
             self._openings[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+            if self.actuation.memory_names:
+                self._shown[:] = self.actuation.memory()
 
     def _follow(self, _: int) -> None:
         self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)

@@ -136,7 +136,13 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+def said(case):
+    """A case in words that are the same in every process."""
+    plain = (str, bool, int, dict)
+    return ", ".join(f"{name} {value if isinstance(value, plain) else type(value).__name__}" for name, value in case.items())
+
+
+@pytest.mark.parametrize("case", CASES, ids=said)
 def test_lanes_begin_together_as_they_begin_one_by_one(case):
     name, lanes = f"BirthSIM/{case['scenario'].capitalize()}-v1", 9
     arguments = {key: value for key, value in case.items() if key != "scenario"}
