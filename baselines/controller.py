@@ -58,13 +58,13 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
     return lanes
 
 
-def told_of(lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None) -> Array:
+def feedforward_rows(lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None) -> Array:
     """What a law is told besides, (5, lanes), zero where nothing: forces to believe in along cylinders 1 and 2, N, their
     rates, N/s, and a damping factor. ``ValueError`` for what has not that shape."""
     told = np.zeros((5, lanes))
     for name, rows, given in (
-        ("believed_force", told[:2], force),
-        ("believed_rate", told[2:4], rate),
+        ("feedforward_force", told[:2], force),
+        ("feedforward_rate", told[2:4], rate),
         ("damping_factor", told[4], factor),
     ):
         if given is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.controller import lanes_of, told_of
+from baselines.controller import feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import (
     ASKED,
@@ -81,19 +81,19 @@ class StagedController:
         self,
         measurement: Measurement,
         reference: Reference,
-        believed_force: Array | None = None,
-        believed_rate: Array | None = None,
+        feedforward_force: Array | None = None,
+        feedforward_rate: Array | None = None,
         damping_factor: Array | None = None,
     ) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        Called once per control period. ``believed_force`` (2, N), N, along cylinders 1 and 2, is added to what the law believes
-        acts on the pistons, and ``believed_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies the damping
-        where the law has one to vary. Raises ``ValueError`` for signals over different numbers of lanes, and for setpoints that
-        the law cannot render.
+        Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
+        believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
+        the damping where the law has one to vary. Raises ``ValueError`` for signals over different numbers of lanes, and for
+        setpoints that the law cannot render.
         """
         if measurement.position.ndim == 1:
-            given = (believed_force, believed_rate, damping_factor)
+            given = (feedforward_force, feedforward_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
@@ -103,7 +103,7 @@ class StagedController:
             self._openings: Array = np.zeros((4, lanes))
             placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._told[:] = told_of(lanes, believed_force, believed_rate, damping_factor)
+        self._told[:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:ASKED] = self._seen[ASKED:] = reference.rows
         if self._loop.run():

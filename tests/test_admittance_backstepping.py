@@ -48,7 +48,7 @@ class Law:
     lead_time: float | None = None
 
     def command(
-        self, now: rigid_body.Instant, motion: Array, user: Array, unseen: Array,
+        self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
         rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
         told: Array | None = None,
     ) -> Array:  # fmt: skip
@@ -58,7 +58,7 @@ class Law:
         # A spool that follows as fast as it does by itself is told where to go, no further.
         quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
         admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, unseen,
+            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
             np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
             np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD, self.gain,
             self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE, 30.0,
@@ -82,12 +82,12 @@ def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> 
     """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with all that is known."""
     lanes, c, rng = 60, 60.0, np.random.default_rng(2)
     now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
-    user, unseen = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
+    user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
     motion, measured = near(now, rig, user, seed=1)
-    openings = Law(rig, c).command(now, motion, user, unseen)
+    openings = Law(rig, c).command(now, motion, user, disturbance_force)
     free = np.abs(openings).max(axis=0) < 1
     assert free.sum() > 0.7 * lanes
-    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, unseen, user)
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, disturbance_force, user)
     wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
     wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
     np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
@@ -98,13 +98,13 @@ def test_where_what_is_told_is_true_the_end_effector_gets_the_jerk_that_the_law_
     """Forces along the pistons that grow: the law knows both from what it is told, beside what is unseen."""
     lanes, c, rng = 60, 60.0, np.random.default_rng(2)
     now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
-    user, unseen = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
+    user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
     told = np.concatenate([rng.uniform(-4, 4, (2, lanes)), rng.uniform(-200, 200, (2, lanes))])
     motion, measured = near(now, rig, user, seed=1)
-    openings = Law(rig, c).command(now, motion, user, unseen, told=told)
+    openings = Law(rig, c).command(now, motion, user, disturbance_force, told=told)
     free = np.abs(openings).max(axis=0) < 1
     assert free.sum() > 0.7 * lanes
-    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, unseen + told[:2], user)
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, disturbance_force + told[:2], user)
     growing = by_points.newton_force(rigid_body.pose_of(now.piston, rig), now.piston[1] + rig.geometry.k2, *told[2:])
     wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
     wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
@@ -347,7 +347,7 @@ def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
         assert np.array_equal(alone, together[:, 1])
         plant.advance(openings, push, PERIOD)
     for wrong in (np.zeros((2, 2)), np.zeros(3), np.zeros((1, 3))):
-        with pytest.raises(ValueError, match=r"believed_force has shape .*; allowed: \(2, 3\)"):
+        with pytest.raises(ValueError, match=r"feedforward_force has shape .*; allowed: \(2, 3\)"):
             plain.command(seen, wanted, wrong)
-        with pytest.raises(ValueError, match=r"believed_rate has shape .*; allowed: \(2, 3\)"):
+        with pytest.raises(ValueError, match=r"feedforward_rate has shape .*; allowed: \(2, 3\)"):
             plain.command(seen, wanted, None, wrong)

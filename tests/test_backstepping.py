@@ -47,7 +47,7 @@ def random_situations(
         for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2))
     ]
     s["pressures"] = np.concatenate(pressures)
-    s["believed_rate"] = rng.normal(0, 100, (2, lanes))
+    s["feedforward_rate"] = rng.normal(0, 100, (2, lanes))
     possible = np.all((s["pressures"] > 1.1e5) & (s["pressures"] < 6.9e5), axis=0)
     return {name: value[:, possible] for name, value in s.items()}
 
@@ -64,7 +64,7 @@ def many(lanes: int) -> tuple[Measurement, Reference, tuple[Array, Array, Array]
     situation = random_situations(Parameters(), 0.01, True, 200, np.random.default_rng(3))
     measured, reference = as_signals(situation, Parameters())
     assert measured.time.size >= lanes
-    told = situation["believed"][:, :lanes], situation["believed_rate"][:, :lanes], np.linspace(0.5, 2.0, lanes)
+    told = situation["believed"][:, :lanes], situation["feedforward_rate"][:, :lanes], np.linspace(0.5, 2.0, lanes)
     return *of_lanes(measured, reference, slice(lanes)), told
 
 
@@ -145,12 +145,12 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     compensate, frozen = options.get("weight_compensation", False), options.get("frozen_friction", False)
     s = random_situations(rig, width, compensate, 800, np.random.default_rng(7), options.get("damping_ratio"))
     controller = BacksteppingController(rig, pneumatic_gain=gain, sign_width=width, **options)
-    got = controller.command(*as_signals(s, rig), s["believed"], s["believed_rate"])
+    got = controller.command(*as_signals(s, rig), s["believed"], s["feedforward_rate"])
     _, wanted_rates = derived.errors_and_rates()
     values = derived.rig_values(rig, width, compensate, frozen)
     force_rate = np.array(
         wanted_rates(
-            *s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values, *s["believed_rate"]
+            *s["piston"], *s["speed"], *s["force"], *s["wanted"], *s["gains"], *s["believed"], *values, *s["feedforward_rate"]
         )
     )
     stiffness_rate = s["pneumatic_rate"] - gain * (s["pneumatic"] - s["pneumatic_wanted"])
@@ -164,7 +164,7 @@ def test_openings_are_those_of_the_derived_law(rig: Parameters, gain: float, wid
     assert unsaturated.sum() >= 60
     assert (~unsaturated).any(), "saturated valves must have been met too"
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-8)
-    terms = controller.inspect(*as_signals(s, rig), s["believed"], s["believed_rate"])
+    terms = controller.inspect(*as_signals(s, rig), s["believed"], s["feedforward_rate"])
     np.testing.assert_allclose(terms.gains.swapaxes(0, 1).reshape(6, -1), s["gains"], rtol=1e-8)
     np.testing.assert_allclose(terms.force_rate, force_rate, rtol=1e-7, atol=1e-4)
     np.testing.assert_allclose(terms.wanted, s["wanted"], rtol=1e-7, atol=1e-7)
@@ -193,7 +193,7 @@ def test_the_force_rate_is_the_slope_of_the_wanted_force_along_a_changing_belief
         )
         return law.inspect(*as_signals(then, rig), *told)
 
-    rate = 30 * s["believed_rate"]
+    rate = 30 * s["feedforward_rate"]
     later, sooner = (at(time, (s["believed"] + time * rate,)).wanted_force for time in (step, -step))
     now = at(0.0, (s["believed"], rate))
     gains = now.gains.swapaxes(0, 1).reshape(6, -1)

@@ -108,9 +108,9 @@ def test_signals_over_different_lanes_are_refused() -> None:
     with pytest.raises(ValueError, match=r"reference.rows has shape \(8, 3\); allowed: \(15, 3\)"):
         law.command(measured, Reference(reference.rows[:8].copy()))
     for wrong in (believed[:, :1], believed[:1], believed[:, 0]):
-        with pytest.raises(ValueError, match=r"believed_force has shape .*; allowed: \(2, 3\)"):
+        with pytest.raises(ValueError, match=r"feedforward_force has shape .*; allowed: \(2, 3\)"):
             law.command(measured, reference, wrong)
-        with pytest.raises(ValueError, match=r"believed_rate has shape .*; allowed: \(2, 3\)"):
+        with pytest.raises(ValueError, match=r"feedforward_rate has shape .*; allowed: \(2, 3\)"):
             law.inspect(measured, reference, believed, wrong)
     for wrong in (factor[:1], factor[None], factor[0]):
         with pytest.raises(ValueError, match=r"damping_factor has shape .*; allowed: \(3,\)"):

@@ -272,7 +272,7 @@ def test_no_episodes_are_refused(episodes):
 
 def test_commands_that_are_not_openings_stop_the_evaluation_by_name():
     class Broken(BacksteppingController):
-        def command(self, measurement, reference, believed_force=None):
+        def command(self, measurement, reference, feedforward_force=None):
             return np.full((4, measurement.position.shape[1]), np.nan)
 
     with pytest.raises(ValueError, match=r"command\(\)\[0, 0\] = nan; allowed: spool openings"):

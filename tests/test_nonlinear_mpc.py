@@ -11,7 +11,7 @@ from scipy.optimize import least_squares, lsq_linear
 
 from baselines.bench.comparison import default_controllers
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
-from baselines.estimation.awareness import Awareness
+from baselines.estimation.state_estimator import StateEstimator
 from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
@@ -173,25 +173,25 @@ def test_tolerances_are_the_gains_of_their_names() -> None:
 @pytest.mark.usefixtures("told")
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_what_is_known_reaches_the_planner_and_its_first_flow_the_valves(sensors: str) -> None:
-    """State, flows, forces and forecasts of an awareness of its own, stiffnesses at the nodes, bounds; lane by lane.
+    """State, flows, forces and forecasts of an estimator of its own, stiffnesses at the nodes, bounds; lane by lane.
 
     The plan of the period before comes back as the mean that it had over each step one period later.
     """
     controller = NonlinearMPC(RIG)
     planner = planners(controller)[sensors]
-    knowing = Awareness(RIG, sensors == "lab", NonlinearMPC.TUNED[sensors])
+    knowing = StateEstimator(RIG, sensors == "lab", NonlinearMPC.TUNED[sensors])
     nodes, lanes = np.cumsum(planner.steps), 2
     for tick, (measured, wanted) in enumerate(recorded(lanes, 30, sensors)):
         wanted.rows[12:14] = [[300.0, -200.0], [-150.0, 400.0]]
         openings = controller.command(measured, wanted)
         now = knowing.update(measured, wanted)
-        ahead, unseen = knowing.forecast(now, wanted, np.round(nodes / PERIOD).astype(np.int64))
+        ahead, disturbance_force = knowing.forecast(now, wanted, np.round(nodes / PERIOD).astype(np.int64))
         for lane, (plan, given, low, high) in enumerate(planner.asked[-lanes:]):
             air = now.pressures[:, lane]
             flows = [derived_law.net_flow(s, p, RIG) for s, p in zip(now.spools[:, lane], air, strict=True)]
             asked = wanted.rows[10:12, lane] + nodes[:, None] * wanted.rows[12:14, lane]
             own = [now.joints[:, lane], air / PRESSURE, np.array(flows) / FLOW, measured.user_force[:, lane]]
-            nodewise = [part.ravel() for part in (unseen[:, :, lane], ahead[:, :, lane], asked)]
+            nodewise = [part.ravel() for part in (disturbance_force[:, :, lane], ahead[:, :, lane], asked)]
             np.testing.assert_allclose(given, np.concatenate([*own, *nodewise]), rtol=1e-9, atol=1e-12)
             for bound, opening in ((low, -1.0), (high, 1.0)):
                 np.testing.assert_allclose(FLOW * bound, [derived_law.net_flow(opening, p, RIG) for p in air], rtol=1e-9)

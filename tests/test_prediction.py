@@ -48,11 +48,11 @@ def states(rig: Parameters, count: int, seed: int, speed: float = 0.3, push: flo
     return np.concatenate([now.piston, now.speed, now.pressures / PRESSURE])
 
 
-def second_rates(state: Array, flows: Array, force: Array, unseen: Array, rig: Parameters) -> Array:
+def second_rates(state: Array, flows: Array, force: Array, disturbance_force: Array, rig: Parameters) -> Array:
     """d(state)/dt (8,): Newton's law for the mass in Cartesian coordinates; dp/p = k (dm/m - dV/V) in chambers."""
     piston, speed, pressures = state[:2, None], state[2:4, None], PRESSURE * state[4:]
     along = rigid_body.forces(pressures[:, None], rig)
-    cartesian = rigid_body.acceleration(piston, speed, along, rig, unseen[:, None], force[:, None])
+    cartesian = rigid_body.acceleration(piston, speed, along, rig, disturbance_force[:, None], force[:, None])
     bend = rigid_body.joint_acceleration(piston, speed, cartesian, rig)[:, 0]
     air, rates = rig.air, []
     for chamber, pressure in enumerate(pressures):
@@ -90,16 +90,16 @@ def test_rates_are_those_of_newton_and_polytropic_chambers(rig: Parameters) -> N
     """With dead volume, a user's force and forces unseen; random states, every row to 1e-9 of its size."""
     model, rng, found, expected = ControlModel(rig), np.random.default_rng(1), [], []
     for state in states(rig, 40, 0).T:
-        flows, force, unseen = rng.normal(0, 2, 4), rng.normal(0, 30, 2), rng.normal(0, 20, 2)
-        found.append(numbers(model.rates(*map(casadi.DM, (state, flows, force, unseen)))))
-        expected.append(second_rates(state, flows, force, unseen, rig))
+        flows, force, disturbance_force = rng.normal(0, 2, 4), rng.normal(0, 30, 2), rng.normal(0, 20, 2)
+        found.append(numbers(model.rates(*map(casadi.DM, (state, flows, force, disturbance_force)))))
+        expected.append(second_rates(state, flows, force, disturbance_force, rig))
     size = np.abs(expected).max(axis=0)
     assert np.all(size > [0.1, 0.1, 5, 5, 5, 5, 5, 5])
     np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=1e-9)
 
 
 def stepped(model: ControlModel, state: Array, flows: Array, commanded: Array, pushes: Array, times: list[float]) -> Array:
-    """State and flows (12,) after steps of these ``times``; ``pushes`` (4,): the user's force, then that unseen."""
+    """State and flows (12,) after steps of these ``times``; ``pushes`` (4,): the user's force, then that disturbance_force."""
     now, flowing, held = casadi.DM(state), casadi.DM(flows), (casadi.DM(pushes[:2]), casadi.DM(pushes[2:]))
     for time in times:
         now, flowing = model.step(now, flowing, casadi.DM(commanded), *held, time)
@@ -149,14 +149,14 @@ class Case:
     state: Array
     flows: Array
     force: Array
-    unseen: Array
+    disturbance_force: Array
     motion: Array
     asked: Array
     commanded: Array
 
     @property
     def given(self) -> Array:
-        nodes = [part.ravel() for part in (self.unseen, self.motion, self.asked)]
+        nodes = [part.ravel() for part in (self.disturbance_force, self.motion, self.asked)]
         return np.concatenate([self.state, self.flows, self.force, *nodes])
 
 
@@ -177,7 +177,7 @@ def written_out(case: Case, rig: Parameters, last: float, unit: float) -> Array:
     """The residuals (10 M,) as the module's documentation states them."""
     model, state, flows, before, found = ControlModel(rig), case.state, case.flows, case.flows, []
     for k, time in enumerate(HORIZON):
-        pushes = np.concatenate([case.force, case.unseen[k]])
+        pushes = np.concatenate([case.force, case.disturbance_force[k]])
         state, flows = np.split(stepped(model, state, flows, case.commanded[k], pushes, [time]), [8])
         weight = np.sqrt((last if k == NODES - 1 else 1.0) * time / unit)
         away = seen_from_outside(state, rig) - np.concatenate([case.motion[k], case.asked[k]])
@@ -210,8 +210,10 @@ def test_a_plan_that_keeps_the_balance_leaves_no_residual() -> None:
             state = np.concatenate([now.piston[:, lane], np.zeros(2), now.pressures[:, lane] / PRESSURE])
             target = np.concatenate([rigid_body.pose_of(now.piston, rig).end_effector[:, lane], np.zeros(2)])
             for force in (np.zeros(2), push):
-                unseen, asked = np.tile(-jacobian.T @ force, (NODES, 1)), np.tile(now.stiffness[:, lane], (NODES, 1))
-                case = Case(state, np.zeros(4), force, unseen, np.tile(target, (NODES, 1)), asked, np.zeros((NODES, 4)))
+                disturbance_force, asked = np.tile(-jacobian.T @ force, (NODES, 1)), np.tile(now.stiffness[:, lane], (NODES, 1))
+                case = Case(
+                    state, np.zeros(4), force, disturbance_force, np.tile(target, (NODES, 1)), asked, np.zeros((NODES, 4))
+                )
                 found = numbers(function(case.commanded.ravel(), case.given)[0])
                 np.testing.assert_allclose(found, 0, rtol=0, atol=1e-7)
 
@@ -221,7 +223,7 @@ def test_what_comes_later_changes_nothing_before() -> None:
     rig, case = TILTED, drawn(TILTED, 4)
     function = residuals(rig, HORIZON, TOLERANCES)
     base = numbers(function(case.commanded.ravel(), case.given)[0]).reshape(NODES, NODE)
-    stays = {"commanded": False, "unseen": False, "motion": True, "asked": True}
+    stays = {"commanded": False, "disturbance_force": False, "motion": True, "asked": True}
     for name, only_there in stays.items():
         changed = dataclasses.replace(case, **{name: getattr(case, name).copy()})
         getattr(changed, name)[1] += 0.1

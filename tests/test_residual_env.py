@@ -117,7 +117,9 @@ def unguarded(monkeypatch):
         ("admittance-backstepping", 25.0, 0.028, 0.001),
     ],
 )
-def test_a_held_action_becomes_a_believed_force_and_its_rate_through_the_low_pass(law, authority, constant, period, unguarded):
+def test_a_held_action_becomes_a_feedforward_force_and_its_rate_through_the_low_pass(
+    law, authority, constant, period, unguarded
+):
     """z' = (a - z)/T at 1 kHz: after n periods z = a (1 - exp(-n ms/T)), and the force changes at authority (a - z)/T."""
     steps, periods, action = 40, round(1000 * period), np.array([0.75, -0.5], np.float32)
     whole = authority * action.astype(np.float64)
@@ -157,7 +159,7 @@ def told(monkeypatch):
     return beliefs
 
 
-def test_the_believed_force_never_exceeds_the_authority_and_changes_at_the_control_rate(told, unguarded):
+def test_the_feedforward_force_never_exceeds_the_authority_and_changes_at_the_control_rate(told, unguarded):
     env = lanes(4, authority=25.0, time_constant=0.02)
     env.reset(seed=0)
     actions = np.sign(random_actions(50, 4, seed=4))
@@ -198,7 +200,7 @@ def test_oscillation_costs_authority_and_what_is_left_is_seen(told):
         np.testing.assert_allclose(rate, 400 * shares[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
 
 
-def test_an_ended_lane_starts_its_next_episode_with_no_believed_force(told, unguarded):
+def test_an_ended_lane_starts_its_next_episode_with_no_feedforward_force(told, unguarded):
     # Lane 1 hits the end stop; the others go on with what they had been told.
     env = lanes(3, PROBE, authority=500.0, time_constant=0.014, duration=2.0)
     env.reset(seed=0)

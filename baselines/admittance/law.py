@@ -3,7 +3,7 @@
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
     L_i = F_i - Fext_i - Fv v_i + unseen_i
-with the unseen forces of ``awareness``: believed friction and what an observer finds besides.
+with the disturbance forces of ``state_estimator``: believed friction and what an observer finds besides.
 
 - While pistons rest (``observers``) position errors weigh ``rest_push`` times as much, since stiction, not inertia, has to be
   overcome, and those within ``dead_zone`` move nothing. Once the reference rests the loop has a gain of its own, softer: what
@@ -101,15 +101,15 @@ def beyond(error: float, zone: float) -> float:
 
 @kernel
 def command(
-    joints: Array, pressures: Array, motion: Array, target: Array, force: Array, unseen: Array, rest: Array, moving: Array,
-    spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float, dead_zone: float,
+    joints: Array, pressures: Array, motion: Array, target: Array, force: Array, disturbance_force: Array, rest: Array,
+    moving: Array, spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float, dead_zone: float,
     quickness: float, level: float, fall: float, least: float, c4: float, told: Array, memory: Array, openings: Array,
 ) -> None:  # fmt: skip
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
-    ``joints``, ``pressures``, ``motion``, ``force``, ``unseen``, ``rest``, ``moving`` and ``spools`` are those of
-    ``awareness.Situation``; ``target`` (15, N) is the reference; ``told`` what
-    ``controller.told_of`` gives.
+    ``joints``, ``pressures``, ``motion``, ``force``, ``disturbance_force``, ``rest``, ``moving`` and ``spools`` are those of
+    ``state_estimator.Estimate``; ``target`` (15, N) is the reference; ``told`` what
+    ``controller.feedforward_rows`` gives.
     """
     u, kept = np.empty((4, 1)), exact.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
@@ -123,7 +123,7 @@ def command(
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1
         load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2
-        load1, load2 = load1 + unseen[0, i] + told[0, i], load2 + unseen[1, i] + told[1, i]
+        load1, load2 = load1 + disturbance_force[0, i] + told[0, i], load2 + disturbance_force[1, i] + told[1, i]
 
         # Across (t) and along (n) cylinder 2: errors of position, speed and acceleration.
         ex, ey = r2 * sine - motion[0, i], -r2 * cosine - motion[1, i]

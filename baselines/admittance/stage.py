@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from baselines.admittance import law as admittance_law
 from baselines.estimation import admittance, chamber_observer, disturbance_observer, reference_friction
-from baselines.estimation.awareness import MOVING_SPEED, unseen_forces
 from baselines.estimation.observers import REST, observe
+from baselines.estimation.state_estimator import MOVING_SPEED, disturbance_forces
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
@@ -51,7 +51,7 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     p, period, g, sampled = about[NUMBERS:], about[PERIOD], about[GAIN:NUMBERS], about[SAMPLED] > 0.0
     m = block(memory, PISTONS + int(about[ROWS]))[:, :n]
     own = scratch(17)[:, :n]
-    motion, believed, disturbance, unseen = own[:8], own[8:10], own[10:12], own[12:14]
+    motion, believed, disturbance, disturbance_force = own[:8], own[8:10], own[10:12], own[12:14]
     rest, moving, force, missed = own[14:16], own[16], s[USER_FORCE:REFERENCE, :n], 0
     target, told = s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n]
     for i in range(n):
@@ -91,11 +91,11 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
             pistons[4, i] = 0.0
             for k in range(2):
                 disturbance[k, i] = pistons[2 + k, i]
-    unseen_forces(joints, believed, disturbance, p, unseen)
+    disturbance_forces(joints, believed, disturbance, p, disturbance_force)
     openings = s[OPENING:SHOWN, :n]
     admittance_law.command(
-        joints, pressures, motion, target, force, unseen, rest, moving, spools, p, period, g[0], g[1], g[2], g[3], g[4], g[5],
-        g[6], g[7], about[PNEUMATIC], told, m[LAW : LAW + admittance_law.MEMORY], openings,
+        joints, pressures, motion, target, force, disturbance_force, rest, moving, spools, p, period, g[0], g[1], g[2], g[3],
+        g[4], g[5], g[6], g[7], about[PNEUMATIC], told, m[LAW : LAW + admittance_law.MEMORY], openings,
     )  # fmt: skip
     for valve in range(4):
         for i in range(n):

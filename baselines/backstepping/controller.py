@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
-from baselines.controller import lanes_of, told_of
+from baselines.controller import feedforward_rows, lanes_of
 from baselines.estimation.observers import BANDWIDTH, FRESH, PistonObserver, measured_joints, memory_rows, observe
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import (
@@ -184,15 +184,15 @@ class BacksteppingController(StagedController):
         self,
         measurement: Measurement,
         reference: Reference,
-        believed_force: Array | None = None,
-        believed_rate: Array | None = None,
+        feedforward_force: Array | None = None,
+        feedforward_rate: Array | None = None,
         damping_factor: Array | None = None,
     ) -> LawTerms:
         """What ``command`` would want with the same signals, over N lanes.
 
         Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
         """
-        joints, believed = self._joints(measurement, reference, believed_force, believed_rate, damping_factor)
+        joints, believed = self._joints(measurement, reference, feedforward_force, feedforward_rate, damping_factor)
         lanes = joints.shape[1]
         wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
         gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
@@ -207,7 +207,7 @@ class BacksteppingController(StagedController):
     ) -> tuple[Array, Array]:
         """y1, y2, v1, v2 (4, N), and what the law is told (TOLD, N), from signals whose shapes are checked."""
         lanes = lanes_of(measurement, reference)
-        told = told_of(lanes, force, rate, factor)
+        told = feedforward_rows(lanes, force, rate, factor)
         if measurement.sampled:
             return np.ascontiguousarray(self._observer.update(measurement)), told
         return measured_joints(measurement, self._p), told

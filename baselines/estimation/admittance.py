@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import require_stiffness, told_of
+from baselines.controller import feedforward_rows, require_stiffness
 from birthsim_env.parts.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
@@ -143,7 +143,7 @@ class Admittance:
         lanes = reference.rows.shape[1]
         if self._offset.shape[1] != lanes:
             self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)
-        motion, factor = np.empty((8, lanes)), told_of(lanes, None, None, damping_factor)[4]
+        motion, factor = np.empty((8, lanes)), feedforward_rows(lanes, None, None, damping_factor)[4]
         give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
         self._fresh[:] = 0.0
         return motion

@@ -71,8 +71,8 @@ class ControlModel:
         half = cylinder.stroke / 2
         return self.casadi.fmax(half + y, LEAST_LENGTH), self.casadi.fmax(half - y, LEAST_LENGTH)
 
-    def rates(self, state: Any, flows: Any, force: Any, unseen: Any) -> Any:
-        """d(state)/dt; ``force`` (2,), N, is the user's, ``unseen`` (2,), N, acts along the pistons besides."""
+    def rates(self, state: Any, flows: Any, force: Any, disturbance_force: Any) -> Any:
+        """d(state)/dt; ``force`` (2,), N, is the user's, ``disturbance_force`` (2,), N, acts along the pistons besides."""
         air, mass, gravity = self.rig.air, self.rig.mechanics.mass, self.rig.mechanics.gravity
         y, v = (state[0], state[1]), (state[2], state[3])
         r4, r2, w, s2, kappa, sine, cosine = self.pose(*y)
@@ -86,7 +86,7 @@ class ControlModel:
             pp, pn = PRESSURE * state[4 + 2 * i], PRESSURE * state[5 + 2 * i]
             qp, qn, ap, an = FLOW * flows[2 * i], FLOW * flows[2 * i + 1], cylinder.area_p, cylinder.area_n
             held = plain(mechanics.piston_force)(pp, pn, ap, an, air.atmospheric_pressure)
-            loads.append(held - cylinder.viscous_friction * v[i] + users[i] + unseen[i])
+            loads.append(held - cylinder.viscous_friction * v[i] + users[i] + disturbance_force[i])
             dead, lengths = self.rig.chambers.dead_volume, self.lengths(cylinder, y[i])
             rate_p = plain(control_model.polytropic_rate_p)(pp, qp, v[i], ap, lengths[0] + dead / ap, index, gas_t)
             rate_n = plain(control_model.polytropic_rate_n)(pn, qn, v[i], an, lengths[1] + dead / an, index, gas_t)
@@ -95,14 +95,14 @@ class ControlModel:
         a2 = plain(mechanics.acceleration2)(loads[1], v[0], r2, r4, s2, cosine, 1 / mass, gravity)
         return self.casadi.vertcat(*v, a1, a2, *pressure_rates)
 
-    def step(self, state: Any, flows: Any, commanded: Any, force: Any, unseen: Any, time: float) -> tuple[Any, Any]:
+    def step(self, state: Any, flows: Any, commanded: Any, force: Any, disturbance_force: Any, time: float) -> tuple[Any, Any]:
         """State and flows after ``time``, s, in which the flows follow the ``commanded`` ones."""
         kept = np.exp(-time / 2 / self.rig.valves.time_constant)
         middle, end = commanded + kept * (flows - commanded), commanded + kept**2 * (flows - commanded)
-        k1 = self.rates(state, flows, force, unseen)
-        k2 = self.rates(state + time / 2 * k1, middle, force, unseen)
-        k3 = self.rates(state + time / 2 * k2, middle, force, unseen)
-        k4 = self.rates(state + time * k3, end, force, unseen)
+        k1 = self.rates(state, flows, force, disturbance_force)
+        k2 = self.rates(state + time / 2 * k1, middle, force, disturbance_force)
+        k3 = self.rates(state + time / 2 * k2, middle, force, disturbance_force)
+        k4 = self.rates(state + time * k3, end, force, disturbance_force)
         return state + time / 6 * (k1 + 2 * k2 + 2 * k3 + k4), end
 
     def end_effector(self, state: Any) -> tuple[Any, Any, Any, Any]:
@@ -131,11 +131,11 @@ def residuals(rig: Parameters, steps: Sequence[float], tolerances: Mapping[str, 
     casadi = symbols()
     model, count = ControlModel(rig), len(steps)
     symbol = casadi.SX.sym
-    start, flowing, force, unseen = symbol("x", STATE), symbol("q", FLOWS), symbol("f", 2), symbol("d", 2, count)
+    start, flowing, force, disturbance_force = symbol("x", STATE), symbol("q", FLOWS), symbol("f", 2), symbol("d", 2, count)
     motion, asked, commanded = symbol("r", 4, count), symbol("K", 2, count), symbol("u", FLOWS, count)
     state, flows, before, found = start, flowing, flowing, []
     for k, time in enumerate(steps):
-        state, flows = model.step(state, flows, commanded[:, k], force, unseen[:, k], time)
+        state, flows = model.step(state, flows, commanded[:, k], force, disturbance_force[:, k], time)
         weight = np.sqrt(time / NODES_WEIGH * (LAST if k == count - 1 else 1.0))
         x, y, vx, vy = model.end_effector(state)
         found += [weight / tolerances["position"] * (x - motion[0, k]), weight / tolerances["position"] * (y - motion[1, k])]
@@ -145,7 +145,7 @@ def residuals(rig: Parameters, steps: Sequence[float], tolerances: Mapping[str, 
         found.append(FLOW / tolerances["flow"] * (commanded[:, k] - before))
         before = commanded[:, k]
     stacked, inputs = casadi.vertcat(*found), casadi.vec(commanded)
-    given = casadi.vertcat(start, flowing, force, casadi.vec(unseen), casadi.vec(motion), casadi.vec(asked))
+    given = casadi.vertcat(start, flowing, force, casadi.vec(disturbance_force), casadi.vec(motion), casadi.vec(asked))
     slopes = casadi.densify(casadi.jacobian(stacked, inputs))
     names = (["commanded", "given"], ["residuals", "slopes"])
     return casadi.Function("residuals", [inputs, given], [stacked, slopes], *names)

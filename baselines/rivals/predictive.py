@@ -3,7 +3,7 @@
 At every control period the flows into the four chambers are planned over a horizon of ``prediction``, with the least sum of
 squares of its residuals within what the valves can give: one Gauss-Newton step from the plan of the period before (real-time
 iteration), a quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their
-characteristic. Motion, friction and disturbances are those of ``awareness``, as for ``admittance-backstepping``.
+characteristic. Motion, friction and disturbances are those of ``state_estimator``, as for ``admittance-backstepping``.
 
 These commands found the tolerances (with ideal, then with lab and 16 trials) by the search that birthsim-tune had before it
 used Optuna. It was as short as its trials are long; the best was the same for both:
@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.controller import check_gains, lanes_of
-from baselines.estimation.awareness import Awareness, Situation
+from baselines.estimation.state_estimator import Estimate, StateEstimator
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
 from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
@@ -81,7 +81,7 @@ class NonlinearMPC:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
             speed_tolerance, m/s, stiffness_tolerance, N/m, and flow_tolerance, kg/s, what counts as much as a position error
-            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_share of ``Awareness``.
+            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_share of ``StateEstimator``.
 
     Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
     """
@@ -120,7 +120,7 @@ class NonlinearMPC:
         self.parameters = load_parameters(parameters)
         self._p, self._period = parameter_column(self.parameters), self.parameters.electronics.control_period
         chosen = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
-        self._awareness = {kind: Awareness(self.parameters, kind == "lab", own) for kind, own in chosen.items()}
+        self._estimator = {kind: StateEstimator(self.parameters, kind == "lab", own) for kind, own in chosen.items()}
         periods = np.maximum(np.round(np.array(STEPS) / self._period), 1)
         self._steps, self._ticks = periods * self._period, np.cumsum(periods).astype(np.int64)
         self._planners = {kind: self._planner(own) for kind, own in chosen.items()}
@@ -133,8 +133,8 @@ class NonlinearMPC:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        for awareness in self._awareness.values():
-            awareness.reset(lanes)
+        for estimator in self._estimator.values():
+            estimator.reset(lanes)
         if lanes is None:
             self._plan = np.empty((0, 0))
         elif len(self._plan):
@@ -150,24 +150,24 @@ class NonlinearMPC:
             return self.command(*one_lane(measurement, reference))[:, 0]
         lanes, count = lanes_of(measurement, reference), len(self._steps)
         kind = "lab" if measurement.sampled else "ideal"
-        awareness, planner = self._awareness[kind], self._planners[kind]
-        now = awareness.update(measurement, reference)
+        estimator, planner = self._estimator[kind], self._planners[kind]
+        now = estimator.update(measurement, reference)
         if len(self._plan) != lanes:
             self._plan = np.zeros((lanes, FLOWS * count))
         low, high, flows = (q / FLOW for q in flow_ranges(now.pressures, now.spools, self._p))
-        given = self._given(now, reference, flows, *awareness.forecast(now, reference, self._ticks))
+        given = self._given(now, reference, flows, *estimator.forecast(now, reference, self._ticks))
         for lane in range(lanes):
             self._plan[lane] = planner.improve(self._plan[lane], given[:, lane], low[:, lane], high[:, lane])
         openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), now.pressures, self._p)
         self._advance_plan()
-        awareness.commanded(openings)
+        estimator.commanded(openings)
         return openings
 
-    def _given(self, now: Situation, reference: Reference, flows: Array, ahead: Array, unseen: Array) -> Array:
+    def _given(self, now: Estimate, reference: Reference, flows: Array, ahead: Array, disturbance_force: Array) -> Array:
         """What ``residuals`` asks for, (G, N)."""
         times = self._period * self._ticks[:, None, None]
         asked = reference.pneumatic_stiffness + times * reference.pneumatic_stiffness_rate
-        nodes = [along.reshape(-1, along.shape[2]) for along in (unseen, ahead, asked)]
+        nodes = [along.reshape(-1, along.shape[2]) for along in (disturbance_force, ahead, asked)]
         return np.concatenate([now.joints, now.pressures / PRESSURE, flows, now.force, *nodes])
 
     def _advance_plan(self) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from baselines.controller import check_gains, lanes_of
 from baselines.estimation.admittance import Admittance
-from baselines.estimation.awareness import is_moving
 from baselines.estimation.observers import PistonObserver
+from baselines.estimation.state_estimator import is_moving
 from baselines.rivals.feedforward import NEEDED, prepare
 from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.compilation import helper

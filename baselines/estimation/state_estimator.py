@@ -36,8 +36,8 @@ BELIEVED_LIMIT = 120.0
 
 
 @kernel
-def unseen_forces(joints: Array, believed: Array, disturbance: Array, p: Array, unseen: Array) -> None:
-    """Writes ``unseen`` (2, N), N: what is ``believed`` to act along the pistons, and what their ``disturbance`` adds, m/s2."""
+def disturbance_forces(joints: Array, believed: Array, disturbance: Array, p: Array, force: Array) -> None:
+    """Writes ``force`` (2, N), N: what is ``believed`` to act along the pistons, and what their ``disturbance`` adds, m/s2."""
     for i in range(joints.shape[1]):
         kappa = geometry.pose(
             joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
@@ -45,16 +45,16 @@ def unseen_forces(joints: Array, believed: Array, disturbance: Array, p: Array, 
         for cylinder in range(2):
             mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
             observed = max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, mass * disturbance[cylinder, i]))
-            unseen[cylinder, i] = believed[cylinder, i] + observed
+            force[cylinder, i] = believed[cylinder, i] + observed
 
 
 @dataclass(frozen=True)
-class Situation:
+class Estimate:
     """N lanes at one instant. ``motion`` (8, N): x and y that are wanted and three derivatives, SI; ``force`` (2, N), N, the
     user's; ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
     ``believed`` (2, N), N, what acts along the pistons besides, ``disturbance`` (2, N), m/s2, what still accelerates them
-    unexplained, and ``unseen`` (2, N), N, both together; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N) how far each
-    piston is taken to rest, 0 to 1. The arrays are good until the next ``update``."""
+    unexplained, and ``disturbance_force`` (2, N), N, both together; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N)
+    how far each piston is taken to rest, 0 to 1. The arrays are good until the next ``update``."""
 
     motion: Array
     force: Array
@@ -63,7 +63,7 @@ class Situation:
     spools: Array
     believed: Array
     disturbance: Array
-    unseen: Array
+    disturbance_force: Array
     moving: Array
     rest: Array
 
@@ -74,8 +74,8 @@ def is_moving(motion: Array) -> Array:
     return np.asarray(square > MOVING_SPEED * MOVING_SPEED, dtype=np.float64)
 
 
-class Awareness:
-    """The ``Situation`` of N lanes, one control period at a time, for one kind of sensors.
+class StateEstimator:
+    """The ``Estimate`` of N lanes, one control period at a time, for one kind of sensors.
 
     Arguments: the rig as believed; ``sampled``, whether positions are samples; ``gains`` with bandwidth, 1/s, of the observer
     of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_share, how much of the
@@ -98,7 +98,7 @@ class Awareness:
         for part in (self._admittance, self._friction, self._chambers, self._pistons):
             part.reset(lanes)
 
-    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Situation:
+    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Estimate:
         """Take one control period's signals over N lanes. ``damping_factor`` (N,) multiplies the damping of the motion.
 
         Raises ``ValueError`` for signals over different numbers of lanes, and a stiffness that is not positive definite.
@@ -118,17 +118,17 @@ class Awareness:
         else:
             self._joints, rest = pistons.update(measurement, force, believed), np.zeros((2, lanes))
         disturbance = np.ascontiguousarray(pistons.disturbance)
-        unseen = np.empty((2, lanes))
-        unseen_forces(self._joints, believed, disturbance, self._p, unseen)
+        disturbance_force = np.empty((2, lanes))
+        disturbance_forces(self._joints, believed, disturbance, self._p, disturbance_force)
         spools = self._chambers.spools
-        return Situation(motion, force, self._joints, pressures, spools, believed, disturbance, unseen, moving, rest)
+        return Estimate(motion, force, self._joints, pressures, spools, believed, disturbance, disturbance_force, moving, rest)
 
-    def forecast(self, now: Situation, reference: Reference, ticks: NDArray[np.int64]) -> tuple[Array, Array]:
+    def forecast(self, now: Estimate, reference: Reference, ticks: NDArray[np.int64]) -> tuple[Array, Array]:
         """The motion's x, y (m), vx, vy (m/s), (M, 4, N), and the forces unseen along it, N, (M, 2, N), so many periods after
         ``now``, the last situation: friction follows the motion, what was observed besides stays."""
         ahead = self._admittance.forecast(reference, now.force, ticks)
         friction = self._friction.forecast(ahead, ticks)
-        return ahead, now.unseen - now.believed - self._friction_share * friction
+        return ahead, now.disturbance_force - now.believed - self._friction_share * friction
 
     def commanded(self, openings: Array) -> None:
         """What the valves are told until the next ``update``: openings (4, N)."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.estimation.awareness import BELIEVED_LIMIT, MOVING_SPEED, Awareness, Situation
+from baselines.estimation.state_estimator import BELIEVED_LIMIT, MOVING_SPEED, Estimate, StateEstimator
 from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import PRESSURES, SPOOLS, Array, parameter_array
@@ -27,8 +27,8 @@ PISTON = np.array([[0.02, -0.04], [-0.05, 0.08]])
 either = pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
 
 
-def aware(sampled: bool, rig: Parameters = RIG, **gains: float) -> Awareness:
-    return Awareness(rig, sampled, {**GAINS, **gains})
+def aware(sampled: bool, rig: Parameters = RIG, **gains: float) -> StateEstimator:
+    return StateEstimator(rig, sampled, {**GAINS, **gains})
 
 
 def balanced(piston: Array, rig: Parameters = RIG) -> Array:
@@ -183,7 +183,7 @@ def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() ->
     assert np.abs(found[150.0, 1.0] - found[150.0, 0.0]).min() > 1e-4
 
 
-def copied(now: Situation) -> dict[str, Array]:
+def copied(now: Estimate) -> dict[str, Array]:
     return {name: np.array(value) for name, value in vars(now).items()}
 
 
@@ -254,9 +254,9 @@ def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> Non
     part.update(seen(0, PISTON, pressures, user, False), wanted)
     part._pistons._estimate[2:4] = force / mass
     now = part.update(seen(1, PISTON, pressures, user, False), wanted)
-    np.testing.assert_allclose(now.unseen[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
-    np.testing.assert_allclose(now.unseen[:, 0], force[:, 0], rtol=0.05)
-    np.testing.assert_array_equal(now.unseen[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
+    np.testing.assert_allclose(now.disturbance_force[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(now.disturbance_force[:, 0], force[:, 0], rtol=0.05)
+    np.testing.assert_array_equal(now.disturbance_force[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
 
 
 def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:
@@ -290,21 +290,21 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
         np.arange(1, 26),
     )
 
-    def both(tick: int) -> tuple[Situation, Situation]:
+    def both(tick: int) -> tuple[Estimate, Estimate]:
         measured, wanted = turning(tick, push)
         measured = dataclasses.replace(measured, sampled=sampled)
         return part.update(measured, wanted), kept.update(measured, wanted)
 
     for tick in range(401):
         now, _ = both(tick)
-    observed, believed = now.unseen - now.believed, now.believed.copy()
+    observed, believed = now.disturbance_force - now.believed, now.believed.copy()
     assert np.abs(observed).min() > 1
-    ahead, unseen = part.forecast(now, turning(400, push)[1], ticks)
+    ahead, disturbance_force = part.forecast(now, turning(400, push)[1], ticks)
     later = []
     for k, tick in enumerate(ticks):
         now, other = both(400 + tick)
         np.testing.assert_allclose(ahead[k], now.motion[:4], rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(unseen[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(disturbance_force[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
         assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
         later.append(now.believed - believed)
     assert np.all(np.abs(later).max(axis=0) >= 10 * share)
