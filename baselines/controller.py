@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 
 

@@ -17,8 +17,8 @@ from birthsim_env.loop.rows import (
     REFERENCE,
     fill_measurement,
 )
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 

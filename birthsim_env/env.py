@@ -13,7 +13,7 @@ from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_o
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.reward import REWARD_TERMS
 
 _ONE = np.ones(1, dtype=np.bool_)

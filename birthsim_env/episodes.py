@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from birthsim_env import reward
 from birthsim_env.assembly import Setup
 from birthsim_env.drawing.scene import Scene
+from birthsim_env.loop.signals import Mask
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.seeding import lane_seeds
-from birthsim_env.parts.signals import Mask
 from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env.parts.signals import compliance
+from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import control_model, dynamics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel

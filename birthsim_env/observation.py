@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.parts.signals import Measurement, Reference, compliance
+from birthsim_env.loop.signals import Measurement, Reference, compliance
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel

@@ -27,8 +27,8 @@ from birthsim_env.loop.rows import (
     VELOCITY,
     WORLD,
 )
+from birthsim_env.loop.signals import REFERENCES, Mask, compliance
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, singles, table2
-from birthsim_env.parts.signals import REFERENCES, Mask, compliance
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from birthsim_env.parts.signals import compliance
+from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import exact
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel

@@ -30,6 +30,7 @@ from birthsim_env.loop.rows import (
     fill_measurement,
     measurement_of,
 )
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
@@ -37,7 +38,6 @@ from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.randomization import Ranges, draw_columns
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.user_forces import UserForce, forces_of
 from birthsim_env.parts.worlds import begin, worlds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from birthsim_env.parts.signals import compliance
+from birthsim_env.loop.signals import compliance
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
 

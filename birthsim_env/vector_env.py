@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import vector_info
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.reward import REWARD_TERMS
 

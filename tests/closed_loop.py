@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.bench import probes
-from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
 from birthsim_env.physics.lanes import Array

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from scipy.optimize import brentq
 
-from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Cylinder, Parameters
 from tests import linkage_by_points as by_points

@@ -7,7 +7,7 @@ import numpy as np
 from agents.residual import authority, unexplained
 from baselines.estimation.disturbance_observer import DisturbanceObserver
 from baselines.estimation.observers import PistonObserver
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 

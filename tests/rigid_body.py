@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from birthsim_env.parts.signals import Measurement
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from tests import derived_law

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, sqrtm
 
 from baselines.estimation.admittance import DAMPING_RATIO, Admittance, square_root
-from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 

@@ -9,7 +9,7 @@ import pytest
 
 from baselines.admittance import law as admittance_law
 from baselines.admittance.controller import LEAST_SHARE, AdmittanceBackstepping
-from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.parameters import Parameters

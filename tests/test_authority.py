@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents.residual.authority import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING
-from birthsim_env.parts.signals import REFERENCES, Reference
+from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 from tests import linkage_by_points as by_points

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from baselines import BacksteppingController
 from baselines.backstepping.gains import closed_loop_damping, closed_loop_stiffness
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import mechanics
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.geometry import joint_force
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

@@ -16,7 +16,7 @@ from birthsim_env.physics.compilation import source_stamp
 ROOT = Path(__file__).parent.parent
 PROBE = """
 from birthsim_env.physics.compilation import kernel
-from birthsim_env.parts.signals import compliance
+from birthsim_env.loop.signals import compliance
 
 @kernel
 def displaced(force, x):
@@ -40,12 +40,12 @@ def package(tmp_path):
     folder.mkdir()
     for name in (
         "physics/compilation",
-        "parts/signals",
+        "loop/signals",
         *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "exact", "valves")),
     ):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
-    for room in (folder, folder / "physics", folder / "parts"):
+    for room in (folder, folder / "physics", folder / "loop"):
         (room / "__init__.py").touch()
     (folder / "probe.py").write_text(PROBE)
     return folder
@@ -64,7 +64,7 @@ def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(pack
     assert displaced(package) == (pytest.approx(5.17), True)
     assert displaced(package) == (pytest.approx(5.17), False)
     (kept,) = package.rglob("*.nbc")
-    signals = package / "parts" / "signals.py"
+    signals = package / "loop" / "signals.py"
     # The helper is made by ``helper(displacement)``: no decorator stands in that file.
     signals.write_text(signals.read_text().replace("kx * ky - kxy * kxy", "2.0 * (kx * ky - kxy * kxy)"))
     assert displaced(package) == (pytest.approx(2.585), True)

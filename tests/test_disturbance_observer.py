@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from baselines.estimation.disturbance_observer import DisturbanceObserver
-from birthsim_env.parts.signals import Measurement
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 from tests import linkage_by_points as by_points

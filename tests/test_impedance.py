@@ -15,8 +15,8 @@ from agents.residual.law import MOST_DAMPING, SOFTEST, STIFFENING, STIFFEST, Res
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env import Parameters
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import Plant
 from tests import closed_loop

@@ -10,7 +10,7 @@ import pytest
 from baselines import BacksteppingController
 from baselines.backstepping.lyapunov import PNEUMATIC_UNIT, LyapunovFunction, LyapunovValue
 from baselines.backstepping.strict_feedback import strict_feedback_rates
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

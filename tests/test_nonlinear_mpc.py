@@ -16,7 +16,7 @@ from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
 from baselines.rivals.predictive import Planner
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import PRESSURES, Array
 from birthsim_env.physics.parameters import Parameters

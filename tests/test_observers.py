@@ -10,8 +10,8 @@ import pytest
 
 from baselines import BacksteppingController
 from baselines.estimation.observers import PistonObserver
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters

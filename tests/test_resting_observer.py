@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from baselines.estimation.observers import RELUCTANCE, REST_BANDWIDTH, REST_TIME
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.lanes import PRESSURES, Array, parameter_array

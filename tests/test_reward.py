@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from birthsim_env import StiffnessSchedule, reward
-from birthsim_env.parts.signals import REFERENCES
+from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
 
 CIRCLE, PROBE, FORCEPS, DESCENT = (f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Forceps", "Descent"))

@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
 from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, prepare
 from baselines.rivals.tracking import TrackingController
-from birthsim_env.parts.signals import Reference
+from birthsim_env.loop.signals import Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters

@@ -15,8 +15,8 @@ from baselines import BacksteppingController
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import TrackingController, beyond
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

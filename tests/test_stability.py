@@ -28,7 +28,7 @@ from baselines.bench.stability import (
     stable_up_to,
 )
 from baselines.figures.stability import _border, _edges, stability_figure
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import STATES, Array

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.estimation.state_estimator import BELIEVED_LIMIT, MOVING_SPEED, Estimate, StateEstimator
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import PRESSURES, SPOOLS, Array, parameter_array
 from birthsim_env.physics.parameters import Parameters

@@ -9,8 +9,8 @@ import pytest
 
 from agents.residual.unexplained import MOVING, ROWS
 from baselines.admittance.controller import AdmittanceBackstepping
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.parts.signals import Measurement, Reference
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

@@ -14,7 +14,7 @@ from agents.residual.law import ResidualLaw, observation_names
 from agents.residual.settings import ResidualSettings
 from birthsim_env import observation
 from birthsim_env.assembly import policy_periods
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
 

@@ -20,9 +20,9 @@ from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import quantile
 from baselines.controller import Controller
+from birthsim_env.loop.signals import displacement
 from birthsim_env.parts.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.references import Circle, Hold, Trajectory
-from birthsim_env.parts.signals import displacement
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.user_forces import ForceProfile
 from birthsim_env.physics import lanes as at

@@ -35,9 +35,9 @@ from birthsim_env.loop.rows import (
     USER_FORCE,
     VELOCITY,
 )
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import PARAMETERS, Array

@@ -21,7 +21,7 @@ from baselines.controller import check_gains, require_stiffness
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.observers import FRESH, memory_rows
 from baselines.staged import LawStage, StagedController
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import exact
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

@@ -10,7 +10,7 @@ from baselines.backstepping import cartesian_law
 from baselines.backstepping.controller import PNEUMATIC_GAIN, SIGN_WIDTH
 from baselines.controller import lanes_of, require_stiffness
 from baselines.estimation.observers import PistonObserver, measured_joints
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
 

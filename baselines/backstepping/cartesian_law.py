@@ -18,7 +18,7 @@ import numpy as np
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import square_root
 from baselines.valve_inverse import force_first_openings
-from birthsim_env.parts.signals import REFERENCES
+from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import BLOCK, helper, kernel

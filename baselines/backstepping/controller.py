@@ -27,9 +27,9 @@ from birthsim_env.loop.rows import (
     USER_FORCE,
     VELOCITY,
 )
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
-from birthsim_env.parts.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion

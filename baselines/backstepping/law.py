@@ -19,7 +19,7 @@ import numpy as np
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
 from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
-from birthsim_env.parts.signals import REFERENCES
+from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import BLOCK, helper, kernel

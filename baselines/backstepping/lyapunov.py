@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.backstepping.controller import BacksteppingController
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

@@ -12,9 +12,9 @@ import numpy as np
 
 from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import Array

@@ -15,9 +15,9 @@ import numpy as np
 from baselines.bench.probes import Window, board_limit
 from baselines.controller import Controller
 from baselines.registry import make_controller
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.parts.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry

@@ -19,7 +19,7 @@ from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.bench.tasks import Result, Task
 from baselines.registry import make_controller
-from birthsim_env.parts.signals import Mask, displacement
+from birthsim_env.loop.signals import Mask, displacement
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.controller import feedforward_rows, require_stiffness
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters

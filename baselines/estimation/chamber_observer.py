@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.valve_inverse import driving_flows
-from birthsim_env.parts.signals import Mask
+from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import control_model, exact, valves
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import helper, kernel

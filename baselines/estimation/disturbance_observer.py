@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env.parts.signals import Mask, Measurement
+from birthsim_env.loop.signals import Mask, Measurement
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.parts.signals import Mask
+from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import friction
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import helper, kernel

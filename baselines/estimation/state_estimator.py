@@ -20,7 +20,7 @@ from baselines.estimation.chamber_observer import ChamberObserver
 from baselines.estimation.disturbance_observer import DisturbanceObserver
 from baselines.estimation.observers import PistonObserver
 from baselines.estimation.reference_friction import ReferenceFriction
-from birthsim_env.parts.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics.compilation import kernel

@@ -21,7 +21,7 @@ from baselines.controller import check_gains, lanes_of
 from baselines.estimation.state_estimator import Estimate, StateEstimator
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
 

@@ -14,7 +14,7 @@ from baselines.estimation.admittance import Admittance
 from baselines.estimation.observers import PistonObserver
 from baselines.estimation.state_estimator import is_moving
 from baselines.rivals.feedforward import NEEDED, prepare
-from birthsim_env.parts.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.compilation import helper
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters

@@ -6,7 +6,7 @@ state stand at the beginning of the world, in the order of ``physics.lanes``.
 
 from __future__ import annotations
 
-from birthsim_env.parts.signals import REFERENCES, Measurement
+from birthsim_env.loop.signals import REFERENCES, Measurement
 from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 
 STATE = PARAMETERS

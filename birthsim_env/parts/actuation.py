@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from birthsim_env.loop.rows import ACTION, OPENING, SEEN, STATE, WORLD
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers
-from birthsim_env.parts.signals import Mask, Measurement, Reference
 from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
 from birthsim_env.physics.compilation import kernel

@@ -26,9 +26,9 @@ from birthsim_env.loop.rows import (
     VELOCITY,
     WORLD,
 )
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
 from birthsim_env.parts.seeding import vectorised
-from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import PRESSURES, Array

@@ -9,7 +9,7 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from baselines.rivals.tracking import TrackingController
-from birthsim_env.parts.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_live.rig.settings import RESIDUAL

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.parts.signals import Measurement
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Electronics
 
