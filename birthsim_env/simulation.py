@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.loop import MixedLoop
+from birthsim_env.loop.loop import MixedLoop, Place
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
@@ -199,8 +199,8 @@ class Simulation:
         if loop is not None and loop.run(periods, self.threads):
             self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
 
-    def _assemble(self) -> None:
-        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
+    def _places(self) -> tuple[list[Place], list[Place]]:
+        """Where the arrays of this class stand in a block: in the world, and in what is seen."""
         plant, lanes, actuation = self.plant, self.plant.num_envs, self.actuation
         self._opens, self._sampled = actuation, self.sensors.sampled
         if len(self.action) != actuation.size:
@@ -215,8 +215,15 @@ class Simulation:
             if own is None:
                 self._shown[:] = actuation.memory()
             seen.append((self._shown, SHOWN))
-        acting = getattr(actuation, "stages", None)
-        acts: list[Part] = [*acting(lanes, self.sensors.sampled)] if acting else [self._ask]
+        return world, seen
+
+    def _acts(self) -> list[Part]:
+        stages = getattr(self.actuation, "stages", None)
+        return [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
+
+    def _assemble(self) -> None:
+        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
+        lanes, places, acts = self.plant.num_envs, self._places(), self._acts()
         looks: list[Part] = [
             self._compiled(self.trajectory, "sample", self._follow),
             self._compiled(self.stiffness, "sample", self._set),
@@ -224,8 +231,13 @@ class Simulation:
         ]
         senses = self._compiled(self.sensors, "measure", self._measure)
         counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
-        self._loop = MixedLoop(lanes, world, seen, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
-        self._look = MixedLoop(lanes, world, seen, [*looks, begins, senses], self.beginning)
+        self._loop = MixedLoop(lanes, *places, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
+        self._look = MixedLoop(lanes, *places, [*looks, begins, senses], self.beginning)
+
+    def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
+        """The plant by itself, and the actuation by itself: to be timed, on a copy."""
+        lanes, places = self.plant.num_envs, self._places()
+        return MixedLoop(lanes, *places, [plant_stage(self.period)]), MixedLoop(lanes, *places, self._acts())
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Part) -> Part:

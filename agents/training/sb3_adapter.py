@@ -17,9 +17,9 @@ class SB3VecEnv(VecEnv):
     """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
 
     Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
-    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in steps of
-    the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset`` says: what an on-policy
-    algorithm with rollouts shorter than an episode needs.
+    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in
+    ``steps`` of the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset`` says: what an
+    on-policy algorithm with rollouts shorter than an episode needs.
     """
 
     def __init__(self, env: Any, staggered: bool = False) -> None:
@@ -27,7 +27,7 @@ class SB3VecEnv(VecEnv):
             raise ValueError(f"env = {env!r}; allowed: one made with autoreset_mode='SameStep'")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
-        self.seconds = 0.0
+        self.seconds, self.steps = 0.0, 0
         self._staggered = staggered
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
@@ -51,6 +51,7 @@ class SB3VecEnv(VecEnv):
         started = time.perf_counter()
         observation, rewards, terminated, truncated, info = self.env.step(self._actions)
         self.seconds += time.perf_counter() - started
+        self.steps += 1
         self._returns += rewards
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

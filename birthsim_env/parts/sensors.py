@@ -39,7 +39,8 @@ RATE_TIME = 0.02
 
 
 @kernel
-def _ideal_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+def ideal_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Shows position, velocity, pressures and the hand's force as they are."""
     w, s = block(world, WORLD), block(seen, SEEN)
     for i in range(n):
         s[POSITION_TIME, i] = s[TIME, i]
@@ -69,7 +70,7 @@ class IdealSensors:
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
-        return Stage(_ideal_stage)
+        return Stage(ideal_stage)
 
 
 @helper

@@ -70,7 +70,8 @@ def source_stamp(path: Path) -> str:
         waiting += found
     digest = hashlib.sha256()
     for file in sorted(seen):
-        digest.update(str(file.relative_to(_ROOT)).encode() + file.read_bytes())
+        # A user's own kernel may lie anywhere.
+        digest.update(str(file.relative_to(_ROOT) if file.is_relative_to(_ROOT) else file).encode() + file.read_bytes())
     return digest.hexdigest()
 
 
@@ -155,8 +156,9 @@ def kernel(function: F) -> F:
     """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
     folder = _cache_folder()
-    # With the compiler off there is nothing to keep; what a closure holds, no hash of sources knows.
-    if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None:
+    # With the compiler off there is nothing to keep; what a closure or an interactive session holds, no hash of sources knows.
+    written = Path(function.__code__.co_filename).is_file()
+    if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None and written:
         compiled._cache = _DiskCache(function, folder)
     return compiled  # type: ignore[no-any-return]
 
