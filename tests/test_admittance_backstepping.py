@@ -60,8 +60,8 @@ class Law:
         admittance_law.command(
             np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
             np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
-            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD, self.gain,
-            self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE, 30.0,
+            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
+            np.array([30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE]),
             np.zeros((4, lanes)) if told is None else told,
             remembered(lanes) if memory is None else memory, openings,
         )  # fmt: skip

@@ -36,6 +36,14 @@ MEMORY = len(MEMORY_NAMES)
 WATCH_T, WATCH_N, MOTION_SHARE = 0, 4, 8
 GAIN_SHARES = [WATCH_T, WATCH_N]
 
+GAIN_NAMES = (
+    *("pneumatic_gain", "gain", "rest_gain", "rest_push", "dead_zone"),
+    *("quickness", "oscillation", "yielding", "least_share"),
+)
+"""What ``command`` takes: c4, 1/s; c, 1/s, while the reference moves and while it rests; weight of a resting piston's position
+error; its dead zone, m; fraction of the way that a spool is taken in a period; speed error, m/s, beyond which sustained half
+waves lower c to ``yielding`` times itself, and what is left of it at least."""
+
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
 
@@ -102,15 +110,16 @@ def beyond(error: float, zone: float) -> float:
 @kernel
 def command(
     joints: Array, pressures: Array, motion: Array, target: Array, force: Array, disturbance_force: Array, rest: Array,
-    moving: Array, spools: Array, p: Array, period: float, gain: float, rest_gain: float, rest_push: float, dead_zone: float,
-    quickness: float, level: float, fall: float, least: float, c4: float, told: Array, memory: Array, openings: Array,
+    moving: Array, spools: Array, p: Array, period: float, gains: Array, told: Array, memory: Array, openings: Array,
 ) -> None:  # fmt: skip
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
     ``joints``, ``pressures``, ``motion``, ``force``, ``disturbance_force``, ``rest``, ``moving`` and ``spools`` are those of
-    ``state_estimator.Estimate``; ``target`` (15, N) is the reference; ``told`` what
-    ``controller.feedforward_rows`` gives.
+    ``state_estimator.Estimate``; ``target`` (15, N) is the reference; ``gains`` has the
+    order of ``GAIN_NAMES``; ``told`` is what ``controller.feedforward_rows`` gives.
     """
+    c4, gain, rest_gain, rest_push, dead_zone = gains[0], gains[1], gains[2], gains[3], gains[4]
+    quickness, level, fall, least = gains[5], gains[6], gains[7], gains[8]
     u, kept = np.empty((4, 1)), exact.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]

@@ -34,13 +34,13 @@ MEASURED_ROWS = 5
 """Rows of that observer where speeds are measured; the last is 1 at a new start."""
 
 CONSTANTS = (
-    *("sampled", "rows", "period", "mass", "ratio", "friction_share", "trust", "bandwidth", "noise", "pneumatic_gain"),
-    *("gain", "rest_gain", "rest_push", "dead_zone", "quickness", "oscillation", "yielding", "least_share"),
+    *("sampled", "rows", "period", "mass", "ratio", "friction_share", "trust", "bandwidth", "noise"),
+    *admittance_law.GAIN_NAMES,
 )
 """Constants of the stage: 1 with sampled positions; rows of the observer of the pistons; control period, s; mass, kg, and
 damping ratio of the admittance; fraction of friction fed forward; trust in a pressure cell, 0 to 1; bandwidth, 1/s, of the
-observer; position noise, m; c4, 1/s; and what ``law.command`` takes. The rig follows."""
-SAMPLED, ROWS, PERIOD, MASS, RATIO, FRICTION, TRUST, BANDWIDTH, NOISE, PNEUMATIC, GAIN = range(11)
+observer; position noise, m; and the gains of the law. The rig follows."""
+SAMPLED, ROWS, PERIOD, MASS, RATIO, FRICTION, TRUST, BANDWIDTH, NOISE, GAINS = range(10)
 NUMBERS = len(CONSTANTS)
 
 
@@ -48,7 +48,7 @@ NUMBERS = len(CONSTANTS)
 def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are not positive definite."""
     s, about = block(seen, SEEN), numbers(constants, NUMBERS + PARAMETERS)
-    p, period, g, sampled = about[NUMBERS:], about[PERIOD], about[GAIN:NUMBERS], about[SAMPLED] > 0.0
+    p, period, sampled = about[NUMBERS:], about[PERIOD], about[SAMPLED] > 0.0
     m = block(memory, PISTONS + int(about[ROWS]))[:, :n]
     own = scratch(17)[:, :n]
     motion, believed, disturbance, disturbance_force = own[:8], own[8:10], own[10:12], own[12:14]
@@ -94,8 +94,8 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     disturbance_forces(joints, believed, disturbance, p, disturbance_force)
     openings = s[OPENING:SHOWN, :n]
     admittance_law.command(
-        joints, pressures, motion, target, force, disturbance_force, rest, moving, spools, p, period, g[0], g[1], g[2], g[3],
-        g[4], g[5], g[6], g[7], about[PNEUMATIC], told, m[LAW : LAW + admittance_law.MEMORY], openings,
+        joints, pressures, motion, target, force, disturbance_force, rest, moving, spools, p, period, about[GAINS:NUMBERS],
+        told, m[LAW : LAW + admittance_law.MEMORY], openings,
     )  # fmt: skip
     for valve in range(4):
         for i in range(n):
