@@ -120,8 +120,8 @@ moving: $(READY)
 	cp $(OUT)/moving/comparison.md docs/moving.md
 
 golden: $(READY)
-	$(BIN)/python -m tests.golden.make
-	$(BIN)/python -m tests.golden.fingerprints
+	$(BIN)/python -m tests.oracles.golden.make
+	$(BIN)/python -m tests.oracles.golden.fingerprints
 
 clean:
 	rm -rf $(VENV) $(OUT)

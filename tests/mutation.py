@@ -29,6 +29,8 @@ from types import CodeType, ModuleType
 
 import pytest
 
+HERE = Path(__file__).parent
+
 MODULES = {
     "birthsim_env.physics.geometry": ("strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
     "birthsim_env.physics.mechanics": ("strict_feedback", "cartesian_stiffness", "mechanics"),
@@ -38,7 +40,7 @@ MODULES = {
     "birthsim_env.physics.control_model": ("strict_feedback", "valve_inverse", "control_model"),
     "baselines.backstepping.gains": ("gains", "damping"),
 }
-"""The test files (``tests/test_*.py``) that concern a module, the quickest first."""
+"""The test files (``tests/*/test_*.py``) that concern a module, the quickest first."""
 
 LIMIT = 40.0
 """CPU seconds of one test, uncompiled, beyond which it is left out. The mass and energy balance of the chambers needs 25."""
@@ -289,7 +291,9 @@ def main() -> None:
             options.out.write_text(json.dumps(found, indent=1))
         print_results(module, results, before.get(module, {}).get("mutants", {}))
 
-    files = sorted({str(Path(__file__).with_name(f"test_{name}.py")) for module in options.module for name in MODULES[module]})
+    files = sorted(
+        {str(path) for module in options.module for name in MODULES[module] for path in HERE.rglob(f"test_{name}.py")}
+    )
     arguments = [
         "-qq",
         "-s",

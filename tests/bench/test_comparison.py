@@ -1,0 +1,295 @@
+"""The bench: paired worlds, lost episodes and ratios in its figures, its tables and its pictures."""
+
+from __future__ import annotations
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+
+from baselines.bench import comparison, evaluation
+from baselines.bench.comparison import (
+    ENVIRONMENTS,
+    METRICS,
+    PLANTS,
+    REFERENCE,
+    Conditions,
+    all_conditions,
+    cell_task,
+    controller_settings,
+    default_controllers,
+    file_stem,
+    gather,
+    run_cell,
+    statistics,
+)
+from baselines.bench.comparison_tables import full, losses, overview
+from baselines.figures import comparison as comparison_figures
+from birthsim_env import Parameters
+from tests.controllers.test_named_controllers import OWN
+
+RIG = Parameters()
+CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
+PROBE = Conditions("BirthSIM/Probe-v1", "ideal", "nominal")
+NAN, INF = math.nan, math.inf
+
+
+@pytest.fixture
+def worlds(monkeypatch):
+    """Plants (rows, N), references and forces over time of every environment made; episodes end after 0.4 s."""
+    made = []
+    make_vec = gymnasium.make_vec
+
+    def spied(*args, **kwargs):
+        env = make_vec(*args, max_episode_steps=400, **kwargs)
+        world = {"plant": None, "reference": [], "force": []}
+        made.append(world)
+        step, reset = env.step, env.reset
+
+        def recorded(actions):
+            world["reference"].append(env.reference.rows.copy())
+            world["force"].append(env.measurement.user_force.copy())
+            return step(actions)
+
+        def begun(**options):
+            result = reset(**options)
+            world["plant"] = env.simulation.plant.lane_parameters.copy()
+            return result
+
+        env.step, env.reset = recorded, begun
+        return env
+
+    monkeypatch.setattr(evaluation.gymnasium, "make_vec", spied)
+    return made
+
+
+def cell(controller, conditions=PROBE, episodes=3, seed=4):
+    return run_cell(**cell_task(controller_settings(controller, RIG), conditions, episodes, seed).settings)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_every_controller_meets_the_same_worlds_and_every_episode_another(worlds, plant):
+    conditions = Conditions("BirthSIM/Circle-v1", "lab", plant)
+    law, weight = cell("backstepping", conditions), cell("backstepping-weight", conditions)
+    assert law["seeds"] == weight["seeds"] == [4, 5, 6]
+    for what in ("plant", "reference", "force"):
+        np.testing.assert_array_equal(worlds[0][what], worlds[1][what], err_msg=what)
+    assert law["metrics"]["error_rms_x"] != weight["metrics"]["error_rms_x"]
+    reference = np.array(worlds[0]["reference"])
+    assert len({lane.tobytes() for lane in np.moveaxis(reference, 2, 0)}) == 3
+    assert len({column.tobytes() for column in worlds[0]["plant"].T}) == (3 if plant == "randomised" else 1)
+
+
+def test_the_scenario_is_the_same_with_either_plant(worlds):
+    for plant in PLANTS:
+        cell("backstepping", Conditions("BirthSIM/Circle-v1", "ideal", plant))
+    np.testing.assert_array_equal(worlds[0]["reference"], worlds[1]["reference"])
+
+
+def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
+    monkeypatch.setattr(evaluation, "LANES", 1)
+    calls = []
+
+    class Stopped(evaluation.EpisodeMetrics):
+        def add(self, *args):
+            calls.append(1)
+            if len(calls) == 5200:
+                raise KeyboardInterrupt
+            super().add(*args)
+
+    monkeypatch.setattr(evaluation, "EpisodeMetrics", Stopped)
+    with pytest.raises(KeyboardInterrupt):
+        cell("backstepping", episodes=2)
+    assert "1 of 2 episodes" in capsys.readouterr().out
+
+
+def test_the_grid_is_five_environments_two_sensor_models_and_two_plants():
+    assert len(all_conditions()) == 26
+    moving = [conditions for conditions in all_conditions() if conditions.hand]
+    assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
+    assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
+    assert str(moving[0]) == "Circle, ideal sensors, randomised plant, moving hand: sine"
+    assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
+    assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
+        *("Circle", "Probe", "Descent", "Forceps", "Dystocia")
+    ]
+    assert str(PROBE) == "Probe, ideal sensors, nominal plant"
+
+
+def test_slow_controllers_are_left_out_unless_named(monkeypatch):
+    assert "backstepping-weight" in default_controllers()
+    monkeypatch.setattr(comparison, "SLOW", frozenset({"backstepping-weight"}))
+    assert "backstepping-weight" not in default_controllers()
+    assert "backstepping" in default_controllers()
+
+
+def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    name = f"{path}:Own"
+    first = controller_settings(name, RIG)
+    assert controller_settings(name, RIG) == first
+    path.write_text(OWN + "\n")
+    assert controller_settings(name, RIG)["source"] != first["source"]
+    assert controller_settings("backstepping", RIG)["source"] == ""
+    assert controller_settings("backstepping", RIG.replace({"mechanics.mass": 4.0})) != controller_settings("backstepping", RIG)
+    stems = [file_stem(name) for name in ("backstepping", "a/b.py:C", "a-b.py:C", "a/b.py-C")]
+    assert stems[0] == "backstepping"
+    assert len(set(stems)) == 4
+    assert not any(character in stem for stem in stems for character in "/:")
+    with pytest.raises(ValueError, match="controller = 'nobody'; allowed"):
+        controller_settings("nobody", RIG)
+
+
+def result(lost=(False, False, False), cost=1.0, **metrics):
+    """What run_cell returns: metrics that are not named say nothing."""
+    columns = {name: [None] * len(lost) for name in METRICS if name != "hunting"}
+    return {"seeds": [0, 1, 2], "metrics": {**columns, **metrics}, "lost": list(lost), "cost": cost}
+
+
+@pytest.fixture
+def figures():
+    """Three controllers in two environments; the second loses an episode of the first, the third all of them."""
+    return statistics(gather({
+        (REFERENCE, CIRCLE): result(settled_rms=[2.0, 4.0, 8.0], air=[10.0, 20.0, 30.0], restarts=[0.0, 0.0, 0.0]),
+        ("other", CIRCLE): result((False, True, False), 2.0, settled_rms=[1.0, 0.1, 2.0], air=[5.0, 5.0, 5.0]),
+        ("worst", CIRCLE): result((True, True, True), 4.0, settled_rms=[1.0, 1.0, None]),
+        (REFERENCE, PROBE): result(stiffness_error=[-20.0, 10.0, None], hunting_x=[1.0, 2.0, None], hunting_y=[3.0, 1.0, None]),
+        ("other", PROBE): result(stiffness_error=[1.0, -1.0, 1.0], hunting_x=[0.1, 0.1, 0.1], hunting_y=[0.0, 0.2, 0.0]),
+    }))  # fmt: skip
+
+
+def at(figures, controller, conditions):
+    return next(c for c in figures if c["controller"] == controller and c["environment"] == conditions.environment)
+
+
+def test_figures_count_lost_episodes_as_infinitely_bad(figures):
+    law, other, worst = (at(figures, name, CIRCLE) for name in (REFERENCE, "other", "worst"))
+    assert law["metrics"]["settled_rms"]["median"] == 4.0
+    assert law["metrics"]["settled_rms"]["worst"] == 8.0
+    # By its figures until the loss, the median would be 1 and the worst 2.
+    assert other["metrics"]["settled_rms"]["median"] == 2.0
+    assert other["metrics"]["settled_rms"]["worst"] == INF
+    assert other["metrics"]["air"]["worst"] == INF
+    assert worst["metrics"]["settled_rms"]["median"] == INF
+    # Of air it says nothing at all, and yet it lost what others have figures of.
+    assert worst["metrics"]["air"]["median"] == INF
+    assert [cell["lost"] for cell in (law, other, worst)] == [0, 1, 3]
+
+
+def test_a_metric_applies_where_any_controller_says_something_of_it(figures):
+    assert "stiffness_error" in at(figures, REFERENCE, PROBE)["metrics"]
+    assert not any("stiffness_error" in at(figures, name, CIRCLE)["metrics"] for name in (REFERENCE, "other", "worst"))
+    assert "cross_motion" not in at(figures, REFERENCE, PROBE)["metrics"]
+
+
+def test_errors_apply_even_where_every_episode_is_lost_before_there_are_any():
+    (only,) = statistics(gather({("worst", CIRCLE): result((True, True, True))}))
+    assert only["metrics"]["settled_rms"]["median"] == INF
+    assert "hunting" not in only["metrics"]
+
+
+def test_sizes_count_and_hunting_is_the_larger_axis(figures):
+    law, other = at(figures, REFERENCE, PROBE)["metrics"], at(figures, "other", PROBE)["metrics"]
+    assert (law["stiffness_error"]["median"], law["stiffness_error"]["worst"], law["stiffness_error"]["count"]) == (15, 20, 2)
+    assert law["hunting"]["worst"] == 3.0
+    assert other["hunting"]["median"] == 0.1
+    assert other["hunting"]["worst"] == 0.2
+
+
+def test_ratios_are_paired_by_episode_and_never_to_nothing(figures):
+    other, worst = at(figures, "other", CIRCLE)["ratios"], at(figures, "worst", CIRCLE)["ratios"]
+    # 1/2, lost and 2/8: of the medians it would be 2/4.
+    assert other["settled_rms"]["median"] == 0.5
+    assert other["settled_rms"]["worst"] == INF
+    assert worst["settled_rms"]["low"] == INF
+    assert "restarts" not in other
+    assert at(figures, REFERENCE, CIRCLE)["ratios"] == {}
+    # Of the third episode the reference says nothing.
+    assert at(figures, "other", PROBE)["ratios"]["stiffness_error"]["count"] == 2
+    assert at(figures, "other", PROBE)["ratios"]["stiffness_error"]["median"] == pytest.approx((1 / 20 + 1 / 10) / 2)
+
+
+def rows(text):
+    return [[entry.strip() for entry in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| ")]
+
+
+def test_the_overview_has_a_row_per_controller_and_says_lost(figures):
+    head, law, other, worst = rows(overview(figures))
+    assert head[0] == "controller"
+    assert not any("lab" in title for title in head), "what did not run has no column"
+    column = {title: k for k, title in enumerate(head)}
+    settled, ratio = column["circle: settled error, mm"], column[f"over {REFERENCE}"]
+    assert law[0] == REFERENCE
+    assert law[settled].startswith("4 [")
+    assert law[ratio] == "1"
+    assert (other[settled][:2], other[ratio][:4]) == ("2 ", "0.5 ")
+    assert "lost]" in other[settled]
+    assert worst[settled] == worst[ratio] == "lost [lost, lost]"
+    stiffness = column["rendered stiffness off by, % (median; worst)"]
+    assert (law[stiffness], other[stiffness], worst[stiffness]) == ("15; 20", "1; 1", "-")
+    assert [row[column["lost episodes"]] for row in (law, other, worst)] == ["0 of 6", "1 of 6", "3 of 3"]
+    assert [row[column["cost per call, us"]] for row in (law, other, worst)] == ["1", "1.5", "4"]
+
+
+def test_lost_episodes_are_counted_by_environment(figures):
+    table = rows(losses(figures))
+    assert table[0] == ["lost episodes", CIRCLE.environment, PROBE.environment]
+    assert table[1:] == [[REFERENCE, "0 of 3", "0 of 3"], ["other", "1 of 3", "0 of 3"], ["worst", "3 of 3", "-"]]
+
+
+def test_the_full_tables_have_a_section_per_condition_and_a_row_per_metric_and_controller(figures):
+    text = full(figures)
+    circle, probe = text.split("## ")[1:]
+    assert circle.startswith("BirthSIM/Circle-v1, ideal sensors, randomised plant\n")
+    found = {(row[0], row[1]): row[2:] for row in rows(circle)}
+    assert found["settled_rms, mm", "other"][0].startswith("2 [")
+    assert found["settled_rms, mm", "other"][1:3] == ["lost", "lost"]
+    assert found["settled_rms, mm", REFERENCE][3] == ""
+    assert found["settled_rms, mm", "other"][3].startswith("0.5 [")
+    assert found["lost episodes", "worst"][0] == "3 of 3"
+    assert {row[1] for row in rows(probe)} == {"controller", REFERENCE, "other"}
+    assert len({line.count("|") for line in text.splitlines() if line.startswith("|")}) == 1
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures drawn, by name, still open."""
+    found = {}
+    monkeypatch.setattr(comparison_figures, "save", lambda figure, folder, name: found.setdefault(name, figure) and [])
+    yield found
+    plt.close("all")
+
+
+def test_pictures_show_medians_with_intervals_and_name_what_is_lost(figures, drawn, tmp_path):
+    cells = [{**c, "sensors": s} for c in figures for s in ("ideal", "lab") if c["environment"] == CIRCLE.environment]
+    comparison_figures.draw_comparison(cells, tmp_path)
+    settled, air = drawn["settled_error"], drawn["air_against_error"]
+    circle = settled.axes[0]
+    assert [label.get_text() for label in circle.get_yticklabels()] == [REFERENCE, "other", "worst"]
+    assert [text.get_text() for text in circle.texts] == ["lost", "lost"]
+    medians = sorted(float(line.get_xdata()[0]) for line in circle.lines if len(line.get_xdata()) == 1)
+    assert medians == [2.0, 2.0, 4.0, 4.0]
+    assert circle.get_xlim()[1] < 20, "a lost episode does not stretch the axis"
+    assert [axes.get_title("left") for axes in air.axes] == [
+        *(f"{kind} sensors; not shown, for they lose episodes: worst" for kind in ("ideal", "lab"))
+    ]
+    labels = [text.get_text() for text in air.legends[0].get_texts()]
+    assert labels == [REFERENCE, "other"]
+    assert [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in air.axes[0].lines] == [(4.0, 20.0), (2.0, 5.0)]
+
+
+def test_ten_controllers_have_looks_of_their_own_and_a_legend_that_covers_nothing(figures, drawn, tmp_path):
+    law = at(figures, REFERENCE, CIRCLE)
+    names = [f"a rather long controller name {k}" for k in range(10)]
+    comparison_figures.draw_comparison([{**law, "controller": name, "plant": "nominal"} for name in names], tmp_path)
+    assert len({line.get_marker() for line in drawn["air_against_error"].axes[0].lines}) == 10
+    for figure in drawn.values():
+        figure.canvas.draw()
+        legend = figure.legends[0].get_window_extent()
+        around = [axes.get_tightbbox() for axes in figure.axes] + [text.get_window_extent() for text in figure.texts]
+        assert not any(legend.overlaps(box) for box in around)
+        assert legend.x0 >= 0
+        assert legend.x1 <= figure.bbox.width

@@ -1,0 +1,224 @@
+"""The paper's experiment (Fig. 4), 16 s on the full plant with friction: what the law reaches, and the figures drawn of it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from PIL import Image
+
+from baselines.bench.evaluation import Evaluation
+from baselines.commands import figure4 as figure4_command
+from baselines.commands.figure4 import FIELDS, figures_of, record_run
+from baselines.figures import runs as figures
+from baselines.figures.runs import error_over_time, figure4
+from birthsim_env import Parameters
+from tests.bench.test_evaluation import Slam, run
+from tests.console import call, strict
+
+RIG = Parameters()
+LIMITS = {2000: 2.5, 4000: 1.2}
+"""Setpoint in N/m -> largest settled RMS error per axis, mm: the paper's curves lie within a few millimetres."""
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory):
+    """What birthsim-figure4 leaves: its folder, its record of the paper's law with ideal sensors, what it printed."""
+    records, printed, out = [], io.StringIO(), tmp_path_factory.mktemp("figure4") / "out"
+
+    def kept(*arguments):
+        records.append(record_run(*arguments))
+        return records[-1]
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(figure4_command, "record_run", kept)
+        patch.setattr(sys, "argv", ["birthsim-figure4", "--out", str(out)])
+        figure4_command.main()
+    return out, records[0], printed.getvalue()
+
+
+@pytest.fixture(scope="module")
+def records(command):
+    """The four runs: controller and sensors -> record."""
+    others = (("backstepping", "lab"), ("backstepping-weight", "ideal"), ("backstepping-weight", "lab"))
+    return {("backstepping", "ideal"): command[1], **{setting: record_run(*setting) for setting in others}}
+
+
+def settled_rms(record, setpoint):
+    """mm per axis, more than 0.5 s after a jump, computed from positions, target and force by (19)."""
+    compliant = record["target"] + record["user_force"] / record["stiffness_setpoint"]
+    chosen = (record["since_jump"] >= 0.5) & (record["stiffness_setpoint"][:, 0] == setpoint)
+    return 1e3 * np.sqrt(((record["position"] - compliant)[chosen] ** 2).mean(axis=0))
+
+
+def test_the_record_is_the_experiment_of_the_paper(records):
+    record = records["backstepping", "ideal"]
+    time = record["time"]
+    assert set(record) == {*FIELDS, "lost"}
+    np.testing.assert_allclose(time, 1e-3 * np.arange(16001), atol=1e-9)
+    # Two identical halves: circles of 50 mm in 4 s about the centre, pushes of 30 N; stiffness doubles, pneumatic falls.
+    circle = 0.05 * np.stack([np.cos(np.pi / 2 * time), np.sin(np.pi / 2 * time)], axis=1)
+    np.testing.assert_allclose(record["target"] - [0.5, 0.0], circle, atol=1e-9)
+    first, second = time < 7.9995, time >= 7.9995
+    np.testing.assert_array_equal(record["stiffness_setpoint"], np.where(first, 2000.0, 4000.0)[:, None] * [1, 1])
+    np.testing.assert_allclose(record["user_force"][:8001], record["user_force"][8000:], atol=1e-6)
+    assert record["user_force"].min(axis=0) == pytest.approx([-30, -30])
+    assert record["user_force"].max(axis=0) == pytest.approx([30, 30])
+    np.testing.assert_array_equal(record["pneumatic_stiffness_setpoint"][first], [[4600, 2300]] * first.sum())
+    np.testing.assert_allclose(record["pneumatic_stiffness_setpoint"][second][500:], [[3600, 1800]] * (second.sum() - 500))
+    np.testing.assert_allclose(record["tracking_error"], record["position"] - record["compliant_target"], atol=1e-12)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("name", ["backstepping", "backstepping-weight"])
+def test_the_law_follows_the_compliant_target_on_the_plant_with_friction(records, name, sensors):
+    record = records[name, sensors]
+    assert all(np.isfinite(values).all() for values in record.values())
+    assert record["impact_speed"].max() == 0
+    clearance = np.array([0.1, 0.2]) - np.abs(record["piston_position"]).max(axis=0)
+    assert (clearance > 0.02).all()
+    for setpoint, limit in LIMITS.items():
+        assert (settled_rms(record, setpoint) < limit).all()
+    # From the moment on which the law has taken over, no jump throws the end effector far away.
+    assert np.abs(record["tracking_error"]).max() < 0.02
+    relative = record["pneumatic_stiffness"] / record["pneumatic_stiffness_setpoint"] - 1
+    assert (np.sqrt((relative**2).mean(axis=0)) < 0.03).all()
+
+
+def test_the_pushes_are_felt_as_springs_of_the_stiffness_asked_for(records):
+    # While a push is held (its last 0.3 s), the end effector has moved by the force over the setpoint, friction's share aside.
+    record = records["backstepping", "ideal"]
+    for half, setpoint in ((0.0, 2000.0), (8.0, 4000.0)):
+        for axis, end in ((0, 2.0), (0, 4.0), (1, 6.0), (1, 7.7)):
+            chosen = (record["time"] > half + end - 0.3) & (record["time"] < half + end)
+            moved = (record["position"] - record["target"])[chosen, axis].mean()
+            pushed = record["user_force"][chosen, axis].mean()
+            assert abs(pushed) == pytest.approx(30)
+            assert moved == pytest.approx(pushed / setpoint, abs=2 * LIMITS[round(setpoint)] * 1e-3)
+            assert np.sign(moved) == np.sign(pushed)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("setpoint", [2000, 4000])
+def test_weight_compensation_lowers_the_error_on_x(records, setpoint, sensors):
+    without = settled_rms(records["backstepping", sensors], setpoint)[0]
+    assert settled_rms(records["backstepping-weight", sensors], setpoint)[0] < 0.7 * without
+
+
+def test_lab_sensors_cost_accuracy_but_not_stability(records):
+    ideal, lab = records["backstepping", "ideal"], records["backstepping", "lab"]
+    assert not np.array_equal(ideal["position"], lab["position"])
+    for setpoint in LIMITS:
+        assert (settled_rms(lab, setpoint) < settled_rms(ideal, setpoint) + 0.3).all()
+
+
+def test_the_same_run_twice_is_the_same(records, monkeypatch):
+    """Its first three seconds: two pushes, noise of the sensors."""
+    make = gymnasium.make
+    monkeypatch.setattr(figure4_command.gymnasium, "make", lambda *args, **options: make(*args, duration=3.0, **options))
+    again = record_run("backstepping", "lab")
+    for name, values in records["backstepping", "lab"].items():
+        np.testing.assert_array_equal(again[name], values[:3001], err_msg=name)
+
+
+def test_the_figures_beside_the_plot_are_those_of_the_record(records):
+    record = records["backstepping", "ideal"]
+    result = figures_of(record, RIG)
+    for setpoint in LIMITS:
+        np.testing.assert_allclose(result[f"settled_rms_mm_at_{setpoint}"], settled_rms(record, setpoint))
+        chosen = (record["since_jump"] >= 0.5) & (record["stiffness_setpoint"][:, 0] == setpoint)
+        largest = 1e3 * np.abs(record["tracking_error"][chosen]).max(axis=0)
+        np.testing.assert_allclose(result[f"settled_max_mm_at_{setpoint}"], largest)
+    relative = record["pneumatic_stiffness"] / record["pneumatic_stiffness_setpoint"] - 1
+    np.testing.assert_allclose(result["pneumatic_rms_percent"], 100 * np.sqrt((relative**2).mean(axis=0)))
+    np.testing.assert_allclose(result["least_clearance_mm"], 1e3 * ([0.1, 0.2] - np.abs(record["piston_position"]).max(axis=0)))
+    assert result["finite"] is True
+    assert result["duration_s"] == pytest.approx(16)
+    broken = {**record, "position": np.where(record["time"][:, None] > 15, np.nan, record["position"])}
+    assert figures_of(broken, RIG)["finite"] is False
+
+
+def assert_pictures(folder, name, least_width):
+    """PNG with something drawn on it and an SVG with curves; both written by a call whose files come back as paths."""
+    with Image.open(folder / f"{name}.png") as image:
+        pixels = np.asarray(image.convert("L"), dtype=float)
+    assert pixels.shape[1] >= least_width
+    assert 1000 < (pixels < 128).sum() < 0.5 * pixels.size
+    text = (folder / f"{name}.svg").read_text()
+    assert text.lstrip().startswith("<?xml")
+    assert text.count("<path") > 20
+    assert (folder / f"{name}.png").stat().st_size > 20_000
+    assert (folder / f"{name}.svg").stat().st_size > 20_000
+    return text
+
+
+def test_the_command_writes_its_figures_the_picture_and_the_numbers(command):
+    out, record, printed = command
+    names = sorted(path.name for path in out.iterdir())
+    assert names == ["figure4.json", "figure4.png", "figure4.svg", "rig.png"]
+    assert (out / "rig.png").stat().st_size > 10_000
+    numbers = strict(out / "figure4.json")
+    assert numbers == figures_of(record, RIG)
+    for setpoint, limit in LIMITS.items():
+        assert max(numbers[f"settled_rms_mm_at_{setpoint}"]) < limit
+    assert min(numbers["least_clearance_mm"]) > 0
+    assert max(numbers["pneumatic_rms_percent"]) < 3
+    assert f"{numbers['settled_rms_mm_at_2000'][0]:10.3f}{numbers['settled_rms_mm_at_2000'][1]:10.3f}" in printed
+
+
+def test_figure_4_is_drawn_as_png_and_svg_and_always_the_same(command, tmp_path):
+    out, record, _ = command
+    text = assert_pictures(out, "figure4", 1200)
+    paths = figure4(record, tmp_path)
+    assert sorted(path.name for path in paths) == ["figure4.png", "figure4.svg"]
+    # Neither dates nor random identifiers: a figure in a repository changes only with its data.
+    assert (tmp_path / "figure4.svg").read_text() == text
+    assert (tmp_path / "figure4.png").read_bytes() == (out / "figure4.png").read_bytes()
+
+
+def test_the_error_over_time_is_drawn_even_if_every_lane_is_lost(tmp_path):
+    kept, lost = run(Slam(lanes=()), "kept"), run(Slam(lanes=(0, 1, 2)), "lost")
+    assert lost.lost == [True] * 3
+    error_over_time([kept, lost], "some lost", tmp_path)
+    some = assert_pictures(tmp_path, "error_over_time", 1000)
+    error_over_time([lost], "all lost", tmp_path)
+    assert assert_pictures(tmp_path, "error_over_time", 1000) != some
+
+
+def test_the_error_over_time_shows_the_median_of_every_controller_in_a_style_of_its_own(tmp_path, monkeypatch):
+    size = np.arange(1.0, 7.0)
+    traces = [1e-3 * k * np.tile(size[:, None], (50, 1, 1)).reshape(50, 6, 1) * [0.6, 0.8] for k in range(1, 7)]
+    evaluations = [Evaluation(f"law {k}", traces=[trace[:, :2], trace[:, 2:]]) for k, trace in enumerate(traces)]
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, folder, name: drawn.append(figure))
+    error_over_time(evaluations, "six", tmp_path)
+    (axes,) = drawn[0].axes
+    lines = axes.get_lines()
+    assert [line.get_label().split(" (")[0] for line in lines] == [f"law {k}" for k in range(6)]
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 6
+    for k, line in enumerate(lines):
+        time, median = line.get_data()
+        np.testing.assert_allclose(time, 0.01 * np.arange(50))
+        np.testing.assert_allclose(median, 3.5 * (k + 1))
+    assert axes.get_xlabel() == "time (s)"
+    assert axes.get_ylabel() == "tracking error (mm)"
+    plt.close(drawn[0])
+
+
+def test_what_is_lost_is_said_to_be_lost(tmp_path, monkeypatch, capsys):
+    (tmp_path / "heavy.toml").write_text("[mechanics]\nmass = 400.0\n")
+    arguments = ("--parameters", tmp_path / "heavy.toml", "--out", tmp_path / "out")
+    status, printed, complained = call("figure4", monkeypatch, capsys, *arguments)
+    assert (status, printed) == (2, "")
+    assert "Mechanics.mass = 400 kg is more than this rig can carry" in complained
+    arguments = ("--controller", "slammed-valves", "--out", tmp_path / "out")
+    status, printed, complained = call("figure4", monkeypatch, capsys, *arguments)
+    assert (status, printed) == (2, "")
+    assert "slammed-valves lost the end effector after 0." in complained
+    assert complained.rstrip().endswith("Allowed: a controller and a rig that keep it")
+    assert strict(tmp_path / "out" / "figure4.json")["lost"] is True

@@ -1,0 +1,1 @@
+"""Tests of laws and what they work out."""

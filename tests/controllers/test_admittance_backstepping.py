@@ -1,0 +1,353 @@
+"""The law behind the admittance: the jerk that it gives, resting pistons, gains at rest, valve lead, and gains that yield."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines.admittance import law as admittance_law
+from baselines.admittance.controller import LEAST_SHARE, AdmittanceBackstepping
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+from tests.oracles import closed_loop, rigid_body
+from tests.oracles import linkage_by_points as by_points
+
+PERIOD = 1e-3
+ANOTHER = Parameters().replace(
+    {
+        "geometry.gamma3": 1.4, "mechanics.mass": 4.2, "cylinder1.viscous_friction": 55.0, "cylinder2.viscous_friction": 12.0,
+        "air.polytropic_index": 1.3, "valves.time_constant": 0.006,
+    }
+)  # fmt: skip
+
+
+def remembered(lanes: int) -> Array:
+    """The memory of a law that has just started."""
+    memory = np.zeros((admittance_law.MEMORY, lanes))
+    memory[admittance_law.GAIN_SHARES] = 1.0
+    return memory
+
+
+@dataclasses.dataclass
+class Law:
+    """The kernel with everything that is not under test at rest; ``command`` gives openings (4, N).
+
+    Without ``lead_time`` and with shut spools they are those that the law wants.
+    """
+
+    rig: Parameters
+    gain: float = 60.0
+    rest_gain: float = 60.0
+    dead_zone: float = 0.0
+    rest_push: float = 1.0
+    lead_time: float | None = None
+
+    def command(
+        self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
+        rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
+        told: Array | None = None,
+    ) -> Array:  # fmt: skip
+        lanes = motion.shape[1]
+        target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
+        target[10:12] = now.stiffness
+        # A spool that follows as fast as it does by itself is told where to go, no further.
+        quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
+        admittance_law.command(
+            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
+            np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
+            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
+            np.array([30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE]),
+            np.zeros((4, lanes)) if told is None else told,
+            remembered(lanes) if memory is None else memory, openings,
+        )  # fmt: skip
+        return openings
+
+
+def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, share: float = 1.0) -> tuple[Array, Measurement]:
+    """A motion (8, N) that the rig nearly has."""
+    rng, measured = np.random.default_rng(seed), rigid_body.seen(now, rig, user)
+    motion = share * np.repeat([1e-4, 2e-3, 0.3, 10.0], 2)[:, None] * rng.uniform(-1, 1, (8, user.shape[1]))
+    motion[:2] += measured.position
+    motion[2:4] += measured.velocity
+    return motion, measured
+
+
+@pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
+def test_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> None:
+    """j = jr - 3 c (a - ar) - (3 c^2 + 2)(v - vr) - (c^3 + 2 c)(x - xr), a with all that is known."""
+    lanes, c, rng = 60, 60.0, np.random.default_rng(2)
+    now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
+    user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
+    motion, measured = near(now, rig, user, seed=1)
+    openings = Law(rig, c).command(now, motion, user, disturbance_force)
+    free = np.abs(openings).max(axis=0) < 1
+    assert free.sum() > 0.7 * lanes
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, disturbance_force, user)
+    wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
+    wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
+    np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
+def test_where_what_is_told_is_true_the_end_effector_gets_the_jerk_that_the_law_states(rig: Parameters) -> None:
+    """Forces along the pistons that grow: the law knows both from what it is told, beside what is unseen."""
+    lanes, c, rng = 60, 60.0, np.random.default_rng(2)
+    now = rigid_body.near_balance(rig, lanes, seed=0, speed=0.05, push=4.0)
+    user, disturbance_force = rng.uniform(-4, 4, (2, lanes)), rng.uniform(-4, 4, (2, lanes))
+    told = np.concatenate([rng.uniform(-4, 4, (2, lanes)), rng.uniform(-200, 200, (2, lanes))])
+    motion, measured = near(now, rig, user, seed=1)
+    openings = Law(rig, c).command(now, motion, user, disturbance_force, told=told)
+    free = np.abs(openings).max(axis=0) < 1
+    assert free.sum() > 0.7 * lanes
+    a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, disturbance_force + told[:2], user)
+    growing = by_points.newton_force(rigid_body.pose_of(now.piston, rig), now.piston[1] + rig.geometry.k2, *told[2:])
+    wanted = motion[6:8] - 3 * c * (a - motion[4:6]) - (3 * c**2 + 2) * (measured.velocity - motion[2:4])
+    wanted -= (c**3 + 2 * c) * (measured.position - motion[:2])
+    jerk += growing / rig.mechanics.mass
+    np.testing.assert_allclose(jerk[:, free], wanted[:, free], rtol=1e-6, atol=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("cylinder", [0, 1])
+@pytest.mark.parametrize(("resting", "push"), [(1.0, 3.0), (1.0, 1.0), (0.4, 3.0)])
+def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: float, push: float) -> None:
+    """Errors along a resting piston within the zone change nothing; beyond it they weigh ``rest_push``; moving, all count.
+
+    A piston that half rests has half the zone and half of what ``rest_push`` adds.
+    """
+    rig, zone = Parameters(), 1e-4
+    now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
+    sizes = np.array([0.0, 0.3, 0.99, 1.5])
+    now = rigid_body.Instant(*(np.repeat(part, len(sizes), axis=1) for part in now))
+    nothing = np.zeros((2, len(sizes)))
+    motion, _ = near(now, rig, nothing, seed=1, share=0.0)
+    pose = rigid_body.pose_of(now.piston, rig)
+    along = pose.beam if cylinder == 1 else pose.across
+    motion[:2] -= zone * sizes * along
+    rest = np.zeros((2, len(sizes)))
+    rest[cylinder] = resting
+
+    def jerks(**changes: Array) -> Array:
+        openings = Law(rig, 50.0, 50.0, zone, push).command(now, motion, nothing, nothing, **changes)
+        assert np.abs(openings).max() < 1
+        a, jerk = rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)
+        assert np.abs(a).max() < 1e-9
+        return np.asarray((jerk * along).sum(axis=0))
+
+    stiffness = 50.0**3 + 2 * 50.0
+    np.testing.assert_allclose(jerks(), -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
+    weight = 1 + (push - 1) * resting
+    expected = -weight * stiffness * zone * np.maximum(sizes - resting, 0)
+    np.testing.assert_allclose(jerks(rest=rest), expected, rtol=0, atol=1e-4 * stiffness * zone)
+    other = jerks(rest=rest[::-1].copy())
+    np.testing.assert_allclose(other, -stiffness * zone * sizes, rtol=0, atol=1e-4 * stiffness * zone)
+
+
+def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
+    """From c to the rest's c with the time constant MOTION_TIME; at once back to c when it moves."""
+    rig, lanes, error = Parameters(), 1, 5e-5
+    now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.0, push=0.0)
+    nothing = np.zeros((2, lanes))
+    motion, _ = near(now, rig, nothing, seed=1, share=0.0)
+    motion[0] -= error
+    law, memory, stiffnesses = Law(rig, 60.0, 30.0), remembered(lanes), []
+    for tick in range(400):
+        moving = float(tick in (0, 399))
+        openings = law.command(now, motion, nothing, nothing, moving=moving, memory=memory)
+        stiffnesses.append(-rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1][0, 0] / error)
+    decay = np.exp(-PERIOD * np.arange(399) / admittance_law.MOTION_TIME)
+    c = 30.0 + 30.0 * decay
+    np.testing.assert_allclose(stiffnesses[:399], c**3 + 2 * c, rtol=1e-4)
+    assert stiffnesses[399] == pytest.approx(60.0**3 + 120.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("tau", "lead_time"), [(0.004, 0.0015), (0.008, 0.001), (0.002, 0.004)])
+def test_the_spool_follows_with_the_lead_time(tau: float, lead_time: float) -> None:
+    """The plant's own spool comes nearer to what is wanted by exp(-T/lead) per period while no command is full."""
+    rig = Parameters().replace({"valves.time_constant": tau})
+    plant, kept, quickness = Plant(rig), np.exp(-PERIOD / tau), 1 - np.exp(-PERIOD / lead_time)
+    spool, path = np.zeros(4), []
+    wanted = np.array([0.1, -0.12, 0.05, 0.08])
+    for _ in range(12):
+        command = np.array([admittance_law.lead(w, s, kept, quickness) for w, s in zip(wanted, spool, strict=True)])
+        assert np.abs(command).max() < 1
+        spool = kept * spool + (1 - kept) * command
+        plant.advance(command[:, None], np.zeros((2, 1)), PERIOD)
+        path.append(plant.state[list(SPOOLS), 0])
+    np.testing.assert_allclose(path[-1], spool, rtol=0, atol=1e-6, err_msg="what it believes of the spool")
+    left = np.exp(-PERIOD / lead_time * np.arange(1, 13))[:, None]
+    np.testing.assert_allclose(1 - np.array(path) / wanted, np.repeat(left, 4, axis=1), rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("lead_time", [0.0015, 0.01])
+def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
+    """After one period the plant's spools have gone the share 1 - exp(-T/lead) of their ways to what the law wants."""
+    rig, lanes = ANOTHER, 40
+    now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
+    nothing = np.zeros((2, lanes))
+    motion, _ = near(now, rig, nothing, seed=1)
+    wanted = Law(rig).command(now, motion, nothing, nothing)
+    spools = wanted + np.random.default_rng(3).uniform(-0.1, 0.1, wanted.shape)
+    openings = Law(rig, lead_time=lead_time).command(now, motion, nothing, nothing, spools=spools)
+    free = np.abs(openings) < 1
+    assert free.mean() > 0.7
+    plant = Plant(rig, lanes)
+    plant.state[list(SPOOLS)] = spools
+    plant.advance(openings, nothing, PERIOD)
+    expected = wanted + np.exp(-PERIOD / lead_time) * (spools - wanted)
+    np.testing.assert_allclose(plant.state[list(SPOOLS)][free], expected[free], rtol=0, atol=1e-5)
+
+
+def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
+    for sign in (1.0, -1.0):
+        assert admittance_law.lead(sign, -sign, np.exp(-PERIOD / 0.004), 0.5) == sign
+
+
+def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35) -> Array:
+    """The gain share after each of the speed errors (T,), one per period."""
+    memory, row = remembered(1), admittance_law.WATCH_N
+    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least) for error in errors])
+
+
+TIMES = PERIOD * np.arange(2000)
+
+
+@pytest.mark.parametrize("frequency", [4.0, 12.0, 40.0])
+def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: float) -> None:
+    """By ``fall`` at each half wave after the second one, never below ``least``."""
+    share = watched(0.1 * np.sin(2 * np.pi * frequency * TIMES))
+    falls = np.round(np.log(share) / np.log(0.9), 9)
+    half_waves = np.floor(2 * frequency * TIMES - 1e-9)
+    expected = np.maximum(0.9 ** np.maximum(half_waves - 1, 0), 0.35)
+    assert np.mean(np.abs(share - expected) < 1e-12) > 0.97, "but for the instants of the sign's change"
+    assert share.min() == pytest.approx(max(0.35, 0.9 ** np.floor(2 * frequency * 2 - 2)), rel=0.11)
+    assert falls.min() == 0
+
+
+@pytest.mark.parametrize("kept", [0.3, 0.6, 0.74])
+def test_a_decaying_transient_costs_no_gain(kept: float) -> None:
+    """Each half wave smaller than SUSTAINED times the one before, whatever its size."""
+    decay = np.log(kept) * 2 * 10.0
+    share = watched(2.0 * np.exp(decay * TIMES) * np.sin(2 * np.pi * 10.0 * TIMES))
+    assert share.min() == 1.0
+
+
+def test_small_or_slow_oscillations_and_one_way_errors_cost_no_gain() -> None:
+    assert watched(0.055 * np.sin(2 * np.pi * 10 * TIMES)).min() == 1.0, "below the level"
+    assert watched(0.5 * np.sin(2 * np.pi * 2.4 * TIMES)).min() == 1.0, "half waves beyond 0.2 s"
+    assert watched(0.3 + 0.2 * np.sin(2 * np.pi * 10 * TIMES)).min() == 1.0, "no change of sign"
+    assert watched(0.2 * np.sin(2 * np.pi * 10 * TIMES), fall=1.0).min() == 1.0, "fixed gains"
+    growing = watched(0.02 * np.exp(3 * TIMES) * np.sin(2 * np.pi * 10 * TIMES))
+    first = TIMES[np.argmax(growing < 1)]
+    assert 0.02 * np.exp(3 * first) == pytest.approx(0.06, rel=0.25), "a growing one, as soon as it is beyond the level"
+
+
+@pytest.mark.parametrize("direction", ["across", "along"])
+def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(direction: str) -> None:
+    """After five half waves of the speed error in one direction: c 0.9^3 there, jerk by jerk, and c in the other one."""
+    rig, c, error = Parameters(), 50.0, 5e-5
+    now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
+    nothing, law, memory, pose = np.zeros((2, 1)), Law(rig, 50.0, 50.0), remembered(1), rigid_body.pose_of(now.piston, rig)
+    resting, _ = near(now, rig, nothing, seed=1, share=0.0)
+    shaken = {"across": pose.across, "along": pose.beam}[direction]
+    for time in TIMES[:245]:
+        motion = resting.copy()
+        motion[2:4] += 0.1 * np.sin(2 * np.pi * 10.0 * time) * shaken
+        law.command(now, motion, nothing, nothing, memory=memory)
+    for way in (pose.across, pose.beam):
+        motion = resting.copy()
+        motion[:2] -= error * way
+        openings = law.command(now, motion, nothing, nothing, memory=memory.copy())
+        jerk = (rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1] * way).sum()
+        left = 0.9**3 * c if way is shaken else c
+        assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)
+
+
+def test_the_gain_share_is_that_of_the_direction() -> None:
+    """The end effector shakes by 0.1 m/s and 10 Hz about a resting target: across cylinder 2, along it, both, not at all."""
+    lanes, rig = 4, Parameters()
+    wanted = closed_loop.holding(np.repeat([[0.45], [-0.2]], lanes, axis=1), 2000.0)
+    pressures, nothing = closed_loop.resting_at(wanted, rig).pressures, np.zeros((2, lanes))
+    beam = wanted.position / np.hypot(*wanted.position)
+    across = np.array([-beam[1], beam[0]])
+    way = across * np.array([1.0, 0.0, 1.0, 0.0]) + beam * np.array([0.0, 1.0, 1.0, 0.0])
+    law, rate = AdmittanceBackstepping(rig, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
+    for time in TIMES[:1000]:
+        clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
+        place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
+        law.command(Measurement(clock, place, clock, speed, pressures, nothing, sampled=False), wanted)
+    assert np.array_equal(law.gain_share, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
+    law.reset(np.array([True, False, False, False]))
+    assert np.array_equal(law.gain_share[:, :2], [[1, 1], [1, LEAST_SHARE]])
+
+
+def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, Array]:
+    """How far the pistons move from a resting target at (0.5, 0), (2, N), m, and where they started, without dry friction:
+    the law is told of the forces ``told`` (2, N), N, along them, and not that a hand pushes with ``unmeasured`` (2, N), N."""
+    rig, lanes = closed_loop.FRICTIONLESS, told.shape[1]
+    wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
+    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceBackstepping(rig)
+    start = plant.piston.copy()
+
+    def blind(plant: Plant, time: float, force: Array) -> Measurement:
+        return closed_loop.ideal(plant, time, np.zeros_like(force))
+
+    def ramp(time: float) -> float:
+        return min(time / 0.5, 1.0)
+
+    def command(measured: Measurement, wanted: Reference) -> Array:
+        share, rate = ramp(float(measured.time[0])), 2.0 if measured.time[0] < 0.5 else 0.0
+        return law.command(measured, wanted, share * told, rate * told)
+
+    for _ in closed_loop.run(plant, command, lambda t: wanted, lambda t: ramp(t) * unmeasured, seconds, blind):
+        pass
+    return plant.piston - start, start
+
+
+def test_a_belief_holds_the_pistons_against_it_whatever_the_observer_finds() -> None:
+    """At rest dF/dt = 0 leaves y = -(b/m_e) (3 c - Fv/m_e)/(c^3 + 2 c): whoever believes in a push outwards, stays inside.
+
+    A force that is really there and unknown is observed anyway, and what is told comes on top: lanes 5 to 7 are told the truth.
+    """
+    rig, c = closed_loop.FRICTIONLESS, AdmittanceBackstepping.TUNED["ideal"]["gain"]
+    told = np.array([[12.0, -12.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 12.0, -12.0, 0.0, 0.0, 0.0, 0.0]])
+    push = np.zeros((2, 8))
+    push[:, 4:] = [[10.0, 10.0, 0.0, -8.0], [0.0, 0.0, 10.0, 5.0]]
+    place = np.repeat([[0.5], [0.0]], 8, axis=1)
+    piston = inverse_geometry(place, rig)
+    told[:, 5:] = (rigid_body.jacobians(piston, rig).transpose(0, 2, 1) @ push.T[..., None])[..., 0].T[:, 5:]
+    moved, start = held(told, push)
+    masses = rig.mechanics.mass * (rigid_body.jacobians(start, rig) ** 2).sum(axis=1).T
+    viscous = np.array([[rig.cylinder1.viscous_friction], [rig.cylinder2.viscous_friction]])
+    expected = -told / masses * (3 * c - viscous / masses) / (c**3 + 2 * c)
+    np.testing.assert_allclose(moved, expected, rtol=0.01, atol=2e-6)
+    assert np.abs(expected).max() > 1e-3
+
+
+def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
+    lanes = 3
+    wanted = closed_loop.holding(np.array([[0.5, 0.45, 0.55], [0.0, 0.05, -0.1]]), 2000.0)
+    plant = closed_loop.resting_at(wanted, Parameters())
+    plain, zero, several, single = (AdmittanceBackstepping() for _ in range(4))
+    rng = np.random.default_rng(0)
+    for tick in range(50):
+        push = rng.uniform(-5, 5, (2, lanes))
+        seen = closed_loop.ideal(plant, tick * PERIOD, push)
+        openings = plain.command(seen, wanted)
+        assert np.array_equal(zero.command(seen, wanted, np.zeros((2, lanes)), np.zeros((2, lanes))), openings)
+        one = Measurement(*(getattr(seen, field.name)[..., 1] for field in dataclasses.fields(seen)[:-1]), sampled=False)
+        force, rate = rng.uniform(-9, 9, (2, 2, lanes))
+        together = several.command(seen, wanted, force, rate)
+        assert not np.array_equal(together, openings)
+        alone = single.command(one, Reference(wanted.rows[:, 1]), force[:, 1], rate[:, 1])
+        assert np.array_equal(alone, together[:, 1])
+        plant.advance(openings, push, PERIOD)
+    for wrong in (np.zeros((2, 2)), np.zeros(3), np.zeros((1, 3))):
+        with pytest.raises(ValueError, match=r"feedforward_force has shape .*; allowed: \(2, 3\)"):
+            plain.command(seen, wanted, wrong)
+        with pytest.raises(ValueError, match=r"feedforward_rate has shape .*; allowed: \(2, 3\)"):
+            plain.command(seen, wanted, None, wrong)

@@ -1,0 +1,275 @@
+"""The observer of spools and chamber pressures: against exact lags, closed forms, and (6) integrated by SciPy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from baselines.estimation.chamber_observer import ChamberObserver
+from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+from tests.oracles import derived_law
+
+PERIOD = 1e-3
+BLIND = 1e-9
+"""1/s: a bandwidth at which the cells are not believed."""
+
+ANOTHER = Parameters().replace(
+    {
+        "cylinder1.stroke": 0.24, "cylinder1.rod_diameter": 0.014, "cylinder2.piston_diameter": 0.032,
+        "chambers.dead_volume": 2.2e-5, "valves.time_constant": 0.007, "valves.leakage_ratio": 0.02,
+        "valves.critical_ratio": 0.4, "air.temperature": 310.0, "air.polytropic_index": 1.35, "air.supply_pressure": 6.2e5,
+    }
+)  # fmt: skip
+TIGHT = Parameters().replace({"valves.leakage_ratio": 0.0, "valves.time_constant": 0.006})
+"""Valves that do not leak."""
+
+START = np.array([[1.6e5], [5.5e5], [3.0e5], [2.2e5]])
+"""Pa, in chambers P1, N1, P2, N2."""
+
+
+def observer(rig: Parameters, bandwidth: float, period: float = PERIOD) -> ChamberObserver:
+    return ChamberObserver(period, parameter_column(rig), bandwidth)
+
+
+def resting(lanes: int, y1: float = 0.02, y2: float = -0.05) -> Array:
+    """Joints (4, N) of pistons that do not move."""
+    return np.repeat([[y1], [y2], [0.0], [0.0]], lanes, axis=1)
+
+
+def swinging(time: float) -> Array:
+    """Joints (4,) of pistons on their ways: up to 0.6 and 1 m/s."""
+    rate = np.array([13.0, 9.0])
+    return np.concatenate([[0.045, 0.11] * np.sin(rate * time), rate * [0.045, 0.11] * np.cos(rate * time)])
+
+
+def volumes(joints: Array, rig: Parameters) -> tuple[Array, Array]:
+    """Of chambers P1, N1, P2, N2 with their dead volumes, m3, and their rates, m3/s; (4,) each."""
+    found, rates = [], []
+    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        for area, sign in zip(derived_law.areas(cylinder), (1.0, -1.0), strict=True):
+            found.append(rig.chambers.dead_volume + area * (cylinder.stroke / 2 + sign * joints[i]))
+            rates.append(sign * area * joints[2 + i])
+    return np.array(found), np.array(rates)
+
+
+def lagging(start: Array, opening: Array, since: Any, rig: Parameters) -> Array:
+    """Spools a time ``since`` after their valves were told to go from ``start`` to ``opening``."""
+    return np.asarray(opening + (start - opening) * np.exp(-since / rig.valves.time_constant))
+
+
+HOLD = 0.008
+"""s for which every command of ``commands`` is held."""
+
+
+def commands(count: int) -> Array:
+    """Openings (count, 4) that fill and vent chambers in turn, fully at times."""
+    openings = np.random.default_rng(8).uniform(-0.2, 0.2, (count, 4))
+    openings += np.where((np.arange(count)[:, None] + [0, 5, 8, 13]) // 5 % 2 == 0, 0.4, -0.4)
+    openings[3], openings[6, ::2] = [1.0, -1.0, -1.0, 1.0], -1.0
+    return openings
+
+
+def truth(rig: Parameters, openings: Array, times: Array) -> tuple[Array, Array]:
+    """Spools and pressures (T, 4) at ``times`` by (6) with V = V0 + S L and ISO 6358 flows, valves shut at first."""
+    spools, air, found = np.zeros(4), START[:, 0].copy(), []
+    for block, opening in enumerate(openings):
+        begin, first = block * HOLD, spools
+
+        def slope(time: float, p: Array, begin: float = begin, first: Array = first, opening: Array = opening) -> Array:
+            volume, rate = volumes(swinging(time), rig)
+            open_by = lagging(first, opening, time - begin, rig)
+            flow = np.array([derived_law.net_flow(s, own, rig) for s, own in zip(open_by, p, strict=True)])
+            gas_t = rig.air.gas_constant * rig.air.temperature
+            return np.asarray(rig.air.polytropic_index * (gas_t * flow - p * rate) / volume)
+
+        own = times[(times > begin - 1e-9) & (times < begin + HOLD - 1e-9)]
+        path = solve_ivp(slope, (begin, begin + HOLD), air, t_eval=[*own, begin + HOLD], rtol=1e-8, atol=1e-2)
+        found += [np.concatenate([lagging(first, opening, t - begin, rig), p]) for t, p in zip(own, path.y.T, strict=False)]
+        air, spools = path.y[:, -1], lagging(first, opening, HOLD, rig)
+    return np.array(found)[:, :4], np.array(found)[:, 4:]
+
+
+def believed(estimator: ChamberObserver, openings: Array, times: Array, measured: Callable[[int], Array]) -> Array:
+    """Spools and pressures (T, 8) of one rig that swings while its valves are told ``openings``."""
+    path, joints = [], np.zeros((4, 1))
+    for tick, time in enumerate(times):
+        pressures = estimator.update(measured(tick), joints)
+        path.append(np.concatenate([estimator.spools[:, 0], pressures[:, 0]]))
+        joints, estimator.openings[:, 0] = swinging(time)[:, None], openings[int(time / HOLD + 1e-6)]
+    return np.array(path)
+
+
+@pytest.mark.parametrize("rig", [Parameters(), ANOTHER], ids=["default", "another rig"])
+def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
+    """Blind but for the first instant, 0.16 s of swings and strokes of the valves: spools exactly, pressures but for what
+    Euler's step leaves, half as much with half the period."""
+    openings, errors = commands(20), []
+    for period in (1e-3, 5e-4):
+        times = period * np.arange(round(20 * HOLD / period))
+        spools, pressures = truth(rig, openings, times)
+        path = believed(observer(rig, BLIND, period), openings, times, lambda tick: START)
+        np.testing.assert_allclose(path[:, :4], spools, rtol=0, atol=1e-12)
+        errors.append(np.abs(path[:, 4:] - pressures).max(axis=0))
+    assert np.ptp(pressures, axis=0).min() > 4e4, "there must be something to predict"
+    assert np.all(errors[0] < 0.03 * np.ptp(pressures, axis=0))
+    np.testing.assert_allclose(errors[1] / errors[0], 0.5, rtol=0, atol=0.06)
+
+
+def test_spools_are_those_of_the_plant() -> None:
+    """Also with full openings, and after commands that change at every period."""
+    rig, lanes, rng = ANOTHER, 3, np.random.default_rng(0)
+    plant, estimator = Plant(rig, lanes), observer(rig, 150.0)
+    for _ in range(30):
+        estimator.update(plant.pressures, resting(lanes))
+        np.testing.assert_allclose(estimator.spools, plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
+        estimator.openings[:] = np.clip(rng.normal(0, 1, (4, lanes)), -1, 1)
+        plant.advance(estimator.openings, np.zeros((2, lanes)), PERIOD)
+    assert np.abs(plant.state[list(SPOOLS)]).max() > 0.5
+
+
+def test_the_lag_is_integrated_over_the_period() -> None:
+    """Choked supply, pistons at rest, no leakage: P = P0 + k r T C rho Ps (integral of s dt)/V, without an error of steps."""
+    rig, period, tau, rng = TIGHT, 4e-3, 0.006, np.random.default_rng(1)
+    estimator, pressures, spool, expected = observer(rig, BLIND, period), np.full((4, 1), 1.1e5), np.zeros(4), np.full(4, 1.1e5)
+    density = rig.air.reference_density * math.sqrt(rig.air.reference_temperature / rig.air.temperature)
+    choked = rig.valves.sonic_conductance * density * rig.air.supply_pressure
+    gain = rig.air.polytropic_index * rig.air.gas_constant * rig.air.temperature * choked
+    gain /= volumes(resting(1)[:, 0], rig)[0]
+    for _ in range(12):
+        found = estimator.update(pressures, resting(1))[:, 0]
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
+        opening = rng.uniform(0.0, 0.4, 4)
+        estimator.openings[:, 0] = opening
+        gone = lagging(spool, opening, period, rig)
+        expected = expected + gain * (opening * period - tau * (gone - spool))
+        spool = gone
+    assert 1.2e5 < expected.min() < expected.max() < rig.valves.critical_ratio * rig.air.supply_pressure
+
+
+def test_shut_chambers_are_compressed_polytropically() -> None:
+    """P V^k stays what it was, but for the step's error."""
+    rig, period, path = TIGHT, 1e-4, []
+    estimator, joints, times = observer(rig, BLIND, period), np.zeros((4, 1)), period * np.arange(1500)
+    for time in times:
+        path.append(estimator.update(START, joints)[:, 0].copy())
+        joints = swinging(time)[:, None]
+    volume = np.array([volumes(swinging(time), rig)[0] for time in times])
+    expected = START[:, 0] * (volume[0] / volume) ** rig.air.polytropic_index
+    assert np.all(np.ptp(expected, axis=0) > 0.3 * START[:, 0])
+    np.testing.assert_allclose(path, expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("bandwidth", [50.0, 150.0, 600.0])
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 4e-3])
+def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None:
+    """Nothing flows: the mean is true, the variance that of a first-order filter, share/(2 - share), uncorrelated cells."""
+    lanes, noise, share = 1000, 500.0, 1 - np.exp(-bandwidth * period)
+    estimator, rng, kept = observer(TIGHT, bandwidth, period), np.random.default_rng(2), []
+    settled = math.ceil(8 / (bandwidth * period))
+    for tick in range(settled + 60):
+        measured = START + noise * rng.normal(size=(4, lanes))
+        estimate = estimator.update(measured, resting(lanes))
+        if tick >= settled:
+            kept.append(estimate - START)
+    error = np.array(kept)
+    assert np.mean(error**2) == pytest.approx(noise**2 * share / (2 - share), rel=0.05)
+    assert np.abs(error.mean(axis=(0, 2))).max() < 0.1 * noise
+    assert np.abs(np.corrcoef(error[-1]) - np.eye(4)).max() < 0.15
+
+
+def test_an_error_of_the_model_is_followed_with_the_lag_of_the_bandwidth() -> None:
+    """Pressures that rise although nothing should flow: T/(e^(w T) - 1) late, nearly 1/w."""
+    bandwidth, rise, lag = 150.0, 2e5, PERIOD / math.expm1(150.0 * PERIOD)
+    estimator, pressures = observer(TIGHT, bandwidth), START.copy()
+    for _ in range(200):
+        estimate = estimator.update(pressures, resting(1)).copy()
+        behind, pressures = pressures - estimate, pressures + rise * PERIOD
+    np.testing.assert_allclose(behind, rise * lag, rtol=1e-6)
+    assert lag == pytest.approx(1 / bandwidth, rel=0.1)
+
+
+def test_what_the_model_explains_is_followed_without_lag() -> None:
+    """Noisy cells on swings and strokes: half the error of the best first-order filter, which lags or leaves the noise.
+
+    Measured: 0.14 to 0.22 kPa instead of 0.49 to 0.72 kPa; the noise alone leaves 0.14.
+    """
+    rig, openings = Parameters(), commands(20)
+    times = PERIOD * np.arange(round(20 * HOLD / PERIOD))
+    _, pressures = truth(rig, openings, times)
+    cells = pressures + 500.0 * np.random.default_rng(4).normal(size=pressures.shape)
+    path = believed(observer(rig, 150.0), openings, times, lambda tick: cells[tick][:, None])[:, 4:]
+    filtered = np.empty((5, *cells.shape))
+    for own, share in zip(filtered, (0.1, 0.2, 0.4, 0.6, 0.8), strict=True):
+        own[0] = cells[0]
+        for tick in range(1, len(cells)):
+            own[tick] = own[tick - 1] + share * (cells[tick] - own[tick - 1])
+    error = np.sqrt(np.mean((path - pressures)[20:] ** 2, axis=0))
+    by_filter = np.sqrt(np.mean((filtered - pressures)[:, 20:] ** 2, axis=1)).min(axis=0)
+    assert np.all(error < 0.5 * by_filter)
+
+
+def wild(lanes: int, ticks: int) -> tuple[Array, Array, Array]:
+    """Pressures and openings (T, 4, N) and joints (T, 4, N) without a physical meaning."""
+    rng = np.random.default_rng(5)
+    spread = np.array([[0.09], [0.19], [1.0], [1.0]])
+    measured, openings = rng.uniform(0.5e5, 9e5, (ticks, 4, lanes)), rng.uniform(-1, 1, (ticks, 4, lanes))
+    return measured, openings, spread * rng.uniform(-1, 1, (ticks, 4, lanes))
+
+
+def test_exact_cells_are_believed_bit_for_bit() -> None:
+    measured, openings, joints = wild(5, 20)
+    estimator = observer(Parameters(), math.inf)
+    for pressures, opening, now in zip(measured, openings, joints, strict=True):
+        assert np.array_equal(estimator.update(pressures, now), pressures)
+        estimator.openings[:] = opening
+
+
+def test_lanes_and_a_new_start() -> None:
+    """Lanes do not know of each other; a reset one starts like a new observer, the others go on as if nothing were."""
+    measured, openings, joints = wild(3, 40)
+    fresh, one = np.array([False, True, False]), slice(1, 2)
+    kept, reset, single, late = (observer(Parameters(), 150.0) for _ in range(4))
+    for tick in range(40):
+        if tick == 20:
+            reset.reset(fresh)
+        expected, got = (estimator.update(measured[tick], joints[tick]) for estimator in (kept, reset))
+        alone = np.ascontiguousarray(measured[tick][:, one]), np.ascontiguousarray(joints[tick][:, one])
+        assert np.array_equal(single.update(*alone), expected[:, one])
+        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
+        assert np.array_equal(reset.spools[:, ~fresh], kept.spools[:, ~fresh])
+        if tick >= 20:
+            assert np.array_equal(late.update(*alone), got[:, one])
+            assert np.array_equal(late.spools, reset.spools[:, one])
+            late.openings[:] = openings[tick][:, one]
+        if tick == 20:
+            assert np.array_equal(got[:, one], alone[0])
+            assert not reset.spools[:, 1].any()
+            assert np.abs(kept.spools[:, 1]).min() > 0.01
+            assert np.abs(got[:, one] - expected[:, one]).min() > 1e3
+        for estimator in (kept, reset):
+            estimator.openings[:] = openings[tick]
+        single.openings[:] = openings[tick][:, one]
+    for start_anew in (lambda: reset.reset(), lambda: reset.update(measured[0][:, :2].copy(), joints[0][:, :2].copy())):
+        start_anew()
+        assert np.array_equal(reset.update(measured[7], joints[7]), measured[7])
+        assert not reset.spools.any()
+        assert not reset.openings.any()
+
+
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 1e-2])
+def test_pistons_past_their_strokes_leave_pressures_that_can_be(period: float) -> None:
+    """Deeper than the dead volume is long, where a chamber would have none left: the believed one keeps its dead volume."""
+    rig = Parameters().replace({"chambers.dead_volume": 5e-6, "electronics.control_period": period})
+    past = np.array([[0.112, -0.112], [-0.212, 0.212], [1.0, -1.0], [-1.0, 1.0]])
+    estimator, rng, cells = observer(rig, 150.0, period), np.random.default_rng(6), np.full((4, 2), 4e5)
+    for _ in range(200):
+        pressures = estimator.update(cells, past * rng.choice([-1, 1], (4, 1)))
+        assert 1e5 < pressures.min() <= pressures.max() < 1e6
+        estimator.openings[:] = rng.choice([-1.0, 1.0], (4, 2))

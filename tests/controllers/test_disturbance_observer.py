@@ -1,0 +1,118 @@
+"""The disturbance observer from measured speeds: its double pole, and unknown forces on the model of points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from baselines.estimation.disturbance_observer import DisturbanceObserver
+from birthsim_env.loop.signals import Measurement
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
+
+PERIOD = 1e-3
+RIG = Parameters().replace({"geometry.gamma3": 1.45})
+
+
+def observer(bandwidth: float, rig: Parameters = RIG) -> DisturbanceObserver:
+    return DisturbanceObserver(rig.electronics.control_period, parameter_column(rig), bandwidth)
+
+
+def measured(piston: Array, speed: Array, pressures: Array, rig: Parameters, user: Array) -> Measurement:
+    """Exact sensors; pistons (2, N), pressures (4, N)."""
+    return rigid_body.seen(rigid_body.Instant(piston, speed, pressures, pressures[:2]), rig, user)
+
+
+@pytest.mark.parametrize("bandwidth", [30.0, 120.0])
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 4e-3])
+def test_an_unknown_force_is_found_with_a_double_pole(bandwidth: float, period: float) -> None:
+    """Cylinder 2 alone, weightless: d follows F/m (1 - (1 + w t) e^(-w t)), in steps with the pole 1 - w T twice."""
+    changes = {"mechanics.gravity": 0.0, "cylinder2.viscous_friction": 0.0, "electronics.control_period": period}
+    rig = RIG.replace(changes)
+    estimator, unknown, errors = observer(bandwidth, rig), 6.0, []
+    a = unknown / rig.mechanics.mass
+    pressures = np.full((4, 1), rig.air.atmospheric_pressure)
+    times = period * np.arange(round(8 / bandwidth / period))
+    for time in times:
+        piston, speed = np.array([[0.01], [-0.1 + 0.5 * a * time**2]]), np.array([[0.0], [a * time]])
+        estimator.update(measured(piston, speed, pressures, rig, np.zeros((2, 1))), np.zeros((2, 1)), np.zeros((2, 1)))
+        errors.append(estimator.disturbance[:, 0] - [0.0, a])
+    error = np.array(errors)
+    assert np.abs(error[:, 0]).max() < 1e-9, "cylinder 1 feels nothing"
+    kept = 1 - bandwidth * period
+    left = error[2:, 1] - 2 * kept * error[1:-1, 1] + kept**2 * error[:-2, 1]
+    np.testing.assert_allclose(left[1:], 0, rtol=0, atol=1e-9 * a)
+    expected = -a * (1 + bandwidth * times) * np.exp(-bandwidth * times)
+    np.testing.assert_allclose(error[:, 1], expected, rtol=0, atol=1.2 * bandwidth * period * a)
+
+
+def swinging(unknown: Array, known: Callable[[float], Array], user: Array, seconds: float) -> tuple[Array, Array, Array]:
+    """Pistons and speeds (T, 2) of the rig of points under forces along them, and its constant pressures (4, 1)."""
+    now = rigid_body.near_balance(RIG, 1, seed=5, speed=0.1, push=3.0)
+    force = rigid_body.forces(now.pressures, RIG)
+
+    def slope(time: float, state: Array) -> Array:
+        piston, speed = state[:2, None], state[2:, None]
+        constant = unknown[:, None] + known(time)[:, None]
+        wanted = rigid_body.acceleration(piston, speed, force, RIG, constant, user[:, None])
+        return np.concatenate([state[2:], rigid_body.joint_acceleration(piston, speed, wanted, RIG)[:, 0]])
+
+    start = np.concatenate([now.piston[:, 0], now.speed[:, 0]])
+    times = PERIOD * np.arange(round(seconds / PERIOD))
+    path = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-9, atol=1e-12).y.T
+    assert np.all(np.abs(path[:, :2]) < [0.09, 0.19]), "the run must end before a stop"
+    return path[:, :2], path[:, 2:], now.pressures
+
+
+def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
+    """d is the unknown force over the apparent mass; what is known, of the user and along the pistons, is not in it.
+
+    It changes with the pose, which d follows 2/w late; half a period of jerk is what Euler's step leaves.
+    """
+    unknown, user = np.array([15.0, -8.0]), np.array([6.0, 12.0])
+
+    def known(time: float) -> Array:
+        return np.array([4.0 * np.sin(20 * time), -6.0 * np.cos(15 * time)])
+
+    piston, speed, pressures = swinging(unknown, known, user, 0.3)
+    assert np.abs(speed).max() > 0.2, "it must move"
+    estimator = observer(200.0)
+    for tick, (y, v) in enumerate(zip(piston, speed, strict=True)):
+        seen = measured(y[:, None], v[:, None], pressures, RIG, user[:, None])
+        joints = estimator.update(seen, user[:, None], known(tick * PERIOD)[:, None])
+        np.testing.assert_allclose(joints[:, 0], [*y, *v], rtol=0, atol=1e-12)
+        if tick > 150:
+            r2 = y[1] + RIG.geometry.k2
+            pose = by_points.pose_from_lengths(y[0] + RIG.geometry.k1, r2, RIG.geometry)
+            kappa = np.hypot(*by_points.cartesian_velocity(pose, r2, 1.0, 0.0)[0])
+            expected = unknown / (RIG.mechanics.mass * np.array([kappa**2, 1.0]))
+            np.testing.assert_allclose(estimator.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
+
+
+def test_lanes_and_a_new_start() -> None:
+    """Lanes do not know of each other; a reset one starts from the speed that is measured, without a disturbance."""
+    now = rigid_body.near_balance(RIG, 3, seed=7, speed=0.1, push=20.0)
+    nothing, fresh = np.zeros((2, 3)), np.array([False, True, False])
+    kept, reset, single, late = (observer(60.0) for _ in range(4))
+    seen = measured(now.piston, now.speed, now.pressures, RIG, nothing)
+    alone = measured(now.piston[:, 1:2], now.speed[:, 1:2], now.pressures[:, 1:2], RIG, nothing[:, :1])
+    for tick in range(40):
+        if tick == 20:
+            reset.reset(fresh)
+        for estimator in (kept, reset):
+            estimator.update(seen, nothing, nothing)
+        single.update(alone, nothing[:, :1], nothing[:, :1])
+        assert np.array_equal(single.disturbance[:, 0], kept.disturbance[:, 1])
+        assert np.array_equal(reset.disturbance[:, ~fresh], kept.disturbance[:, ~fresh])
+        if tick >= 20:
+            late.update(alone, nothing[:, :1], nothing[:, :1])
+            assert np.array_equal(reset.disturbance[:, 1], late.disturbance[:, 0])
+    assert np.abs(kept.disturbance[:, 1] - reset.disturbance[:, 1]).max() > 0.01
+    reset.reset()
+    reset.update(seen, nothing, nothing)
+    assert np.all(reset.disturbance == 0)

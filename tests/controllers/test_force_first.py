@@ -1,0 +1,147 @@
+"""Openings that put the force before the pneumatic stiffness, against the valves' characteristic and linear programmes."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from baselines.valve_inverse import force_first_openings, two_valve_openings
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Cylinder, Parameters
+from tests.oracles import derived_law
+
+RIG = Parameters()
+LENGTH = RIG.cylinder2.stroke
+
+
+@numba.njit
+def openings_of_both(cases: Array, ap: float, an: float, stroke: float, p: Array, u: Array) -> None:
+    """``u`` (4, N): force first, then neither first; ``cases`` (6, N): dF/dt, dK/dt, Pp, Pn, y, v."""
+    for i in range(cases.shape[1]):
+        rate, stiffness_rate, pp, pn, y, v = cases[0, i], cases[1, i], cases[2, i], cases[3, i], cases[4, i], cases[5, i]
+        lp, ln = stroke / 2 + y, stroke / 2 - y
+        force_first_openings(u, i, 0, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+        two_valve_openings(u, i, 2, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+
+
+def openings(cases: Array) -> tuple[Array, Array]:
+    """Force first and neither first, (2, N) each, of cylinder 2."""
+    u = np.empty((4, cases.shape[1]))
+    openings_of_both(cases, *derived_law.areas(RIG.cylinder2), LENGTH, parameter_column(RIG), u)
+    assert np.abs(u).max() <= 1
+    return u[:2], u[2:]
+
+
+def drawn(count: int, rates: float, seed: int, pressures: tuple[float, float] = (1.02e5, 6.98e5)) -> Array:
+    """Random pressures, positions and speeds; wanted rates of force up to ``rates`` N/s and of stiffness in proportion."""
+    rng, most = np.random.default_rng(seed), 0.45 * LENGTH
+    cases = [rng.uniform(-rates, rates, count), rng.uniform(-20 * rates, 20 * rates, count)]
+    cases += [*rng.uniform(*pressures, (2, count)), rng.uniform(-most, most, count), rng.uniform(-0.5, 0.5, count)]
+    return np.array(cases)
+
+
+def got(case: Array, opening: Array) -> Array:
+    """dF/dt and dK/dt of (6) with the flows that the openings let through."""
+    _, _, pp, pn, y, v = case
+    flows = [derived_law.net_flow(s, pressure, RIG) for s, pressure in zip(opening, (pp, pn), strict=True)]
+    return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, RIG.cylinder2, RIG)
+
+
+def unit_rates(y: float, pp: float, pn: float, v: float) -> tuple[Array, Array]:
+    """dF/dt and dK/dt without flow, and per flow of each chamber as the columns of a matrix."""
+
+    def rates(*flows: float) -> Array:
+        return derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, RIG.cylinder2, RIG)
+
+    still = rates(0.0, 0.0)
+    return still, np.transpose([rates(1.0, 0.0) - still, rates(0.0, 1.0) - still])
+
+
+def best(case: Array) -> tuple[float, float]:
+    """The dF/dt nearest to the wanted one, and with it the pressurisation flow nearest to the one that dK/dt asks for.
+
+    Two linear programmes over the flows that the valves can carry: min |dF/dt - wanted|, then min |qT - wanted|.
+    """
+    rate, stiffness_rate, pp, pn, y, v = case
+    still, gain = unit_rates(y, pp, pn, v)
+    lp, ln = LENGTH / 2 + y, LENGTH / 2 - y
+    to_qt = 0.5 * LENGTH * np.array([1 / lp, 1 / ln])
+    wanted_qt = to_qt @ np.linalg.solve(gain, np.array([rate, stiffness_rate]) - still)
+    limits = [sorted(derived_law.net_flow(s, pressure, RIG) for s in (-1.0, 0.0, 1.0)) for pressure in (pp, pn)]
+    bounds = [(1e4 * low, 1e4 * high) for low, _, high in limits]
+
+    def nearest(line: Array, goal: float, row: Array | None = None, value: float = 0.0) -> Array:
+        """Flows, in 1e-4 kg/s, that bring ``line`` . flows as near to ``goal`` as they can, on the line row . flows = value."""
+        table, right = [[*line, -1.0], [*-line, -1.0]], [goal, -goal]
+        equal = {} if row is None else {"A_eq": [[*row, 0.0]], "b_eq": [value]}
+        found = linprog([0, 0, 1], A_ub=table, b_ub=right, bounds=[*bounds, (0, None)], method="highs", **equal)
+        assert found.status == 0, found.message
+        return np.asarray(found.x[:2])
+
+    force_row = 1e-4 * gain[0] / 1e3
+    first = nearest(force_row, (rate - still[0]) / 1e3)
+    second = nearest(to_qt, 1e4 * wanted_qt, force_row, float(force_row @ first))
+    return still[0] + 1e3 * float(force_row @ first), 1e-4 * float(to_qt @ second)
+
+
+def pressurisation(case: Array, opening: Array) -> float:
+    _, _, pp, pn, y, _ = case
+    flows = [derived_law.net_flow(s, pressure, RIG) for s, pressure in zip(opening, (pp, pn), strict=True)]
+    return 0.5 * LENGTH * (flows[0] / (LENGTH / 2 + y) + flows[1] / (LENGTH / 2 - y))
+
+
+def test_without_saturation_both_rates_are_had() -> None:
+    """The same openings as without an order of precedence, and exactly the wanted rates."""
+    cases = drawn(500, 1000.0, seed=0)
+    first, neither = openings(cases)
+    inside = np.abs(neither).max(axis=0) < 1
+    assert inside.sum() > 200
+    np.testing.assert_allclose(first[:, inside], neither[:, inside], rtol=0, atol=1e-12)
+    for case, opening in zip(cases.T[inside], first.T[inside], strict=True):
+        np.testing.assert_allclose(got(case, opening), case[:2], rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("rates", [2e3, 8e3])
+def test_where_a_valve_saturates_the_force_has_precedence(rates: float) -> None:
+    """Lexicographic optimum: no valves give a nearer dF/dt, and with that none a nearer pressurisation."""
+    cases = drawn(90, rates, seed=1)
+    first, neither = openings(cases)
+    saturated, kept = np.abs(neither).max(axis=0) >= 1, 0
+    assert saturated.sum() > 40
+    for case, opening, plain in zip(cases.T[saturated], first.T[saturated], neither.T[saturated], strict=True):
+        (force_rate, _), (nearest_rate, nearest_qt) = got(case, opening), best(case)
+        assert force_rate == pytest.approx(nearest_rate, rel=1e-7, abs=1e-3)
+        assert pressurisation(case, opening) == pytest.approx(nearest_qt, rel=1e-6, abs=1e-11)
+        lost = abs(got(case, plain)[0] - case[0])
+        if abs(force_rate - case[0]) < 1e-3:
+            kept += lost > 10
+    assert kept > 5, "there must be cases in which precedence matters"
+
+
+@pytest.mark.parametrize("pressures", [(6.9e5, 9e5), (0.6e5, 1.1e5)], ids=["above the supply", "below the atmosphere"])
+def test_pressures_beyond_supply_and_atmosphere(pressures: tuple[float, float]) -> None:
+    """A piston that is pushed compresses a chamber beyond the supply: a valve that cannot fill it still does what it can."""
+    cases = drawn(60, 3e3, seed=2, pressures=pressures)
+    cases[3] = drawn(60, 3e3, seed=3)[3]
+    first, _ = openings(cases)
+    for case, opening in zip(cases.T, first.T, strict=True):
+        nearest_rate, nearest_qt = best(case)
+        assert got(case, opening)[0] == pytest.approx(nearest_rate, rel=1e-7, abs=1e-3)
+        assert pressurisation(case, opening) == pytest.approx(nearest_qt, rel=1e-6, abs=1e-11)
+
+
+def test_it_serves_each_cylinder_with_its_own_areas() -> None:
+    """Another bore, another rod: the wanted rates again."""
+    other = Parameters().replace({"cylinder2.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012})
+    cylinder: Cylinder = other.cylinder2
+    cases, u = drawn(50, 800.0, seed=4), np.empty((4, 50))
+    openings_of_both(cases, cylinder.area_p, cylinder.area_n, cylinder.stroke, parameter_column(other), u)
+    inside = np.abs(u).max(axis=0) < 1
+    assert inside.sum() > 20
+    for case, opening in zip(cases.T[inside], u[:2].T[inside], strict=True):
+        _, _, pp, pn, y, v = case
+        flows = [derived_law.net_flow(s, pressure, other) for s, pressure in zip(opening, (pp, pn), strict=True)]
+        rates = derived_law.force_and_stiffness_rates((pp, pn), flows, y, v, cylinder, other)
+        np.testing.assert_allclose(rates, case[:2], rtol=1e-9, atol=1e-6)

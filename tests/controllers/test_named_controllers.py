@@ -1,0 +1,133 @@
+"""Controllers by name: those of the package, and a user's own from a file."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.backstepping.controller import BacksteppingController
+from baselines.controller import checked_command
+from baselines.registry import controller_names, make_controller
+from birthsim_env import Parameters
+from tests.bench.test_evaluation import Spy, run
+
+PROBE, CIRCLE = "BirthSIM/Probe-v1", "BirthSIM/Circle-v1"
+RIG = Parameters()
+
+
+OWN = """
+from __future__ import annotations
+from dataclasses import dataclass
+import numpy as np
+
+@dataclass
+class Own:
+    parameters: object
+    share: float = 0.05
+
+    def command(self, measurement, reference):
+        assert self.parameters.mechanics.mass == 3.5
+        return np.full((4, measurement.position.shape[1]), self.share) * [[1], [-1], [1], [-1]]
+
+    def reset(self, lanes=None):
+        pass
+
+def made_by_a_function(parameters):
+    return Own(parameters, 0.0)
+
+class Wordless:
+    def __init__(self, parameters):
+        pass
+
+number = 3
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    return path
+
+
+def test_a_controller_from_a_users_own_file_runs_as_named(own):
+    rig = RIG.replace({"mechanics.mass": 3.5})
+    chosen = make_controller(f"{own}:Own", rig)
+    assert type(chosen).__name__ == "Own"
+    assert chosen.parameters == rig
+    spy = Spy(chosen)
+    result = run(spy, duration=0.1, parameters=rig)
+    np.testing.assert_array_equal(np.unique(spy.commands), [-0.05, 0.05])
+    assert result.metrics["error_rms_x"][0] > 0
+    assert make_controller(f"{own}:made_by_a_function", rig).share == 0
+    assert make_controller(f"{own}:Own", rig, share=0.2).share == 0.2
+
+
+def test_two_files_of_one_name_are_two_controllers(tmp_path):
+    made = []
+    for folder, share in (("a", "0.1"), ("b", "0.2")):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "numpy.py"
+        path.write_text(OWN.replace("0.05", share))
+        made.append(make_controller(f"{path}:Own", RIG))
+    assert [one.share for one in made] == [0.1, 0.2]
+    # A file called numpy.py hides no package.
+    import numpy
+
+    assert numpy is np
+
+
+def test_the_named_controllers_are_the_law_with_and_without_weight():
+    assert {"backstepping", "backstepping-weight", "residual"} <= set(controller_names())
+    env = gymnasium.make_vec(CIRCLE, num_envs=2)
+    env.reset(seed=0)
+    for name, weight in (("backstepping", False), ("backstepping-weight", True)):
+        expected = BacksteppingController(RIG, weight_compensation=weight).command(env.measurement, env.reference)
+        np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("backsteping", r"controller = 'backsteping'; allowed: backstepping, backstepping-weight, .*path/to/file\.py:Class"),
+        ("", r"controller = ''; allowed: backstepping"),
+        ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
+        ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),
+        ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a name that it defines: "),
+        ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a name"),
+        ("own.py:number", r"'{folder}/own\.py:number' cannot be made \(TypeError: .*\); allowed: a class that takes the rig"),
+        ("own.py:Wordless", r"'{folder}/own\.py:Wordless' is made without command\(\) or reset\(\); allowed: a class that"),
+    ],
+)
+def test_what_is_no_controller_is_refused_with_its_name_and_what_there_is(own, name, message):
+    given = f"{own.parent}/{name}" if ".py" in name else name
+    with pytest.raises(ValueError, match=message.replace("{folder}", str(own.parent))):
+        make_controller(given, RIG)
+
+
+def test_a_file_that_does_not_import_is_refused_with_its_line(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("import numpy\nimport no_such_module\n")
+    with pytest.raises(ValueError, match=r"broken\.py', line 2: ModuleNotFoundError: No module named 'no_such_module'"):
+        make_controller(f"{path}:Own", RIG)
+    path.write_text("class Own:\n    pass\n")
+    with pytest.raises(ValueError, match=r"cannot be made \(TypeError: Own\(\) takes no arguments\); allowed: a class"):
+        make_controller(f"{path}:Own", RIG)
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        (np.zeros(4), r"returned an array \(4,\)"),
+        ([[0.0] * 2] * 3, r"returned an array \(3, 2\)"),
+        (None, "returned None"),
+        ("open", "returned 'open'"),
+        (np.full((4, 2), np.nan), r"command\(\)\[0, 0\] = nan"),
+        (np.full((4, 2), 1.5), r"command\(\)\[0, 0\] = 1\.5"),
+    ],
+)
+def test_a_command_that_is_none_is_refused_by_name(returned, words):
+    with pytest.raises(ValueError, match=rf"controller 'mine': .*{words}; allowed: spool openings .* an array \(4, 2\)"):
+        checked_command("mine", returned, 2)
+    assert checked_command("mine", [[0.0, 1.0]] * 4, 2).shape == (4, 2)

@@ -1,0 +1,128 @@
+"""One 5/3 valve per cylinder: the rendered stiffness is kept, and the pneumatic stiffness settles by itself."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+
+import birthsim_env
+from baselines import BacksteppingController
+from baselines.bench.evaluation import evaluate
+from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
+from baselines.registry import make_controller
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Cylinder, Parameters
+from tests.controllers.test_backstepping import as_signals, random_situations
+from tests.oracles import closed_loop
+from tests.oracles import derived_law as derived
+from tests.oracles.closed_loop import FRICTIONLESS
+
+CASES = [
+    (pose, setpoint, axis, way) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1) for way in (1, -1)
+]
+
+
+def test_openings_are_opposite_and_give_the_force_rate() -> None:
+    """dF/dt that the flows through both orifices make is the law's, wherever the valve is not saturated."""
+    rig = Parameters()
+    s = random_situations(rig, 0.01, True, 400, np.random.default_rng(5))
+    law = BacksteppingController(rig, weight_compensation=True, sign_width=0.01, valves="one_valve")
+    u, terms = law.command(*as_signals(s, rig)), law.inspect(*as_signals(s, rig))
+    assert np.array_equal(u[[1, 3]], -u[[0, 2]])
+    free = np.abs(u[[0, 2]]) < 1
+    assert 100 < free.sum() < free.size
+    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        for lane in np.flatnonzero(free[i]):
+            air = s["pressures"][2 * i : 2 * i + 2, lane]
+            flows = [derived.net_flow(u[2 * i + j, lane], air[j], rig) for j in (0, 1)]
+            rate, _ = derived.force_and_stiffness_rates(air, flows, s["piston"][i, lane], s["speed"][i, lane], cylinder, rig)
+            assert rate == pytest.approx(terms.force_rate[i, lane], rel=1e-9, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["backstepping-one-valve", "backstepping-weight"])
+def test_rendered_stiffness_is_the_setpoint(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """5 mm either way at 5 poses, 1000 to 4000 N/m, both axes, without dry friction: within 1 %, as with two valves."""
+    closed_loop.shorten_probes(monkeypatch)
+    poses, setpoints, axes, ways = (np.array(column) for column in zip(*CASES, strict=True))
+    force = setpoints * 0.005 * ways * (axes == np.array([[0], [1]]))
+    probes = StiffnessTest(np.ascontiguousarray(poses.T), force, np.stack([setpoints, setpoints, 0 * setpoints]), FRICTIONLESS)
+    answers = run_stiffness_test(probes, make_controller(name, FRICTIONLESS))
+    assert not answers.lost.any()
+    assert np.abs(answers.stiffness_error(force)).max() < 0.01
+    assert answers.hunting.max() < 1e-5
+
+
+def balance(force: float, cylinder: Cylinder, rig: Parameters) -> Array:
+    """Pp and Pn at which a valve with opposite openings holds both pressures, and their difference the force."""
+    area_p, area_n = derived.areas(cylinder)
+
+    def missing(unknown: Array) -> list[float]:
+        pp, pn, opening = unknown[0] * 1e5, unknown[1] * 1e5, unknown[2] * 0.01
+        return [
+            derived.net_flow(opening, pp, rig) * 1e5,
+            derived.net_flow(-opening, pn, rig) * 1e5,
+            (pp * area_p - pn * area_n - force) / 100,
+        ]
+
+    found, _, solved, message = fsolve(missing, [4.5, 5.5, 0.0], full_output=True)
+    assert solved == 1, message
+    return np.array(found[:2]) * 1e5
+
+
+def test_pressures_settle_where_leakage_balances() -> None:
+    """No drift into saturation: each chamber ends where its valve's flows balance, and the stiffness is rendered there.
+
+    Valves that leak ten times more bring the end within ten seconds, which takes a minute with the default ones.
+    """
+    rig = FRICTIONLESS.replace({"valves.leakage_ratio": 0.05})
+    reference = closed_loop.holding(np.ascontiguousarray(np.array(POSES).T), 2000.0)
+    plant, law = closed_loop.resting_at(reference, rig), BacksteppingController(rig, True, valves="one_valve")
+    push, rest = np.array([[8.0], [0.0]]), reference.position
+    start = plant.pressures
+    for time, _, _, openings in closed_loop.run(
+        plant, law.command, lambda t: reference, lambda t: push * np.clip(t - 10, 0, 1) * np.ones(len(POSES)), 12.0
+    ):
+        assert np.abs(openings).max() < 0.5
+        if time == 10.0:
+            settled, rest = plant.pressures, plant.end_effector()[:2]
+    for lane in range(len(POSES)):
+        for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+            chambers = slice(2 * i, 2 * i + 2)
+            force = derived.forces(settled[:, lane], rig)[i]
+            np.testing.assert_allclose(settled[chambers, lane], balance(force, cylinder, rig), rtol=0.01)
+    assert np.abs(settled - start).max() > 1e5
+    assert settled.min() > 3e5
+    assert settled.max() < 6.5e5
+    moved = plant.end_effector()[:2] - rest
+    np.testing.assert_allclose(8.0 / moved[0], 2000.0, rtol=0.01)
+
+
+def test_on_the_circle_the_error_is_that_of_two_valves() -> None:
+    """A part of the Circle, with friction: the same error, and more air, since a valve that fills also drains."""
+    two, one = (
+        evaluate("BirthSIM/Circle-v1", make_controller(name, Parameters()), name, 1, 0, progress=False, duration=2.5).summary()
+        for name in ("backstepping-weight", "backstepping-one-valve")
+    )
+    for axis in "xy":
+        assert one[f"settled_rms_{axis}"]["median"] == pytest.approx(two[f"settled_rms_{axis}"]["median"], rel=0.05)
+    assert 1.0 < one["air"]["median"] / two["air"]["median"] < 1.4
+
+
+def test_an_environment_with_one_valve_takes_rows_0_and_2() -> None:
+    states = []
+    for valves, rows in (("two_valves", [0, 1, 2, 3]), ("one_valve", [0, 2])):
+        env = gymnasium.make("BirthSIM/Circle-v1", valves=valves, policy_period=0.001)
+        env.reset(seed=0)
+        rig, law = env.unwrapped, make_controller("backstepping-one-valve", Parameters())
+        for _ in range(300):
+            env.step(law.command(rig.measurement, rig.reference)[rows])
+        states.append(np.concatenate([rig.measurement.position, rig.measurement.pressures]))
+    np.testing.assert_array_equal(*states)
+
+
+def test_an_unknown_layout_is_refused() -> None:
+    with pytest.raises(ValueError, match="valves = 'three'; allowed: two_valves, one_valve"):
+        BacksteppingController(valves="three")
+    assert birthsim_env.parts.actuation.VALVE_LAYOUTS == ("two_valves", "one_valve")

@@ -1,0 +1,183 @@
+"""Friction along a reference motion: LuGre integrated by SciPy on the linkage made of points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from baselines.estimation.reference_friction import ReferenceFriction
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Cylinder, Parameters
+from tests.oracles import linkage_by_points as by_points
+from tests.oracles import rigid_body
+
+RIG, RATE = Parameters(), 2.5
+
+
+def circle(times: Array, size: float = 0.06) -> Array:
+    """Position and velocity (4, T) on an ellipse; both pistons turn round on it."""
+    angle = RATE * times
+    return np.array(
+        [0.5 + size * np.cos(angle), size / 2 * np.sin(angle), -size * RATE * np.sin(angle), size / 2 * RATE * np.cos(angle)]
+    )  # fmt: skip
+
+
+def piston_speeds(motion: Array) -> Array:
+    """(2, T), by solving with the linkage's columns."""
+    lengths = by_points.lengths(by_points.pose_from_point(motion[:2], RIG.geometry))
+    piston = np.array(lengths) - np.array([[RIG.geometry.k1], [RIG.geometry.k2]])
+    return np.linalg.solve(rigid_body.jacobians(piston, RIG), motion[2:4].T[..., None])[..., 0].T
+
+
+def lugre(speed: Callable[[float], float], cylinder: Cylinder, times: Array, rig: Parameters) -> Array:
+    """s0 z (T,) from dz/dt = v - s0 |v| z / G(v), z(0) = 0."""
+    f, coulomb = rig.friction, cylinder.coulomb_friction
+
+    def slope(time: float, z: Array) -> Array:
+        v = speed(time)
+        level = coulomb + (f.static_ratio - 1) * coulomb / (1 + (v / f.stribeck_speed) ** 2)
+        return v - f.bristle_stiffness * abs(v) * z / level
+
+    found = solve_ivp(slope, (0, times[-1]), [0.0], t_eval=times, method="LSODA", rtol=1e-8, atol=1e-13, max_step=2e-3)
+    return np.asarray(f.bristle_stiffness * found.y[0])
+
+
+def drags(rig: Parameters, times: Array, motion: Callable[[Array], Array]) -> Array:
+    """(T, 2): what the class says, one period after the other."""
+    model = ReferenceFriction(rig.electronics.control_period, parameter_column(rig))
+    rows = np.zeros((8, len(times)))
+    rows[:4] = motion(times)
+    return np.array([model.update(np.ascontiguousarray(rows[:, k : k + 1]))[:, 0] for k in range(len(times))])
+
+
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3])
+def test_friction_is_lugre_along_the_reference(period: float) -> None:
+    """A turn and a half with reversals of both pistons: RMS within 0.5 % and everywhere within 3 % of the Coulomb friction.
+
+    Measured: 0.34 and 2.2 %, of which a part is that no deflection above G(v)/s0 is kept while G falls.
+    """
+    rig = RIG.replace({"electronics.control_period": period})
+    times = period * np.arange(round(4.0 / period))
+    got = drags(rig, times, circle)
+    for i, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
+        grid = np.linspace(0, times[-1], 2000)
+        truth = lugre(CubicSpline(grid, piston_speeds(circle(grid))[i]), cylinder, times, rig)
+        assert truth.max() > cylinder.coulomb_friction
+        assert truth.min() < -cylinder.coulomb_friction
+        error = got[:-1, i] - truth[1:]  # after the period that begins with the sample
+        assert np.sqrt(np.mean(error**2)) < 0.005 * cylinder.coulomb_friction
+        assert np.abs(error).max() < 0.03 * cylinder.coulomb_friction
+
+
+@pytest.mark.parametrize("period", [1e-3, 1e-2])
+@pytest.mark.parametrize("speed", [0.002, 0.05, 0.8])
+def test_steady_motion_feels_the_stribeck_curve_whatever_the_step(period: float, speed: float) -> None:
+    """Straight along cylinder 2: G(v) with the sign of the speed, also where the bristle relaxes within a step."""
+    rig = RIG.replace({"electronics.control_period": period})
+    seconds = min(0.2 / speed, 4.0)
+    times = period * np.arange(round(seconds / period))
+    f, coulomb = rig.friction, rig.cylinder2.coulomb_friction
+    level = coulomb + (f.static_ratio - 1) * coulomb / (1 + (speed / f.stribeck_speed) ** 2)
+    for sign in (1.0, -1.0):
+
+        def straight(at: Array, sign: float = sign) -> Array:
+            zero = np.zeros_like(at)
+            return np.array([0.5 + sign * speed * (at - seconds / 2), zero, zero + sign * speed, zero])
+
+        got = drags(rig, times, straight)
+        assert got[-1, 1] == pytest.approx(sign * level, rel=1e-3)
+        assert np.abs(got[:, 1]).max() <= level * (1 + 1e-12), "never more"
+
+
+def test_a_resting_reference_keeps_its_bristles() -> None:
+    """What friction holds where the reference has stopped does not fade; at the start there is none."""
+    times = 1e-3 * np.arange(2000)
+
+    def stopping(at: Array) -> Array:
+        motion = circle(np.minimum(at, 0.4))
+        motion[2:4] *= at < 0.4
+        return motion
+
+    got = drags(RIG, times, stopping)
+    assert np.all(got[401:] == got[401])
+    assert np.abs(got[401]).min() > 5
+    assert np.all(drags(RIG, times[:50], lambda at: circle(0 * at) * [[1], [1], [0], [0]]) == 0)
+
+
+def test_lanes_and_a_new_start() -> None:
+    times, fresh = 1e-3 * np.arange(300), np.array([False, True])
+    motion = np.zeros((300, 8, 2))
+    motion[:, :4, 0], motion[:, :4, 1] = circle(times).T, circle(times + 0.9).T
+    kept, reset, single, late = (ReferenceFriction(1e-3, parameter_column(RIG)) for _ in range(4))
+    for tick, wanted in enumerate(motion):
+        if tick == 150:
+            reset.reset(fresh)
+        expected, got = kept.update(wanted), reset.update(wanted)
+        alone = np.ascontiguousarray(wanted[:, 1:])
+        assert np.array_equal(single.update(alone)[:, 0], expected[:, 1])
+        assert np.array_equal(got[:, 0], expected[:, 0])
+        if tick >= 150:
+            assert np.array_equal(late.update(alone)[:, 0], got[:, 1])
+        if tick == 150:
+            assert np.abs(got[:, 1] - expected[:, 1]).max() > 1
+    reset.reset()
+    again = ReferenceFriction(1e-3, parameter_column(RIG))
+    assert np.array_equal(reset.update(motion[9]), again.update(motion[9]))
+
+
+def two_lanes(times: Array) -> Array:
+    """(T, 4, 2): the ellipse twice, with different pistons turning round at different times."""
+    return np.stack([circle(times).T, circle(times + 0.9).T], axis=2)
+
+
+def under_way(until: float, count: int = 1) -> tuple[list[ReferenceFriction], Array]:
+    """Models that have followed the ellipses for so long, s, and what they said last (2, N)."""
+    models, motion = [ReferenceFriction(1e-3, parameter_column(RIG)) for _ in range(count)], np.zeros((8, 2))
+    for wanted in two_lanes(np.arange(0, until, 1e-3)):
+        motion[:4] = wanted
+        drags = [model.update(motion) for model in models]
+    return models, drags[0]
+
+
+@pytest.mark.parametrize("until", [0.2, 0.29, 0.63, 1.0])
+def test_a_forecast_is_what_updates_say_later(until: float) -> None:
+    """Period by period the same, lane by lane; asking changes nothing."""
+    (model, kept), _ = under_way(until, 2)
+    times = until + 1e-3 * np.arange(80)
+    ahead, motion = two_lanes(times), np.zeros((8, 2))
+    found = model.forecast(ahead, np.arange(1, len(ahead) + 1))
+    assert np.array_equal(model.forecast(ahead[:5], np.arange(1, 6)), found[:5])
+    alone = np.ascontiguousarray(ahead[:, :, 1:])
+    single = ReferenceFriction(1e-3, parameter_column(RIG))
+    for wanted in two_lanes(np.arange(0, until, 1e-3)):
+        motion[:4] = wanted
+        single.update(np.ascontiguousarray(motion[:, 1:]))
+    assert np.array_equal(single.forecast(alone, np.arange(1, len(ahead) + 1))[:, :, 0], found[:, :, 1])
+    for wanted, said in zip(ahead, found, strict=True):
+        motion[:4] = wanted
+        drag = kept.update(motion)
+        assert np.array_equal(model.update(motion), drag)
+        np.testing.assert_allclose(said, drag, rtol=1e-12, atol=1e-12)
+
+
+def test_a_forecast_of_uneven_steps_is_lugre_with_the_speed_at_their_ends() -> None:
+    """z + T (v - s0 |v| z / G(v)), never beyond G(v)/s0, with speeds of the linkage made of points."""
+    ticks, f = np.array([2, 5, 10, 17, 27, 40, 57]), RIG.friction
+    for until in (0.15, 0.27, 0.6, 1.2):
+        (model,), drag = under_way(until)
+        ahead = two_lanes(until + 1e-3 * (ticks - 1))
+        found = model.forecast(ahead, ticks)
+        for lane in range(2):
+            speeds, bristles = piston_speeds(ahead[:, :, lane].T), drag[:, lane] / f.bristle_stiffness
+            for i, cylinder in enumerate((RIG.cylinder1, RIG.cylinder2)):
+                z, coulomb = bristles[i], cylinder.coulomb_friction
+                for k, time in enumerate(1e-3 * np.diff(ticks, prepend=0)):
+                    v = speeds[i, k]
+                    level = coulomb * (1 + (f.static_ratio - 1) / (1 + (v / f.stribeck_speed) ** 2))
+                    z += time * (v - f.bristle_stiffness * abs(v) * z / level)
+                    z = np.clip(z, -level / f.bristle_stiffness, level / f.bristle_stiffness)
+                    assert found[k, i, lane] == pytest.approx(f.bristle_stiffness * z, rel=1e-9, abs=1e-9)

@@ -1,0 +1,81 @@
+"""The state model (13), (14) against (5) in SymPy and chambers (6) differentiated independently."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from baselines.backstepping.strict_feedback import neglected_acceleration, strict_feedback_rates
+from birthsim_env import Parameters
+from tests.oracles import derived_law as derived
+
+RIGS = {
+    "default": Parameters(),
+    "other": Parameters().replace(
+        {
+            **{"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45, "mechanics.mass": 4.1},
+            **{"cylinder2.rod_diameter": 0.012, "cylinder1.viscous_friction": 55.0, "air.polytropic_index": 1.3},
+        }
+    ),
+}
+LANES = 40
+
+
+@pytest.fixture(scope="module", params=RIGS.values(), ids=RIGS.keys())
+def case(request):
+    """A rig, random sliding states with their chamber pressures and flows, X and U."""
+    rig, rng = request.param, np.random.default_rng(3)
+    y = rng.uniform(-0.8, 0.8, (2, LANES)) * [[rig.cylinder1.stroke / 2], [rig.cylinder2.stroke / 2]]
+    v = rng.uniform(0.01, 0.5, (2, LANES)) * rng.choice([-1, 1], (2, LANES))
+    air, flow = rng.uniform(1.1e5, 6.9e5, (2, 2, LANES)), rng.uniform(-2e-3, 2e-3, (2, 2, LANES))
+    x, u = np.empty((8, LANES)), np.empty((4, LANES))
+    for i, cylinder, row in ((0, rig.cylinder1, 4), (1, rig.cylinder2, 0)):
+        (ap, an), half = derived.areas(cylinder), cylinder.stroke / 2
+        lp, ln = half + y[i], half - y[i]
+        force = air[i, 0] * ap - air[i, 1] * an
+        x[row : row + 4] = y[i], v[i], force, rig.air.polytropic_index * (air[i, 0] * ap / lp + air[i, 1] * an / ln)
+        u[row // 2 : row // 2 + 2] = (
+            half * (flow[i, 0] / lp - flow[i, 1] / ln),
+            half * (flow[i, 0] / lp + flow[i, 1] / ln),
+        )
+    return rig, y, v, air, flow, x, u
+
+
+@pytest.mark.parametrize("neglected", [False, True])
+def test_accelerations_are_those_of_equation_5(case, neglected):
+    rig, y, v, _, _, x, u = case
+    first, second = derived.equation_5(derived.F1, derived.F2)
+    expressions = [first, second - (0 if neglected else 1) * derived.neglected()]
+    function = sp.lambdify([*derived.STATE, *derived.RIG], expressions)
+    expected = function(y[0], y[1], v[0], v[1], x[6], x[2], *derived.rig_values(rig, 0.0, True))
+    rates = strict_feedback_rates(x, u, rig, neglected)
+    np.testing.assert_allclose(rates[[5, 1]], expected, rtol=1e-11, atol=1e-11)
+    np.testing.assert_array_equal(rates[[4, 0]], v)
+
+
+def test_force_and_stiffness_rates_are_those_of_the_chambers(case):
+    rig, y, v, air, flow, x, u = case
+    rates = strict_feedback_rates(x, u, rig)
+    for i, cylinder, row in ((0, rig.cylinder1, 4), (1, rig.cylinder2, 0)):
+        expected = derived.force_and_stiffness_rates(air[i], flow[i], y[i], v[i], cylinder, rig)
+        np.testing.assert_allclose(rates[row + 2 : row + 4], expected, rtol=1e-10, atol=1e-8)
+
+
+def test_strict_feedback_leaves_cylinder_1_out_of_cylinder_2(case):
+    rig, _, _, _, _, x, u = case
+    other = x.copy()
+    other[4:] = x[4:, ::-1]
+    without = strict_feedback_rates(x, u, rig)[:4], strict_feedback_rates(other, u, rig)[:4]
+    np.testing.assert_array_equal(*without)
+    with_it = strict_feedback_rates(x, u, rig, True)[1], strict_feedback_rates(other, u, rig, True)[1]
+    assert np.abs(with_it[0] - with_it[1]).max() > 0.1
+    gap = strict_feedback_rates(x, u, rig, True)[1] - strict_feedback_rates(x, u, rig)[1]
+    np.testing.assert_allclose(neglected_acceleration(x, rig), gap, rtol=1e-9, atol=1e-12)
+
+
+def test_wrong_input_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"state has shape \(7, 2\); allowed: \(8, 2\)"):
+        strict_feedback_rates(np.zeros((7, 2)), np.zeros((4, 2)), Parameters())
+    with pytest.raises(ValueError, match=r"flows has shape \(3, 2\); allowed: \(4, 2\)"):
+        strict_feedback_rates(np.zeros((8, 2)), np.zeros((3, 2)), Parameters())

@@ -1,0 +1,214 @@
+"""Headless Chromium in front of a real server: what the page's tests and its measurement share."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent.parent
+NAMES = (
+    *("chromium", "chromium-browser", "chromium-headless-shell", "headless_shell", "chrome-headless-shell"),
+    *("google-chrome", "google-chrome-stable", "google-chrome-beta", "google-chrome-unstable", "chrome"),
+    *("microsoft-edge", "microsoft-edge-stable", "msedge", "brave-browser", "brave"),
+    *("Chromium", "Google Chrome", "Google Chrome Canary", "Microsoft Edge", "Brave Browser"),  # macOS
+)
+PLACES = (
+    *("/usr/bin", "/usr/local/bin", "/snap/bin", "/usr/lib/chromium", "/usr/lib/chromium-browser"),
+    *("/opt/google/chrome", "/opt/microsoft/msedge", "/opt/brave.com/brave", "/opt/homebrew/bin"),
+    *(f"/Applications/{name}.app/Contents/MacOS" for name in NAMES[-5:]),
+    *(
+        f"{os.environ.get(root, '')}/{name}/Application"
+        for root in ("PROGRAMFILES", "PROGRAMFILES(X86)", "LOCALAPPDATA")
+        for name in ("Google/Chrome", "Chromium", "Microsoft/Edge", "BraveSoftware/Brave-Browser")
+    ),
+)
+OF_PLAYWRIGHT = (
+    "chromium-*/chrome-linux*/chrome",
+    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
+    "chromium-*/chrome-win*/chrome.exe",
+    "chromium_headless_shell-*/chrome-*/headless_shell",
+    "chromium_headless_shell-*/chrome-*/headless_shell.exe",
+    "chromium_headless_shell-*/chrome-*/chrome-headless-shell",
+    "chromium_headless_shell-*/chrome-*/chrome-headless-shell.exe",
+)
+"""Where ``playwright install chromium`` puts programs below its folder, by system and version."""
+INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
+PATIENCE = 120.0  # s; only a state that never comes takes so long
+
+
+def find_chromium():
+    """Path of an installed Chromium or a relative of it, or None; BIRTHSIM_CHROMIUM names another, which must exist."""
+    if chosen := os.environ.get("BIRTHSIM_CHROMIUM"):
+        if found := shutil.which(chosen):
+            return found
+        raise ValueError(f"BIRTHSIM_CHROMIUM = {chosen!r} is no program; allowed: the path of a Chromium, or not set")
+    search = os.pathsep.join([os.environ.get("PATH", ""), *PLACES])
+    installed = (path for name in NAMES if (path := shutil.which(name, path=search)))
+    return next(installed, None) or _of_playwright()
+
+
+def _of_playwright():
+    """The newest Chromium that Playwright has downloaded, or None."""
+    found = [path for folder in _playwright_folders() for pattern in OF_PLAYWRIGHT for path in folder.glob(pattern)]
+    programs = [path for path in found if shutil.which(path)]
+    return str(max(programs, key=_revision)) if programs else None
+
+
+def _playwright_folders():
+    """Where Playwright keeps browsers: the folder that its own variable names, or the caches of Linux, macOS and Windows."""
+    if chosen := os.environ.get("PLAYWRIGHT_BROWSERS_PATH"):
+        return [Path(chosen)]
+    home = Path.home()
+    caches = (
+        os.environ.get("XDG_CACHE_HOME") or home / ".cache",
+        home / "Library" / "Caches",
+        os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local",
+    )
+    return [Path(cache) / "ms-playwright" for cache in caches]
+
+
+def _revision(path):
+    """1228 of ``.../chromium-1228/chrome-linux64/chrome``."""
+    return max(int(number) for number in re.findall(r"chromium(?:_headless_shell)?-(\d+)", str(path)))
+
+
+def missing():
+    """What these tests lack and how to install it, in words, or an empty string."""
+    lacks = []
+    try:
+        import playwright  # noqa: F401
+        import uvicorn  # noqa: F401
+    except ImportError as error:
+        lacks.append(f"{error.name} (pip install 'birthsim[live,dev]')")
+    if find_chromium() is None:
+        lacks.append(f"Chromium ({INSTALLATION})")
+    return f"the page's tests need {' and '.join(lacks)}" if lacks else ""
+
+
+class Server:
+    """``birthsim-live`` or ``birthsim-replay`` as a process of its own; ``arguments`` are those of the command."""
+
+    def __init__(self, command, *arguments, port=0):
+        line = [sys.executable, "-m", f"birthsim_live.commands.{command}", *map(str, arguments), "--port", str(port)]
+        self._process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        said = []
+        # It names its address once it listens; a process that fails closes the pipe.
+        for text in self._process.stdout:
+            said.append(text)
+            if found := re.search(r"http://[^/\s]+:(\d+)", text):
+                self.url, self.port = f"{found[0]}/", int(found[1])
+                return
+        self.__exit__()
+        raise AssertionError(f"{command} serves no page: {''.join(said)}")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        """Ends by the signal that service managers send; whoever does not listen is killed."""
+        with self._process as process:
+            process.terminate()
+            try:
+                process.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def launch(playwright):
+    """A headless browser with a profile of its own."""
+    return playwright.chromium.launch(executable_path=find_chromium(), headless=True, args=ARGUMENTS)
+
+
+class Window:
+    """One tab with the page; ``complaints`` collects console errors, ``foreign`` requests that left this machine."""
+
+    def __init__(self, browser, url, size=WIDE, touch=False):
+        self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
+        self.context.set_default_timeout(1000 * PATIENCE)
+        self.page = self.context.new_page()
+        self.complaints, self.foreign = [], []
+        self.page.on("console", lambda message: message.type in ("error", "warning") and self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", self._asked)
+        self.page.goto(url)
+        self.wait("birthsim.connected && birthsim.frame !== null && birthsim.state !== null")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.context.close()
+
+    def _asked(self, request):
+        if not re.match(r"(https?|wss?)://127\.0\.0\.1[:/]|data:|blob:", request.url):
+            self.foreign.append(request.url)
+
+    def value(self, expression):
+        """Value of an expression in the page, where ``birthsim`` is what main.js shows of itself."""
+        return self.page.evaluate(f"() => {{ const birthsim = window.birthsim; return birthsim && ({expression}); }}")
+
+    def wait(self, expression, seconds=PATIENCE):
+        """Wait until an expression holds (the page's policy forbids the eval of playwright's own waiting)."""
+        end = time.monotonic() + seconds
+        while not (found := self.value(expression)):
+            if time.monotonic() > end:
+                raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {self.value('birthsim')}")
+            self.page.wait_for_timeout(30)
+        return found
+
+    def frame(self):
+        return self.value("birthsim.frame")
+
+    def end_effector(self):
+        """Where the end effector is in the window, px."""
+        return self.value("birthsim.pixel(birthsim.frame.position)")
+
+    def live(self, seconds):
+        """Wait until the rig has lived through so many seconds of its own time."""
+        self.wait(f"birthsim.frame.time > {self.frame()['time'] + seconds}")
+
+    def hold(self, across=0.0, up=0.0):
+        """Press the mouse on the end effector and pull it by (across, up) px."""
+        x, y = self.end_effector()
+        mouse = self.page.mouse
+        mouse.move(x, y)
+        mouse.down()
+        mouse.move(x + across, y - up, steps=6)
+        self.wait("birthsim.frame.pointer !== null")
+
+    def settle(self, least=0.0):
+        """Wait until the end effector rests and at least ``least`` N pull at it; return that frame."""
+        rests = f"Math.hypot(...birthsim.frame.velocity) < 1e-3 && Math.hypot(...birthsim.frame.force) >= {least}"
+        # Rest counts only if it lasts: a turning point is none.
+        since = self.wait(f"{rests} && birthsim.frame.time")
+        while True:
+            self.page.wait_for_timeout(30)
+            if not self.value(rests):
+                since = self.wait(f"{rests} && birthsim.frame.time")
+            elif self.value("birthsim.frame.time") - since > 0.4:
+                return self.frame()
+
+
+def displacement(frame):
+    """(x, y) from the target to the end effector, m."""
+    return tuple(p - t for p, t in zip(frame["position"], frame["target"], strict=True))
+
+
+def rendered(frame):
+    """(x, y) that the force should give: force over stiffness setpoint, m."""
+    return tuple(f / k for f, k in zip(frame["force"], frame["stiffness"], strict=True))

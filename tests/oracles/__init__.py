@@ -1,0 +1,1 @@
+"""What tests compare with, each derived independently of the package."""

@@ -1,0 +1,80 @@
+"""SHA-256 of closed-loop trajectories, which must be equal on every processor; ``make golden`` stores them anew.
+
+A run is a few drawn worlds of a scenario under openings given beforehand, under a controller at its 1 kHz, or under a
+residual policy that comes with the package. Hashed are states, observations and rewards of every step.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy
+from baselines.registry import CONTROLLERS, SLOW, make_controller
+from birthsim_env import Parameters
+from birthsim_env.parts.scenarios import SCENARIOS
+
+FILE = Path(__file__).parent / "fingerprints.json"
+LANES, SEED = 3, 7
+PERIODS, STEPS = 800, 80
+
+EXCEPTIONS = {
+    "lqr": "its gains come from SciPy's Riccati solver, so from LAPACK and BLAS",
+    "nonlinear-mpc": "CasADi plans",
+    "training": "PyTorch sums gradients in an order that depends on the processor",
+}
+"""What is not the same bits everywhere, and why."""
+
+
+def rows() -> dict[str, tuple[str, str, str]]:
+    """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
+    chosen = [("circle", "lab", name) for name in CONTROLLERS if name not in {*SLOW, *EXCEPTIONS}]
+    for scenario in SCENARIOS:
+        chosen += [(scenario, "ideal", who) for who in ("openings", "backstepping", "residual")]
+        chosen += [(scenario, "lab", "admittance-backstepping")]
+    return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}
+
+
+def fingerprint(scenario: str, sensors: str, who: str) -> str:
+    """SHA-256 of one run."""
+    digest = hashlib.sha256()
+    for arrays in _run(scenario, sensors, who):
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
+    shared = {"num_envs": LANES, "sensors": sensors, "randomize": True}
+    if who == "residual":
+        policy = load_policy(best_policy(scenario))
+        env: Any = gymnasium.make_vec(policy.environment, **shared, **policy.settings.to_dict())
+    else:
+        period = 0.01 if who == "openings" else Parameters().electronics.control_period
+        env = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v1", **shared, policy_period=period)
+    controller = None if who in ("openings", "residual") else make_controller(who, Parameters())
+    rng = np.random.default_rng(SEED)
+    observation, _ = env.reset(seed=SEED)
+    for _ in range(PERIODS if controller else STEPS):
+        if controller:
+            action = controller.command(env.measurement, env.reference).T
+        else:
+            action = policy.network.actions(observation) if who == "residual" else rng.uniform(-0.4, 0.4, (LANES, 4))
+        observation, reward, terminated, *_ = env.step(action)
+        if controller and terminated.any():
+            controller.reset(terminated)
+        yield env.simulation.plant.state, observation, reward
+    env.close()
+
+
+if __name__ == "__main__":
+    made = {name: fingerprint(*row) for name, row in rows().items()}
+    FILE.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+    print(f"written: {FILE}")

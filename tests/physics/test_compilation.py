@@ -1,0 +1,111 @@
+"""Compiled code is never stale, and no cache file, disk or home directory is needed to compile."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from birthsim_env.physics import compilation
+from birthsim_env.physics.compilation import source_stamp
+
+ROOT = Path(__file__).parent.parent.parent
+PROBE = """
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.loop.signals import compliance
+
+@kernel
+def displaced(force, x):
+    x[0] = compliance(force, 0.0, 2000.0, 2000.0, 0.0)[0]
+"""
+PROGRAM = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
+import numpy as np
+from birthsim_env.probe import displaced
+x = np.zeros(1)
+displaced(10.34, x)
+print(1e3 * x[0])
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the few modules that one small kernel needs."""
+    folder = tmp_path / "birthsim_env"
+    folder.mkdir()
+    for name in (
+        "physics/compilation",
+        "loop/signals",
+        *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "exact", "valves")),
+    ):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
+    for room in (folder, folder / "physics", folder / "loop"):
+        (room / "__init__.py").touch()
+    (folder / "probe.py").write_text(PROBE)
+    return folder
+
+
+def displaced(package, largest_file=10**9):
+    """What the kernel computes in a process of its own, mm, and whether it was compiled there."""
+    line = [sys.executable, "-c", PROGRAM, str(largest_file)]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(line, cwd=package.parent, env=environment, capture_output=True, text=True, check=True)
+    return float(done.stdout), "compiling" in done.stderr
+
+
+def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(package):
+    assert displaced(package) == (pytest.approx(5.17), True)
+    assert displaced(package) == (pytest.approx(5.17), False)
+    (kept,) = package.rglob("*.nbc")
+    signals = package / "loop" / "signals.py"
+    # The helper is made by ``helper(displacement)``: no decorator stands in that file.
+    signals.write_text(signals.read_text().replace("kx * ky - kxy * kxy", "2.0 * (kx * ky - kxy * kxy)"))
+    assert displaced(package) == (pytest.approx(2.585), True)
+    (newer,) = package.rglob("*.nbc")
+    assert newer != kept, "the old code is gone"
+    content = bytearray(newer.read_bytes())
+    content[len(content) // 2] ^= 1
+    newer.write_bytes(content)
+    assert displaced(package) == (pytest.approx(2.585), True), "damaged code is compiled anew"
+    assert displaced(package) == (pytest.approx(2.585), False)
+    newer.unlink()
+    assert displaced(package, largest_file=1000) == (pytest.approx(2.585), True), "a full disk keeps nothing"
+    assert not [path for path in newer.parent.iterdir() if path.suffix != ".pyc"]
+
+
+def test_the_stamp_is_of_all_that_a_kernel_imports():
+    def imported(name):
+        seen, waiting = set(), [ROOT / "birthsim_env" / name]
+        while waiting:
+            path = waiting.pop()
+            if path not in seen:
+                seen.add(path)
+                waiting += compilation._imports(path)
+        return {path.stem for path in seen}
+
+    assert {"dynamics", "chambers", "friction", "geometry", "mechanics", "valves", "lanes"} <= imported("physics/dynamics.py")
+    assert "signals" in imported("reward.py"), "compliance is made there"
+    assert "references" not in imported("physics/dynamics.py"), "an edit there need not compile the plant anew"
+    stamps = {source_stamp(ROOT / "birthsim_env" / name) for name in ("physics/dynamics.py", "reward.py")}
+    assert len(stamps) == 2
+
+
+def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_path):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", homeless)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
+    monkeypatch.setattr(compilation, "_ROOT", tmp_path / "file")
+    assert compilation._cache_folder.__wrapped__() is None
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
+    assert compilation._cache_folder.__wrapped__() == tmp_path / "own"

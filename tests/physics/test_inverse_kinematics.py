@@ -1,0 +1,97 @@
+"""Positions to jerks of the pistons along moving targets, against mpmath's derivatives of the distances between points."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+
+from birthsim_env.physics import geometry
+from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
+from birthsim_env.physics.lanes import V1, V2, Y1, Y2, Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+from tests.oracles import linkage_by_points as by_points
+
+RIGS = {
+    "default": Parameters(),
+    "tilted pivot": Parameters().replace(
+        {"geometry.gamma3": 1.2, "geometry.d3": 0.42, "geometry.d6": 0.21, "geometry.k1": 0.45}
+    ),
+    "pivot below": Parameters().replace({"geometry.gamma3": -2.0, "geometry.k2": 0.6}),
+}
+each_rig = pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS.keys())
+
+
+def piston_lengths(x: mpmath.mpf, y: mpmath.mpf, rig: Parameters) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """(y1, y2): distances of O3 from the point at d6 along the beam, and of the end effector from O1, less k1 and k2."""
+    g = rig.geometry
+    r2 = mpmath.hypot(x, y)
+    ox, oy = g.d3 * mpmath.cos(g.gamma3), g.d3 * mpmath.sin(g.gamma3)
+    return mpmath.hypot(g.d6 * x / r2 - ox, g.d6 * y / r2 - oy) - g.k1, r2 - g.k2
+
+
+def points(rig: Parameters, lanes: int, rng: np.random.Generator) -> Array:
+    """End effector positions spread over both strokes."""
+    y1, y2 = rng.uniform([[-0.095], [-0.19]], [[0.095], [0.19]], (2, lanes))
+    return by_points.pose_from_lengths(y1 + rig.geometry.k1, y2 + rig.geometry.k2, rig.geometry).end_effector
+
+
+@each_rig
+def test_piston_reference_is_the_inverse_geometry_and_its_three_derivatives(rig: Parameters) -> None:
+    """Targets x(t), y(t) = c0 + c1 t + c2 t^2/2 + c3 t^3/6, differentiated at t = 0 with 60 digits."""
+    rng = np.random.default_rng(0)
+    target = np.empty((8, 25))
+    target[:2] = points(rig, 25, rng)
+    target[2:] = rng.normal(0, np.array([1, 1, 8, 8, 80, 80])[:, None], (6, 25))
+    joints = np.empty((8, 25))
+    piston_reference(target, parameter_column(rig), joints, target.shape[1])
+    with mpmath.workdps(60):
+        for lane in range(25):
+            x, y = ([mpmath.mpf(c) for c in target[axis::2, lane]] for axis in (0, 1))
+
+            def piston(t: mpmath.mpf, which: int, x: list[mpmath.mpf] = x, y: list[mpmath.mpf] = y) -> mpmath.mpf:
+                along = [sum(c[k] * t**k / mpmath.factorial(k) for k in range(4)) for c in (x, y)]
+                return piston_lengths(*along, rig)[which]
+
+            for which in (0, 1):
+                truth = [float(mpmath.diff(lambda t, w=which: piston(t, w), 0, order)) for order in range(4)]
+                # A rounding of the whole derivative: its terms may cancel, so the scale is that of the terms.
+                scale = np.array([1.0, 1.0, 10.0, 100.0]) + np.abs(truth)
+                np.testing.assert_array_less(np.abs(joints[which::2, lane] - truth), 1e-11 * scale)
+
+
+@each_rig
+def test_a_resting_target_rests_in_the_joints_too(rig: Parameters) -> None:
+    target = np.zeros((8, 40))
+    target[:2] = points(rig, 40, np.random.default_rng(1))
+    joints = np.empty((8, 40))
+    piston_reference(target, parameter_column(rig), joints, target.shape[1])
+    assert np.all(joints[2:] == 0)
+    np.testing.assert_allclose(geometry.end_effector(joints[:2], rig), target[:2], rtol=0, atol=1e-14)
+
+
+@each_rig
+def test_piston_motion_undoes_the_direct_model_and_the_jacobian(rig: Parameters) -> None:
+    rng = np.random.default_rng(2)
+    plant = Plant(rig, 500)
+    plant.state[[Y1, Y2]] = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 500))
+    plant.state[[V1, V2]] = rng.uniform(-2, 2, (2, 500))
+    seen, joints = plant.end_effector(), np.empty((4, 500))
+    piston_motion(seen, parameter_column(rig), joints, 500)
+    np.testing.assert_allclose(joints, plant.state[[Y1, Y2, V1, V2]], rtol=0, atol=1e-13)
+    inverse = np.linalg.inv(np.moveaxis(geometry.jacobian(joints[:2], rig), 2, 0))
+    np.testing.assert_allclose(joints[2:], np.einsum("nij,jn->in", inverse, seen[2:]), rtol=0, atol=1e-12)
+
+
+@each_rig
+def test_piston_motion_by_points(rig: Parameters) -> None:
+    """Velocity of the linkage made of points, without the package's direct model."""
+    rng = np.random.default_rng(3)
+    y1, y2 = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 200))
+    v1, v2 = rng.uniform(-2, 2, (2, 200))
+    pose = by_points.pose_from_lengths(y1 + rig.geometry.k1, y2 + rig.geometry.k2, rig.geometry)
+    velocity, _ = by_points.cartesian_velocity(pose, y2 + rig.geometry.k2, v1, v2)
+    joints = np.empty((4, 200))
+    piston_motion(np.concatenate([pose.end_effector, velocity]), parameter_column(rig), joints, 200)
+    np.testing.assert_allclose(joints, [y1, y2, v1, v2], rtol=0, atol=1e-12)

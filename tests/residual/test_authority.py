@@ -1,0 +1,137 @@
+"""What limits the authority: what oscillates loses it in its direction, what swings takes stiffness; what decays does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from agents.residual.authority import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING
+from birthsim_env.loop.signals import REFERENCES, Reference
+from birthsim_env.physics.lanes import Array, parameter_column
+from birthsim_env.physics.parameters import Parameters
+from tests.oracles import linkage_by_points as by_points
+from tests.oracles.residual_parts import AuthorityLimiter
+
+PERIOD = 1e-3
+TIMES = PERIOD * np.arange(1500)
+RIG = Parameters()
+PISTON = np.array([[0.02], [-0.05]])
+POSE = by_points.pose_from_lengths(PISTON[0] + RIG.geometry.k1, PISTON[1] + RIG.geometry.k2, RIG.geometry)
+SIZES = [np.hypot(*by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, 1.0 - i, float(i))[0]) for i in range(2)]
+"""Speed of the end effector per speed of each piston."""
+
+
+def new(lanes: int) -> AuthorityLimiter:
+    limiter = AuthorityLimiter(PERIOD, parameter_column(RIG))
+    limiter.reset(np.ones(lanes, dtype=np.bool_))
+    return limiter
+
+
+def watched(limiter: AuthorityLimiter, speeds: Array, targets: Array | None = None) -> Array:
+    """The shares (T, 2, N) while the pistons move with ``speeds`` (T, 2, N) at one place, and the target with ``targets``."""
+    shares, lanes = [], speeds.shape[2]
+    for k, speed in enumerate(speeds):
+        rows = np.zeros((REFERENCES, lanes))
+        if targets is not None:
+            rows[2:4], _ = by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, *targets[k])
+        limiter.update(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]), Reference(rows))
+        shares.append(limiter.fraction.copy())
+    return np.array(shares)
+
+
+def shaken(waves: list[Array], cylinder: int) -> Array:
+    """Speeds (T, 2, N) of the pistons that move the end effector with ``waves`` (T,), m/s, one per lane, along one way."""
+    speeds = np.zeros((len(TIMES), 2, len(waves)))
+    speeds[:, cylinder] = np.stack(waves, axis=1) / SIZES[cylinder]
+    return speeds
+
+
+def wave(size: float, frequency: float = 10.0, kept: float = 1.0) -> Array:
+    """A sine (T,) of which every half wave keeps a share of the one before."""
+    return size * kept ** (2 * frequency * TIMES) * np.sin(2 * np.pi * frequency * TIMES)
+
+
+@pytest.mark.parametrize("cylinder", [0, 1])
+@pytest.mark.parametrize("size", [1.01, 2.0, 3.5])
+def test_a_sustained_oscillation_lowers_the_share_of_its_own_cylinder_down_to_the_least(cylinder: int, size: float) -> None:
+    share = watched(new(1), shaken([wave(size * LEVEL)], cylinder))[:, :, 0]
+    np.testing.assert_array_equal(share[:, 1 - cylinder], 1.0)
+    # Every half wave after the first two costs a tenth, a larger one more: known once the third has begun.
+    half_waves = np.floor(20 * TIMES - 1e-9)
+    expected = np.maximum(YIELDING ** (size * np.maximum(half_waves - 1, 0)), LEAST)
+    assert np.mean(np.abs(share[:, cylinder] - expected) < 1e-12) > 0.97, "but for the instants at which the sign changes"
+    assert share[-1, cylinder] == LEAST
+    assert np.all(np.diff(share[:, cylinder]) <= 0)
+
+
+@pytest.mark.parametrize("cylinder", [0, 1])
+def test_what_decays_is_slow_small_or_goes_one_way_costs_nothing(cylinder: int) -> None:
+    harmless = [
+        wave(5.0, kept=0.7),
+        wave(5.0, frequency=2.4),
+        wave(0.95 * LEVEL),
+        wave(2 * LEVEL) + 2.5 * LEVEL,
+        np.where(TIMES < 0.7, 5 * LEVEL, -5 * LEVEL),
+        # A jump of the hand or of a setpoint amid ripple: one large half wave between small ones.
+        np.where(abs(TIMES - 0.725) < 0.025, 20.0, 1.0) * wave(0.5 * LEVEL),
+    ]
+    np.testing.assert_array_equal(watched(new(6), shaken(harmless, cylinder)), 1.0)
+
+
+def test_an_oscillation_that_the_target_asks_for_costs_nothing() -> None:
+    speeds = shaken([wave(4 * LEVEL)] * 2, 0) + shaken([wave(4 * LEVEL, 7.0)] * 2, 1)
+    targets = speeds.copy()
+    targets[:, :, 1] = 0.0
+    share = watched(new(2), speeds, targets)
+    np.testing.assert_array_equal(share[:, :, 0], 1.0)
+    np.testing.assert_array_equal(share[-1, :, 1], LEAST)
+
+
+def test_a_reset_gives_a_lane_its_authority_back_and_forgets_its_half_waves() -> None:
+    limiter, speeds = new(3), shaken([wave(2 * LEVEL)] * 3, 1)
+    watched(limiter, speeds)
+    limiter.reset(np.array([False, True, False]))
+    np.testing.assert_array_equal(limiter.fraction, [[1, 1, 1], [LEAST, 1, LEAST]])
+    after, fresh = watched(limiter, speeds), watched(new(1), speeds[:, :, :1])
+    np.testing.assert_array_equal(after[:, :, 1], fresh[:, :, 0])
+    np.testing.assert_array_equal(after[:, 1, [0, 2]], LEAST)
+    # Another number of lanes is a new start.
+    limiter.reset(np.ones(2, dtype=np.bool_))
+    np.testing.assert_array_equal(limiter.fraction, np.ones((2, 2)))
+
+
+def test_lanes_do_not_know_of_each_other() -> None:
+    waves = [wave(2 * LEVEL), wave(2 * LEVEL, kept=0.6), wave(3 * LEVEL, 17.0), wave(0.01)]
+    together = watched(new(4), shaken(waves, 0))
+    for lane, one in enumerate(waves):
+        np.testing.assert_array_equal(watched(new(1), shaken([one], 0))[:, :, 0], together[:, :, lane])
+
+
+def softness_of(waves: list[Array], cylinder: int) -> Array:
+    """The softness (T, N) while the pistons are shaken so."""
+    limiter, softness = new(len(waves)), []
+    for speed in shaken(waves, cylinder):
+        watched(limiter, speed[None])
+        softness.append(limiter.softness.copy())
+    return np.array(softness)
+
+
+@pytest.mark.parametrize("cylinder", [0, 1])
+def test_swings_take_stiffness_that_comes_back_in_time(cylinder: int) -> None:
+    """Five half waves of 50 ms; the first two are not known to be sustained. Then it decays by its time constant."""
+    swing = np.where(TIMES < 0.26, wave(1.5 * SWING), 0.0)
+    small = wave(0.95 * SWING)
+    softness = softness_of([swing, small], cylinder)
+    np.testing.assert_array_equal(softness[:, 1], 0.0)
+    ends = np.array([0.1, 0.15, 0.2, 0.25])
+    expected = [SOFTENING * np.exp(-(t - ends[ends < t]) / RECOVERY).sum() for t in TIMES[::10]]
+    np.testing.assert_allclose(np.minimum(expected, MOST_SOFTENING), softness[::10, 0], atol=0.02)
+    assert 1.5 * SOFTENING < softness.max() < MOST_SOFTENING
+
+
+def test_stiffness_is_taken_up_to_a_bound_and_given_back_by_a_reset() -> None:
+    limiter = new(2)
+    watched(limiter, shaken([wave(3 * SWING), wave(3 * SWING)], 0))
+    assert np.all((limiter.softness > 0.9 * MOST_SOFTENING) & (limiter.softness <= MOST_SOFTENING))
+    limiter.reset(np.array([True, False]))
+    assert limiter.softness[0] == 0 < limiter.softness[1]

@@ -1,0 +1,303 @@
+"""The exported policy is the policy: PyTorch, NumPy and onnxruntime agree, and the file says what it is."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+
+import agents
+from agents.commands import export
+from agents.policy import onnx_export
+from agents.policy.controller import ResidualController, observation_size
+from agents.policy.files import CONFIGURATION, WEIGHTS, Policy, save_policy
+from agents.policy.network import PolicyNetwork
+from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
+from agents.residual.law import action_names
+from agents.residual.settings import ResidualSettings
+from birthsim_env.learned import command
+from tests.console import call
+
+ROOT = Path(__file__).parent.parent.parent
+ENVIRONMENT = "BirthSIM/ProbeResidual-v1"
+SETTINGS = ResidualSettings(impedance="variable_kp", authority=40.0)
+assert agents  # importing it registers the residual environments
+
+
+def network(settings=SETTINGS, squashed=False, hidden=(64, 64), seed=0) -> PolicyNetwork:
+    rng = np.random.default_rng(seed)
+    inputs = observation_size(settings)
+    layers = tuple(
+        ((rng.normal(size=(n, m)) / np.sqrt(m)).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32))
+        for m, n in pairwise((inputs, *hidden, settings.size))
+    )
+    return PolicyNetwork(rng.normal(size=inputs, scale=0.3), rng.uniform(1e-3, 2, inputs), layers, squashed)
+
+
+def policy(settings=SETTINGS, **options) -> Policy:
+    return Policy(network(settings, **options), ENVIRONMENT, settings, {"steps": 7})
+
+
+@pytest.fixture
+def folder(tmp_path):
+    save_policy(policy(), tmp_path / "policy")
+    return tmp_path / "policy"
+
+
+def exported(policy, folder) -> onnxruntime.InferenceSession:
+    export_onnx(policy, folder / "policy.onnx")
+    return onnxruntime.InferenceSession(folder / "policy.onnx", providers=["CPUExecutionProvider"])
+
+
+def assert_same(session, policy, observations):
+    """What onnxruntime, PyTorch and NumPy make of the observations; returns the actions."""
+    actions = session.run(["action"], {"observation": observations})[0]
+    with torch.no_grad():
+        by_torch = PolicyModule(policy.network)(torch.from_numpy(observations)).numpy()
+    assert actions.dtype == by_torch.dtype == np.float32
+    assert actions.shape == (len(observations), policy.settings.size)
+    np.testing.assert_allclose(actions, by_torch, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(actions, policy.network.actions(observations), rtol=0, atol=TOLERANCE)
+    return actions
+
+
+@pytest.mark.parametrize("squashed", [False, True])
+@pytest.mark.parametrize("hidden", [(64, 64), (), (5, 6, 7)])
+def test_random_observations_make_the_same_actions(tmp_path, squashed, hidden):
+    made = policy(squashed=squashed, hidden=hidden)
+    session = exported(made, tmp_path)
+    rng = np.random.default_rng(5)
+    deviation = np.sqrt(made.network.variance)
+    seen = (made.network.mean + deviation * rng.normal(size=(2000, made.network.inputs))).astype(np.float32)
+    actions = assert_same(session, made, seen)
+    assert np.abs(actions).max() > 0.8
+    assert len(np.unique(actions.round(3), axis=0)) > 1900
+    # Without squashing some actions stand at the bound, with it none does.
+    assert (np.abs(actions) == 1.0).any() == (not squashed)
+
+
+@pytest.mark.parametrize("squashed", [False, True])
+def test_extreme_observations_make_the_same_actions(tmp_path, squashed):
+    made = policy(squashed=squashed)
+    session = exported(made, tmp_path)
+    largest = np.finfo(np.float32).max
+    values = np.array([0.0, -0.0, 1e-40, 10.0, -10.0, 1e9, -1e9, largest, -largest, np.inf, -np.inf], np.float32)
+    inputs = made.network.inputs
+    alike = np.repeat(values[:, None], inputs, axis=1)
+    mixed = np.random.default_rng(3).choice(values, (3000, inputs))
+    actions = assert_same(session, made, np.concatenate([alike, mixed]))
+    assert (np.abs(actions) <= 1.0).all()
+    # A sensor that says nothing is not made into an action.
+    alike[:, 3] = np.nan
+    assert np.isnan(session.run(None, {"observation": alike})[0]).all()
+
+
+def test_an_input_that_hardly_varies_is_normalised_in_double_precision(tmp_path):
+    # The nearest single to 0.1 is 1.5e-9 off; over a standard deviation of 1e-4 that is 1.5e-5.
+    made = policy(hidden=())
+    constant = np.full(made.network.inputs, 0.1)
+    ones = (np.full_like(made.network.layers[0][0], 0.5), np.zeros(SETTINGS.size, np.float32))
+    made = Policy(PolicyNetwork(constant, np.zeros_like(constant), (ones,)), ENVIRONMENT, SETTINGS, {})
+    actions = assert_same(exported(made, tmp_path), made, constant.astype(np.float32)[None])
+    np.testing.assert_allclose(actions, 0.5 * len(constant) * (np.float64(np.float32(0.1)) - 0.1) / 1e-4, rtol=1e-5)
+    assert abs(actions).min() > 100 * TOLERANCE
+
+
+def test_a_batch_is_its_rows(tmp_path):
+    made = policy()
+    session = exported(made, tmp_path)
+    seen = np.random.default_rng(1).uniform(-10, 10, (257, made.network.inputs)).astype(np.float32)
+    together = assert_same(session, made, seen)
+    for size in (1, 2, 31):
+        parts = [session.run(None, {"observation": part})[0] for part in np.split(seen, range(size, 257, size))]
+        np.testing.assert_allclose(np.concatenate(parts), together, rtol=0, atol=TOLERANCE)
+    assert session.run(None, {"observation": seen[:0]})[0].shape == (0, SETTINGS.size)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_observations_of_a_rollout_make_the_same_actions(tmp_path, sensors):
+    made = policy()
+    session = exported(made, tmp_path)
+    env = gymnasium.make_vec(ENVIRONMENT, num_envs=8, randomize=True, sensors=sensors, **SETTINGS.to_dict())
+    observation, _ = env.reset(seed=11)
+    seen = [observation]
+    for _ in range(60):
+        observation, *_ = env.step(session.run(None, {"observation": observation})[0])
+        seen.append(observation)
+    actions = assert_same(session, made, np.concatenate(seen))
+    assert actions.std(axis=0).min() > 0.01
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        *(ResidualSettings(impedance=impedance) for impedance in ("fixed", "variable_kp", "variable")),
+        ResidualSettings(law="none", policy_period=0.02, time_constant=0.1),
+    ],
+    ids=["fixed", "variable_kp", "variable", "none"],
+)
+def test_the_file_says_what_it_is(tmp_path, settings):
+    session = exported(policy(settings), tmp_path)
+    about = session.get_modelmeta().custom_metadata_map
+    assert set(about) == {"format", "environment", "settings", "observations", "actions"}
+    assert (about["format"], about["environment"]) == (FORMAT, ENVIRONMENT)
+    assert ResidualSettings(**json.loads(about["settings"])) == settings
+    assert tuple(json.loads(about["actions"])) == action_names(settings)
+    env = gymnasium.make(ENVIRONMENT, **settings.to_dict())
+    names = tuple(json.loads(about["observations"]))
+    assert names == observation_names(settings) == env.unwrapped.observation_names
+    (taken,), (given,) = session.get_inputs(), session.get_outputs()
+    assert (taken.name, taken.type, taken.shape) == ("observation", "tensor(float)", ["batch", len(names)])
+    assert (given.name, given.type, given.shape) == ("action", "tensor(float)", ["batch", settings.size])
+
+
+def test_the_same_policy_makes_the_same_file_in_one_piece(tmp_path):
+    for name in ("one", "other"):
+        result = export_onnx(policy(), tmp_path / name / "policy.onnx")
+    one, other = ((tmp_path / name / "policy.onnx").read_bytes() for name in ("one", "other"))
+    assert one == other
+    assert result.size == len(one)
+    assert result.observations >= 1000
+    assert max(result.from_torch, result.from_numpy) <= TOLERANCE
+    assert [path.name for path in (tmp_path / "one").iterdir()] == ["policy.onnx"]
+
+
+def test_exporting_leaves_the_policy_as_it_was(tmp_path):
+    made, again = policy(), policy()
+    exported(made, tmp_path)
+    for one, other in zip(made.network.layers, again.network.layers, strict=True):
+        for mine, its in zip(one, other, strict=True):
+            np.testing.assert_array_equal(mine, its)
+    np.testing.assert_array_equal(made.network.mean, again.network.mean)
+
+
+def tampered(module, inputs):
+    """The model with one bias a little off."""
+    model = TRACED(module, inputs)
+    bias = next(part for part in model.graph.initializer if part.name == "layers.4.bias")
+    values = onnx.numpy_helper.to_array(bias) + 3e-5
+    bias.CopyFrom(onnx.numpy_helper.from_array(values, bias.name))
+    return model
+
+
+TRACED = onnx_export._traced
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("_traced", tampered, r"actions differ from PyTorch's by \S+e-05; allowed: 1.19209e-07"),
+        ("CLIP", 5.0, r"actions differ from NumPy's by \S+; allowed: 1.19209e-07"),
+        ("EPSILON", float("nan"), "actions differ from PyTorch's by nan; allowed: 1.19209e-07"),
+    ],
+)
+def test_a_file_that_is_not_the_policy_is_not_written(tmp_path, monkeypatch, name, value, message):
+    path = tmp_path / "deeper" / "policy.onnx"
+    monkeypatch.setattr(onnx_export, name, value)
+    with pytest.raises(ValueError, match=message):
+        export_onnx(policy(), path)
+    assert not path.parent.exists()
+    monkeypatch.undo()
+    export_onnx(policy(), path)
+    before = path.read_bytes()
+    monkeypatch.setattr(onnx_export, name, value)
+    with pytest.raises(ValueError, match=message):
+        export_onnx(policy(seed=1), path)
+    assert path.read_bytes() == before
+
+
+def test_a_write_that_is_cut_off_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "policy.onnx"
+    export_onnx(policy(), path)
+    before = path.read_bytes()
+
+    def cut(self, target):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", cut)
+    with pytest.raises(KeyboardInterrupt):
+        export_onnx(policy(seed=1), path)
+    assert path.read_bytes() == before
+
+
+def test_a_network_of_other_settings_is_refused(tmp_path):
+    fixed = ResidualSettings(impedance="fixed")
+    with pytest.raises(ValueError, match="policy maps 36 to 4 numbers; allowed: 32 to 2"):
+        export_onnx(Policy(network(SETTINGS), ENVIRONMENT, fixed, {}), tmp_path / "policy.onnx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def refused(monkeypatch, capsys, *arguments):
+    """What the command complained about, in one line and with exit status 2."""
+    status, printed, complaint = call("export", monkeypatch, capsys, *arguments)
+    assert (status, printed) == (2, "")
+    assert complaint.startswith("birthsim-export: error: ")
+    assert complaint.count("\n") == 1
+    return complaint
+
+
+def test_the_script_is_this_command(monkeypatch, capsys):
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    assert scripts["birthsim-export"] == "birthsim_env.learned:command"
+    monkeypatch.setattr(sys, "argv", ["/somewhere/birthsim-export"])
+    monkeypatch.setattr(export, "main", lambda: print("export"))
+    command()
+    assert capsys.readouterr().out == "export\n"
+
+
+def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):
+    status, printed, complaint = call("export", monkeypatch, capsys, folder)
+    assert (status, complaint) == (0, "")
+    written = folder / "policy.onnx"
+    assert f"{written}: {written.stat().st_size} bytes, 36 observation entries to 4 actions" in printed
+    assert "over 3000 observations" in printed
+    assert re.search(r": \S+ from PyTorch, \S+ from NumPy; allowed: 1.19209e-07\n", printed)
+    elsewhere = tmp_path / "new" / "folder" / "mine.onnx"
+    status, printed, complaint = call("export", monkeypatch, capsys, folder, "--format", "onnx", "--out", elsewhere)
+    assert (status, complaint) == (0, "")
+    assert str(elsewhere) in printed
+    assert elsewhere.read_bytes() == written.read_bytes()
+    # The folder is still a policy's.
+    ResidualController(policy=folder)
+
+
+def test_what_a_user_can_mend_is_said_in_one_line(folder, tmp_path, monkeypatch, capsys):
+    assert "--format 'tflite'; allowed: onnx" in refused(monkeypatch, capsys, folder, "--format", "tflite")
+    assert f"has no {CONFIGURATION}" in refused(monkeypatch, capsys, tmp_path / "nowhere")
+    assert "is a folder; allowed: the name of a file" in refused(monkeypatch, capsys, folder, "--out", tmp_path)
+    (tmp_path / "file").write_text("")
+    refused(monkeypatch, capsys, folder, "--out", tmp_path / "file" / "policy.onnx")
+    content = bytearray((folder / WEIGHTS).read_bytes())
+    content[100] ^= 1
+    (folder / WEIGHTS).write_bytes(content)
+    assert f"{WEIGHTS} is not the file" in refused(monkeypatch, capsys, folder)
+    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
+
+
+@pytest.mark.parametrize("missing", ["onnx", "onnxruntime", "torch"])
+def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
+    monkeypatch.delitem(sys.modules, "agents.policy.onnx_export")
+    monkeypatch.delattr(agents.policy, "onnx_export")
+    monkeypatch.setitem(sys.modules, missing, None)
+    complaint = refused(monkeypatch, capsys, folder)
+    assert missing in complaint
+    assert "extras agents and onnx: pip install 'birthsim[agents,onnx]'" in complaint
+
+
+def test_help_names_every_option():
+    line = [sys.executable, "-W", "error", "-m", "agents.commands.export", "--help"]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("usage: birthsim-export")
+    assert all(word in done.stdout for word in ("POLICY", "--format", "--out"))

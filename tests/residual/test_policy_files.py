@@ -1,0 +1,394 @@
+"""A policy folder: what is written is what is read, what is damaged or foreign is refused by name, nothing is unpickled."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import pickle
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import load, save
+
+from agents.policy.controller import ResidualController, observation_size
+from agents.policy.files import CONFIGURATION, FORMAT, WEIGHTS, Policy, load_policy, save_policy
+from agents.policy.network import PolicyNetwork
+from agents.residual.settings import ResidualSettings
+
+ROOT = Path(__file__).parent.parent.parent
+ENVIRONMENT = "BirthSIM/CircleResidual-v1"
+SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)
+INPUTS = observation_size(SETTINGS)
+
+
+def network(inputs=INPUTS, outputs=2, hidden=(16, 8), seed=0, squashed=False) -> PolicyNetwork:
+    rng = np.random.default_rng(seed)
+    widths = (inputs, *hidden, outputs)
+    layers = tuple(
+        (rng.normal(size=(n, m), scale=0.4).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32))
+        for m, n in pairwise(widths)
+    )
+    mean, variance = rng.normal(size=inputs), rng.uniform(0.1, 2, inputs)
+    return PolicyNetwork(mean, variance, layers, squashed)
+
+
+POLICY = Policy(network(), ENVIRONMENT, SETTINGS, {"steps": 7, "seed": 3, "curve": [{"steps": 0, "pooled_mm": 1.5}]})
+
+
+@pytest.fixture
+def folder(tmp_path):
+    save_policy(POLICY, tmp_path / "policy")
+    return tmp_path / "policy"
+
+
+def resign(folder):
+    """Make the configuration vouch for the weights that lie beside it, whatever they are."""
+    configuration = json.loads((folder / CONFIGURATION).read_text())
+    configuration["sha256"] = hashlib.sha256((folder / WEIGHTS).read_bytes()).hexdigest()
+    (folder / CONFIGURATION).write_text(json.dumps(configuration))
+
+
+def rewrite(folder, **changes):
+    """Change the configuration; None removes an entry."""
+    configuration = {**json.loads((folder / CONFIGURATION).read_text()), **changes}
+    configuration = {name: value for name, value in configuration.items() if value is not None}
+    (folder / CONFIGURATION).write_text(json.dumps(configuration))
+
+
+def replace_arrays(folder, **changes):
+    """Change arrays of the weights file (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
+    arrays = {**load((folder / WEIGHTS).read_bytes()), **{name.replace("_", "."): value for name, value in changes.items()}}
+    (folder / WEIGHTS).write_bytes(save({name: value for name, value in arrays.items() if value is not None}))
+    resign(folder)
+
+
+def assert_refused(folder, message):
+    with pytest.raises(ValueError, match=message) as caught:
+        load_policy(folder)
+    assert repr(str(folder)) in str(caught.value)
+    assert "allowed: " in str(caught.value)
+    assert "\n" not in str(caught.value)
+    # The controller refuses in the same words.
+    with pytest.raises(ValueError, match=message) as again:
+        ResidualController(policy=folder)
+    assert str(again.value) == str(caught.value)
+
+
+def test_a_round_trip_is_exact(folder):
+    read = load_policy(folder)
+    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
+    assert (read.environment, read.settings, read.training) == (ENVIRONMENT, SETTINGS, POLICY.training)
+    for name in ("mean", "variance"):
+        np.testing.assert_array_equal(getattr(read.network, name), getattr(POLICY.network, name), strict=True)
+    assert len(read.network.layers) == 3
+    for mine, its in zip(read.network.layers, POLICY.network.layers, strict=True):
+        for one, other in zip(mine, its, strict=True):
+            np.testing.assert_array_equal(one, other, strict=True)
+    seen = np.random.default_rng(1).normal(size=(50, INPUTS)).astype(np.float32)
+    np.testing.assert_array_equal(read.network.actions(seen), POLICY.network.actions(seen))
+    assert load_policy(str(folder)).settings == SETTINGS
+    assert read.network.squashed is False
+
+
+def test_a_squashed_network_comes_back_squashed(tmp_path):
+    squashed = network(squashed=True)
+    save_policy(Policy(squashed, ENVIRONMENT, SETTINGS, {}), tmp_path)
+    read = load_policy(tmp_path).network
+    assert read.squashed is True
+    seen = np.random.default_rng(1).normal(size=(50, INPUTS)).astype(np.float32)
+    np.testing.assert_array_equal(read.actions(seen), squashed.actions(seen))
+    assert not np.array_equal(read.actions(seen), network().actions(seen))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ResidualSettings(impedance="variable_kp"),
+        ResidualSettings("backstepping-frozen", "variable", 500, 1, 0.001),
+        ResidualSettings("admittance-backstepping"),
+        ResidualSettings("none"),
+    ],
+)
+def test_whatever_a_residual_may_do_comes_back(tmp_path, settings):
+    inputs = observation_size(settings)
+    save_policy(Policy(network(inputs, settings.size), ENVIRONMENT, settings, {}), tmp_path)
+    assert load_policy(tmp_path).settings == settings
+    ResidualController(policy=tmp_path)
+
+
+def test_the_configuration_is_json_as_others_read_it(tmp_path):
+    """Some figures say nothing, hunting where the reference never rests; JSON has no word for NaN but null."""
+
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    save_policy(Policy(network(), ENVIRONMENT, SETTINGS, {"reached": {"hunting_mm": float("nan")}}), tmp_path)
+    content = json.loads((tmp_path / CONFIGURATION).read_text(), parse_constant=refuse)
+    assert content["training"]["reached"]["hunting_mm"] is None
+
+
+def test_eleven_layers_come_back_in_order(tmp_path):
+    # Sorted as text, layer 10 would come before layer 2.
+    deep = network(hidden=(5,) * 10)
+    save_policy(Policy(deep, ENVIRONMENT, SETTINGS, {}), tmp_path)
+    seen = np.random.default_rng(1).normal(size=(9, INPUTS)).astype(np.float32)
+    np.testing.assert_array_equal(load_policy(tmp_path).network.actions(seen), deep.actions(seen))
+
+
+def test_writing_again_replaces_the_policy_whole(folder):
+    other = Policy(network(hidden=(4,), seed=5), "BirthSIM/ProbeResidual-v1", ResidualSettings(), {"steps": 9})
+    save_policy(other, folder)
+    read = load_policy(folder)
+    assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v1", {"steps": 9})
+    assert len(read.network.layers) == 2
+    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, CONFIGURATION])
+def test_a_write_that_is_cut_off_leaves_the_old_file_or_is_noticed(folder, name, monkeypatch):
+    replace = Path.replace
+
+    def cut(self, target):
+        if Path(target).name == name:
+            raise KeyboardInterrupt
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", cut)
+    other = Policy(network(hidden=(4,), seed=5), ENVIRONMENT, ResidualSettings(), {})
+    with pytest.raises(KeyboardInterrupt):
+        save_policy(other, folder)
+    if name == WEIGHTS:
+        assert load_policy(folder).settings == SETTINGS
+    else:
+        assert_refused(folder, "policy.safetensors is not the file that policy.json was written with")
+
+
+@pytest.mark.parametrize("name", [CONFIGURATION, WEIGHTS])
+def test_a_missing_file_is_named(folder, name):
+    (folder / name).unlink()
+    assert_refused(
+        folder, f"has no {name}; allowed: a folder that birthsim-train wrote, with policy.json and policy.safetensors"
+    )
+
+
+def test_a_folder_that_is_not_there_or_no_folder_is_named(tmp_path):
+    assert_refused(tmp_path / "nowhere", r"has no policy\.json")
+    (tmp_path / "file").write_text("")
+    assert_refused(tmp_path / "file", r"has no policy\.json")
+
+
+@pytest.mark.parametrize("place", [0, 9, 100, -1])
+def test_a_flipped_byte_in_the_weights_is_noticed(folder, place):
+    content = bytearray((folder / WEIGHTS).read_bytes())
+    content[place] ^= 1
+    (folder / WEIGHTS).write_bytes(content)
+    assert_refused(folder, "policy.safetensors is not the file that policy.json was written with")
+
+
+def test_truncated_or_empty_weights_are_noticed(folder):
+    content = (folder / WEIGHTS).read_bytes()
+    for part in (content[:-4], content[:20], b""):
+        (folder / WEIGHTS).write_bytes(part)
+        assert_refused(folder, "is not the file")
+        # Even if the configuration vouches for them.
+        resign(folder)
+        assert_refused(folder, "is damaged")
+
+
+def test_the_weights_of_another_policy_are_noticed(folder, tmp_path):
+    save_policy(Policy(network(seed=9), ENVIRONMENT, SETTINGS, {}), tmp_path / "other")
+    (folder / WEIGHTS).write_bytes((tmp_path / "other" / WEIGHTS).read_bytes())
+    assert_refused(folder, "is not the file")
+
+
+@pytest.mark.parametrize("text", ["", "{", "not json", '{"format": ', "\xff"])
+def test_a_configuration_that_is_no_json_is_refused(folder, text):
+    (folder / CONFIGURATION).write_bytes(text.encode("latin-1"))
+    assert_refused(folder, r"policy\.json is damaged")
+
+
+@pytest.mark.parametrize("content", [{}, {"format": "other-1"}, {"format": "birthsim-residual-1"}, [1, 2], 3, None, "text"])
+def test_json_of_something_else_is_called_foreign(folder, content):
+    (folder / CONFIGURATION).write_text(json.dumps(content))
+    assert_refused(folder, rf"format .* is foreign; allowed: '{FORMAT}'")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"settings": None},
+        {"training": None},
+        {"environment": None},
+        {"settings": {**SETTINGS.to_dict(), "authority": -1.0}},
+        {"settings": {**SETTINGS.to_dict(), "authority": "forty"}},
+        {"settings": {**SETTINGS.to_dict(), "time_constant": 0}},
+        {"settings": {**SETTINGS.to_dict(), "law": "pid"}},
+        {"settings": {**SETTINGS.to_dict(), "impedance": 3}},
+        {"settings": {**SETTINGS.to_dict(), "law": "none", "impedance": "variable"}},
+        {"settings": {"authority": 40.0, "smoothing": 0.3, "policy_period": 0.01, "weight_compensation": False}},
+        {"squashed": None},
+        {"settings": {**SETTINGS.to_dict(), "unknown": 1}},
+        {"settings": [1, 2]},
+        {"settings": 3},
+        {"training": 3},
+        {"training": "text"},
+    ],
+)
+def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, changes):
+    rewrite(folder, **changes)
+    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim-train wrote")
+
+
+@pytest.mark.parametrize("squashed", ["false", 3, []])
+def test_a_squashing_that_is_neither_true_nor_false_is_refused(folder, squashed):
+    rewrite(folder, squashed=squashed)
+    assert_refused(folder, "is damaged")
+
+
+def test_a_configuration_without_the_hash_is_refused(folder):
+    rewrite(folder, sha256=None)
+    assert_refused(folder, "is not the file")
+
+
+def shape(*sizes, fill=0.1, dtype=np.float32):
+    return np.full(sizes, fill, dtype)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"mean": None},
+        {"variance": None},
+        {"1_weight": None},
+        {"2_bias": None},
+        {"mean": shape(INPUTS - 1)},
+        {"variance": shape(INPUTS + 1)},
+        {"mean": shape(1, INPUTS), "variance": shape(1, INPUTS)},
+        {"mean": shape(0), "variance": shape(0), "0_weight": shape(16, 0)},
+        {"0_weight": shape(16, INPUTS - 1)},
+        {"0_weight": shape(INPUTS, 16)},
+        {"0_weight": shape(16 * INPUTS)},
+        {"0_bias": shape(15)},
+        {"0_bias": shape(16, 1)},
+        {"1_weight": shape(8, 17)},
+        {"3_weight": shape(2, 3), "3_bias": shape(2)},
+        {"extra_weight": shape(2, 2)},
+        {"variance": shape(INPUTS, fill=-0.1)},
+    ]
+    + [{name: None for name in ("0_weight", "1_weight", "2_weight")}]
+    + [{"mean": shape(INPUTS, fill=bad)} for bad in (np.nan, np.inf)]
+    + [{"variance": shape(INPUTS, fill=bad)} for bad in (np.nan, np.inf)]
+    + [{"1_weight": shape(8, 16, fill=bad)} for bad in (np.nan, np.inf, -np.inf)]
+    + [{"2_bias": shape(2, fill=np.nan)}],
+)
+def test_arrays_that_are_no_network_are_refused(folder, changes):
+    replace_arrays(folder, **changes)
+    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim-train wrote")
+
+
+@pytest.mark.parametrize(("inputs", "outputs"), [(22, 2), (INPUTS, 4), (INPUTS - 1, 3)])
+def test_a_network_of_another_task_is_refused_by_the_controller(tmp_path, inputs, outputs):
+    save_policy(Policy(network(inputs, outputs), ENVIRONMENT, SETTINGS, {}), tmp_path)
+    assert load_policy(tmp_path).network.inputs == inputs
+    with pytest.raises(ValueError, match=rf"maps {inputs} to {outputs} numbers; allowed: {INPUTS} to 2") as caught:
+        ResidualController(policy=tmp_path)
+    assert repr(str(tmp_path)) in str(caught.value)
+
+
+@pytest.mark.parametrize("period", [0.0105, 0.0004])
+def test_a_policy_period_that_the_rig_cannot_keep_is_refused(tmp_path, period):
+    save_policy(Policy(network(), ENVIRONMENT, ResidualSettings(policy_period=period), {}), tmp_path)
+    with pytest.raises(ValueError, match=rf"policy_period = {period}; allowed: a multiple of the control period 0\.001 s"):
+        ResidualController(policy=tmp_path)
+
+
+class Trap:
+    """Unpickling one writes a file."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return (Path.touch, (self.path,))
+
+
+@pytest.mark.parametrize("name", [WEIGHTS, CONFIGURATION])
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_pickle_under_another_name_is_refused_and_not_opened(folder, tmp_path, name, signed):
+    trap = tmp_path / "sprung"
+    (folder / name).write_bytes(pickle.dumps(Trap(trap)))
+    if signed and name == WEIGHTS:
+        resign(folder)
+    assert_refused(folder, "is damaged" if signed or name == CONFIGURATION else "is not the file")
+    assert not trap.exists()
+    # The trap is a real one.
+    pickle.loads(pickle.dumps(Trap(trap)))
+    assert trap.exists()
+
+
+def test_no_module_of_the_project_unpickles():
+    forbidden = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
+    files = {file for package in ("birthsim_env", "baselines", "agents") for file in (ROOT / package).rglob("*.py")}
+    # The kernels' own cache holds machine code, which runs anyway; joblib starts processes there and reads no file.
+    for path in files - {ROOT / "birthsim_env/physics/compilation.py", ROOT / "baselines/side_by_side.py"}:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, (ast.Import, ast.ImportFrom)) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+            assert not {name.split(".")[0] for name in names} & forbidden, path
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "load":
+                own = ast.unparse(node.func) == "torch.load"
+                # PyTorch's format holds tensors and plain numbers where nothing else is let in.
+                said = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+                assert said.get("weights_only") == "True" if own else said == {}, path
+            if isinstance(node, ast.keyword):
+                assert node.arg != "allow_pickle", path
+
+
+def test_running_a_policy_needs_neither_torch_nor_stable_baselines(folder):
+    program = (
+        "import sys\n"
+        "sys.modules['torch'] = sys.modules['stable_baselines3'] = sys.modules['sb3_contrib'] = None\n"
+        "from baselines.registry import make_controller\n"
+        "from birthsim_env import Parameters\n"
+        "import gymnasium, sys\n"
+        f"law = make_controller('residual', Parameters(), policy={str(folder)!r})\n"
+        "env = gymnasium.make_vec('BirthSIM/Circle-v1', num_envs=2)\n"
+        "env.reset(seed=0)\n"
+        "print(law.command(env.measurement, env.reference).shape)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "(4, 2)", done.stderr
+
+
+def test_a_network_is_normalization_tanh_layers_and_a_clip():
+    hand = PolicyNetwork(
+        np.array([1.0, 0.0]),
+        np.array([4.0, 0.25]),
+        (
+            (np.array([[1.0, 0.0], [0.0, 2.0]], np.float32), np.array([0.0, 0.5], np.float32)),
+            (np.array([[1.0, 1.0], [0.0, 3.0]], np.float32), np.array([0.1, 0.0], np.float32)),
+        ),
+    )
+    assert (hand.inputs, hand.outputs) == (2, 2)
+    # Actions are singles, rounded by 6e-8 of their size; EPSILON of the variance counts 1.3e-9 to 2e-8.
+    one, other = np.tanh((2 - 1) / 2), np.tanh(2 * -0.5 / 0.5 + 0.5)
+    seen = np.array([[2.0, -0.5], [1e9, 1e9]], np.float32)
+    actions = hand.actions(seen)
+    np.testing.assert_allclose(actions[0], [one + other + 0.1, max(3 * other, -1)], rtol=1e-6)
+    # Far inputs are clipped at ten standard deviations, actions at one.
+    np.testing.assert_array_equal(actions[1], [1, 1])
+    weak = PolicyNetwork(hand.mean, hand.variance, ((np.array([[0.05, 0.0]], np.float32), np.zeros(1, np.float32)),))
+    np.testing.assert_allclose(weak.actions(seen)[:, 0], [0.025, 0.5], rtol=1e-6)
+    assert actions.dtype == np.float32
+
+
+def test_a_squashed_network_ends_with_another_tanh():
+    weight, bias = np.array([[0.5, -2.0]], np.float32), np.array([0.25], np.float32)
+    hand = PolicyNetwork(np.zeros(2), np.ones(2), ((weight, bias),), squashed=True)
+    actions = hand.actions(np.array([[1.0, 0.5], [100.0, -100.0]], np.float32))
+    np.testing.assert_allclose(actions[:, 0], np.tanh([0.5 - 1 + 0.25, 5 + 20 + 0.25]), rtol=1e-6)

@@ -1,0 +1,372 @@
+"""The residual environments: zero is exactly the law, and what an action may do is bounded, smooth and forgotten on reset."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check
+from stable_baselines3.common.env_checker import check_env as stable_baselines_check
+
+import birthsim_env
+from agents.residual import authority
+from agents.residual.env import ResidualEnv, ResidualVectorEnv
+from agents.residual.law import ResidualActuation, ResidualLaw
+from agents.residual.settings import LAWS, ResidualSettings
+from baselines.backstepping.controller import BacksteppingController
+from baselines.registry import make_controller
+from birthsim_env import Parameters
+from birthsim_env.info import FIELDS
+from birthsim_env.observation import ENTRIES, SIZE
+from birthsim_env.parts.scenarios import SCENARIOS
+from tests.oracles.residual_parts import UnexplainedForceObserver
+
+assert birthsim_env  # importing it registers the ids
+IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS)
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
+RIG = Parameters()
+
+
+def single(name=CIRCLE, **arguments) -> ResidualEnv:
+    env = gymnasium.make(name, **arguments).unwrapped
+    assert type(env) is ResidualEnv
+    return env
+
+
+def lanes(count=3, name=CIRCLE, **arguments) -> ResidualVectorEnv:
+    env = gymnasium.make_vec(name, num_envs=count, **{"autoreset_mode": "SameStep", **arguments})
+    assert type(env) is ResidualVectorEnv
+    return env
+
+
+def random_actions(steps, count, size=2, seed=0):
+    return np.random.default_rng(seed).uniform(-1, 1, (steps, count, size)).astype(np.float32)
+
+
+def by_hand(name, steps, seed, told=None, law="backstepping", periods=10, **arguments):
+    """The base environment at 1 kHz, driven by the law from measurements; its state and info after every policy step.
+
+    ``told(tick)`` is what the law is told about in control period ``tick``: a force (2,), N, and its rate (2,), N/s.
+    """
+    env = gymnasium.make(name.replace("Residual", ""), policy_period=1e-3, **arguments).unwrapped
+    controller = make_controller(law, arguments.get("parameters") or RIG)
+    env.reset(seed=seed)
+    rows = []
+    for step in range(steps):
+        for tick in range(periods * step, periods * (step + 1)):
+            believed = () if told is None else told(tick)
+            _, _, terminated, truncated, info = env.step(controller.command(env.measurement, env.reference, *believed))
+        rows.append((env.simulation.plant.state.copy(), info, terminated, truncated))
+    return rows
+
+
+def assert_follows(env, actions, rows, seed):
+    """The residual environment under ``actions`` goes, bit for bit, through ``rows`` of ``by_hand``."""
+    env.reset(seed=seed)
+    for action, (state, expected, terminated, truncated) in zip(actions, rows, strict=True):
+        _, _, its_end, its_limit, info = env.step(action)
+        np.testing.assert_array_equal(env.simulation.plant.state, state)
+        assert (its_end, its_limit) == (terminated, truncated)
+        for field in set(FIELDS) - {"impact_speed"}:
+            np.testing.assert_array_equal(info[field], expected[field], err_msg=field)
+
+
+@pytest.mark.parametrize("law", LAWS[:-1])
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
+    arguments = {"sensors": sensors, "randomize": True}
+    rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
+    env = single(law=law, **arguments)
+    assert_follows(env, np.zeros((140, 2), np.float32), rows, seed=3)
+    # It was no standstill: the first push has come.
+    assert np.abs(rows[-1][1]["user_force"]).max() > 5
+
+
+@pytest.mark.parametrize("name", IDS[1:])
+def test_zero_actions_are_the_law_in_every_scenario_up_to_its_end(name):
+    steps = 80
+    rows = by_hand(name, steps, 0, duration=steps * 0.01)
+    assert rows[-1][3]
+    assert_follows(single(name, duration=steps * 0.01), np.zeros((steps, 2), np.float32), rows, seed=0)
+
+
+def test_zero_actions_on_a_rig_of_ones_own_are_the_law_told_of_that_rig():
+    rig = RIG.replace({"mechanics.mass": 4.5, "cylinder2.coulomb_friction": 22.0})
+    rows = by_hand(CIRCLE, 60, 0, parameters=rig)
+    assert_follows(single(parameters=rig), np.zeros((60, 2), np.float32), rows, seed=0)
+    # The law's belief follows the rig: a law that believes in the default goes elsewhere.
+    env, law = gymnasium.make("BirthSIM/Circle-v1", policy_period=1e-3, parameters=rig).unwrapped, BacksteppingController()
+    env.reset(seed=0)
+    for _ in range(600):
+        env.step(law.command(env.measurement, env.reference))
+    assert np.abs(env.simulation.plant.state - rows[-1][0]).max() > 1e-4
+
+
+@pytest.fixture
+def unguarded(monkeypatch):
+    """Nothing that oscillates costs authority."""
+    monkeypatch.setattr(authority, "LEVEL", np.inf)
+
+
+@pytest.mark.parametrize(
+    ("law", "authority", "constant", "period"),
+    [
+        ("backstepping", 40.0, 0.028, 0.01),
+        ("backstepping-weight", 15.0, 0.001, 0.01),
+        ("backstepping-frozen", 80.0, 0.1, 0.02),
+        ("admittance-backstepping", 25.0, 0.028, 0.001),
+    ],
+)
+def test_a_held_action_becomes_a_feedforward_force_and_its_rate_through_the_low_pass(
+    law, authority, constant, period, unguarded
+):
+    """z' = (a - z)/T at 1 kHz: after n periods z = a (1 - exp(-n ms/T)), and the force changes at authority (a - z)/T."""
+    steps, periods, action = 40, round(1000 * period), np.array([0.75, -0.5], np.float32)
+    whole = authority * action.astype(np.float64)
+
+    def told(tick):
+        left = np.exp(-1e-3 * tick / constant)
+        return whole * (1 - left), whole * left / constant
+
+    rows = by_hand(CIRCLE, steps, 1, told, law, periods)
+    env = single(law=law, authority=authority, time_constant=constant, policy_period=period)
+    env.reset(seed=1)
+    for state, expected, _, _ in rows:
+        _, _, _, _, info = env.step(action)
+        # The closed form and the recursion differ in rounding alone.
+        np.testing.assert_allclose(info["position"], expected["position"], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(env.simulation.plant.state[6:14], state[6:14], rtol=1e-6)
+    # Force and rate are felt: the law alone goes elsewhere, and so does one that is told of the force without its rate.
+    for other in (None, lambda tick: told(tick)[:1]):
+        untold = by_hand(CIRCLE, steps, 1, other, law, periods)
+        assert np.abs(rows[-1][1]["position"] - untold[-1][1]["position"]).max() > 1e-7
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Forces (2, N), N, and rates (2, N), N/s, that the law inside was told about, (4, N) a control period: the loop, else
+    compiled, stops for it."""
+    beliefs, command = [], ResidualLaw.command
+
+    def spied(self, measurement, reference):
+        openings = command(self, measurement, reference)
+        assert not self.told[4].any()
+        beliefs.append(self.told[:4])
+        return openings
+
+    monkeypatch.delattr(ResidualActuation, "stages")
+    monkeypatch.setattr(ResidualLaw, "command", spied)
+    return beliefs
+
+
+def test_the_feedforward_force_never_exceeds_the_authority_and_changes_at_the_control_rate(told, unguarded):
+    env = lanes(4, authority=25.0, time_constant=0.02)
+    env.reset(seed=0)
+    actions = np.sign(random_actions(50, 4, seed=4))
+    actions[30:] = 1.0
+    for action in actions:
+        env.step(action)
+    forces, rates = np.array(told).reshape(50, 10, 2, 2, 4).transpose(2, 0, 1, 3, 4)
+    smooth = np.zeros((2, 4))
+    for k, action in enumerate(actions):
+        for tick in range(10):
+            np.testing.assert_allclose(forces[k, tick], 25 * smooth, rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(rates[k, tick], 25 / 0.02 * (action.T - smooth), rtol=1e-9, atol=1e-9)
+            smooth += (1 - np.exp(-1e-3 / 0.02)) * (action.T - smooth)
+    assert np.abs(forces).max() <= 25
+    assert forces[-1, -1].min() > 24.9
+
+
+def test_oscillation_costs_authority_and_what_is_left_is_seen(told):
+    """Lane 0 is shaken at 7 Hz with all that an action may say; lane 1 is left alone."""
+    env, actions, shares = lanes(2, PROBE, authority=400.0, duration=4.0), np.zeros((2, 2), np.float32), []
+    env.reset(seed=0)
+    columns = [env.observation_names.index(f"share of the authority on cylinder {i}, 1") for i in (1, 2)]
+    for step in range(150):
+        actions[0] = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
+        shares.append(env.step(actions)[0][:, columns].T)
+    shares, smooth = np.array(shares), np.zeros(2)
+    np.testing.assert_array_equal(shares[:, :, 1], 1.0)
+    assert np.all(np.diff(shares[:, :, 0], axis=0) <= 0)
+    assert shares[-1, :, 0].min() < 0.5
+    for step in range(150):
+        action = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
+        for _ in range(10):
+            believed = smooth
+            smooth = smooth + (1 - np.exp(-1 / 28)) * (action - smooth)
+        # In the last period of a step the share was the one that the policy sees after it.
+        force, rate = told[10 * step + 9][:, 0].reshape(2, 2)
+        np.testing.assert_allclose(force, 400 * shares[step, :, 0] * believed, rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(rate, 400 * shares[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
+
+
+def test_an_ended_lane_starts_its_next_episode_with_no_feedforward_force(told, unguarded):
+    # Lane 1 hits the end stop; the others go on with what they had been told.
+    env = lanes(3, PROBE, authority=500.0, time_constant=0.014, duration=2.0)
+    env.reset(seed=0)
+    actions, ended = np.full((3, 2), 0.1, np.float32), None
+    actions[1] = [-1.0, -1.0]
+    for step in range(200):
+        _, _, terminated, _, infos = env.step(actions)
+        if ended is not None:
+            break
+        if terminated.any():
+            np.testing.assert_array_equal(terminated, [False, True, False])
+            ended = step
+            assert infos["time"][1] == 0
+            actions[1] = 0.0
+    assert ended is not None
+    np.testing.assert_allclose(told[10 * ended][:2], [[50, -500, 50]] * 2, rtol=0.02)
+    np.testing.assert_array_equal(told[-1][:, 1], 0.0)
+    np.testing.assert_allclose(told[-1][:2, [0, 2]], 50, rtol=0.02)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_every_episode_of_a_lane_is_that_of_the_single_environment(sensors):
+    arguments = {"sensors": sensors, "randomize": True, "duration": 0.4}
+    env, actions = lanes(35, **arguments), random_actions(100, 35)
+    chosen = (0, 1, 33)
+    alone = {lane: single(**arguments) for lane in chosen}
+    observation, _ = env.reset(seed=20)
+    for lane in chosen:
+        np.testing.assert_array_equal(alone[lane].reset(seed=20 + lane)[0], observation[lane])
+    for k, action in enumerate(actions):
+        observation, reward, terminated, truncated, infos = env.step(action)
+        assert truncated.all() == (k % 40 == 39)
+        for lane in chosen:
+            row = alone[lane].step(action[lane])
+            assert row[1:4] == (reward[lane], terminated[lane], truncated[lane])
+            last = infos["final_obs"][lane] if truncated[lane] else observation[lane]
+            np.testing.assert_array_equal(row[0], last)
+            if truncated[lane]:
+                np.testing.assert_array_equal(alone[lane].reset()[0], observation[lane])
+
+
+def test_the_same_actions_twice_are_the_same_rollout_in_the_same_environment():
+    env, actions, rollouts = lanes(2, sensors="lab", randomize=True), random_actions(30, 2), []
+    for _ in range(2):
+        rows = [env.reset(seed=9)[0]]
+        rows += [env.step(action)[0] for action in actions]
+        rollouts.append(np.array(rows))
+    np.testing.assert_array_equal(*rollouts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [({}, 2), ({"impedance": "variable_kp"}, 4), ({"impedance": "variable"}, 5), ({"law": "none"}, 4)],
+)
+def test_observations_end_with_the_last_action_and_what_the_law_remembers(arguments, size):
+    env = lanes(2, time_constant=0.02, **arguments)
+    assert env.single_action_space == gymnasium.spaces.Box(-1, 1, (size,), np.float32)
+    assert env.single_observation_space.shape == (SIZE + 2 * size + 8,) == (len(env.observation_names),)
+    names = list(env.observation_names)
+    assert names[:SIZE] == [str(entry) for entry in ENTRIES]
+    said = [name.removeprefix("last action: ") for name in names[SIZE : SIZE + size]]
+    assert names[SIZE + size : SIZE + 2 * size] == [f"smoothed action: {name}" for name in said]
+    word = "opening" if "law" in arguments else "believed force"
+    assert [word in name for name in said[:2]] == [True, True]
+    assert all("share" in name for name in names[-8:-6])
+    assert all(name.startswith("unexplained force on piston") for name in names[-6:])
+    assert len(set(names)) == len(names)
+    observation, _ = env.reset(seed=0)
+    np.testing.assert_array_equal(observation[:, SIZE:], [[0] * 2 * size + [1, 1] + [0] * 6] * 2)
+    actions = random_actions(1, 2, size)[0]
+    observation, _, _, _, infos = env.step(actions)
+    np.testing.assert_array_equal(observation[:, SIZE : SIZE + size], actions)
+    np.testing.assert_allclose(observation[:, SIZE + size : SIZE + 2 * size], (1 - np.exp(-10 / 20)) * actions, rtol=1e-6)
+    np.testing.assert_allclose(infos["reward_action_change"], -0.2 / 8.75 * np.abs(actions).mean(axis=1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(sensors):
+    env = lanes(3, PROBE, sensors=sensors, randomize=True, policy_period=1e-3)
+    observation, _ = env.reset(seed=5)
+    observer = UnexplainedForceObserver(RIG)
+    observer.reset(np.ones(3, dtype=np.bool_))
+    for _ in range(400):
+        observer.update(env.measurement)
+        observation = env.step(np.zeros((3, 2), np.float32))[0]
+        np.testing.assert_array_equal(observation[:, -6:], np.clip(observer.met.T / 100, -10, 10).astype(np.float32))
+    assert np.abs(observation[:, -6:]).max() > 0.05
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("name", IDS)
+def test_both_checkers_find_nothing_to_say(name, sensors, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    gymnasium_check(single(name, sensors=sensors, randomize=True, render_mode="rgb_array"))
+    stable_baselines_check(single(name, sensors=sensors, randomize=True))
+
+
+def test_importing_twice_registers_once():
+    import importlib
+
+    before = {name: spec for name, spec in gymnasium.registry.items() if "Residual" in name}
+    assert set(before) == set(IDS)
+    importlib.reload(birthsim_env)
+    assert {name: spec for name, spec in gymnasium.registry.items() if "Residual" in name} == before
+
+
+@pytest.mark.parametrize("make", [single, lanes])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"action_mode": "flow"}, "action_mode = 'flow'; allowed: not given"),
+        ({"action_mode": "valve"}, "action_mode = 'valve'; allowed: not given"),
+        ({"valves": "one_valve"}, "valves = 'one_valve'; allowed: not given"),
+        ({"authority": 0.0}, r"authority = 0\.0; allowed: more than 0, at most 500"),
+        ({"authority": 500.1}, r"authority = 500\.1; allowed: more than 0, at most 500"),
+        ({"authority": float("nan")}, "authority = nan; allowed: more than 0"),
+        ({"authority": "40"}, "authority = '40'; allowed: more than 0"),
+        ({"time_constant": 0.0}, r"time_constant = 0\.0; allowed: more than 0, at most 1"),
+        ({"time_constant": 1.5}, r"time_constant = 1\.5; allowed: more than 0, at most 1"),
+        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-backstepping', 'none'"),
+        ({"law": None}, "law = None; allowed: 'backstepping'"),
+        ({"impedance": "soft"}, "impedance = 'soft'; allowed: 'fixed', 'variable_kp', 'variable'"),
+        ({"impedance": "variable", "law": "none"}, "impedance = 'variable'; allowed: 'fixed', law = 'none' has no impedance"),
+        (
+            {"impedance": "variable_kp", "law": "admittance-backstepping"},
+            "impedance = 'variable_kp'; allowed: 'fixed', law = 'admittance-backstepping' has no impedance",
+        ),
+        ({"actuation": None}, "actuation = None; allowed: not given"),
+        ({"policy_period": 0.0105}, r"policy_period = 0\.0105; allowed: a multiple of the control period 0\.001 s"),
+        ({"policy_period": -0.01}, r"policy_period = -0\.01; allowed: more than 0"),
+        ({"policy_period": "fast"}, "policy_period = 'fast'; allowed: more than 0"),
+        ({"sensors": "none"}, "sensors = 'none'; allowed: 'ideal', 'lab'"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(make, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        make(**arguments)
+
+
+@pytest.mark.parametrize("make", [single, lanes])
+def test_unknown_arguments_are_refused_as_python_does_and_the_residuals_own_are_named(make):
+    with pytest.raises(TypeError, match=r"got an unexpected keyword argument 'smoothing'; allowed: law, impedance, .*sensors"):
+        make(smoothing=0.3)
+
+
+def test_the_largest_settings_are_allowed():
+    env = lanes(2, authority=500, time_constant=1, policy_period=1)
+    env.reset(seed=0)
+    assert np.isfinite(env.step(np.zeros((2, 2), np.float32))[0]).all()
+    settings = ResidualSettings("backstepping-weight", "variable", 500, 1, 1)
+    assert settings.to_dict() == {
+        "law": "backstepping-weight", "impedance": "variable", "authority": 500, "time_constant": 1, "policy_period": 1,
+    }  # fmt: skip
+    assert ResidualSettings(**settings.to_dict()) == settings
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ([[0, 0]], r"action has shape \(1, 2\); allowed: \(3, 2\)"),
+        ([[0, 0], [0, 1.01], [0, 0]], r"action\[1\] = 1\.01 in lane 1; allowed: -1 to 1"),
+        ([[0, 0], [0, 0], [np.nan, 0]], r"action\[0\] = nan in lane 2; allowed: -1 to 1"),
+    ],
+)
+def test_wrong_actions_are_refused(action, message):
+    env = lanes(3)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=message):
+        env.step(np.array(action))
