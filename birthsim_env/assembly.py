@@ -15,6 +15,7 @@ from gymnasium import spaces
 from birthsim_env import observation
 from birthsim_env.drawing.rendering import checked_size
 from birthsim_env.loop.loop import available_threads
+from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
 from birthsim_env.parts.randomization import checked_ranges, documented_ranges
@@ -108,6 +109,9 @@ def assemble(
     one_of("valves", valves, VALVE_LAYOUTS)
     one_of("sensors", sensors, tuple(SENSORS))
     chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
+    for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
+        if not length <= most:
+            raise ValueError(f"actuation.{name} has a length of {length}; allowed: at most {most}")
     if isinstance(randomize, Mapping):
         ranges, varied = checked_ranges(randomize, rig), False
     else:

@@ -12,7 +12,6 @@ from birthsim_env.loop.rows import (
     ACTION,
     FORCE,
     IMPACT,
-    MOST_ACTIONS,
     MOTION,
     POSITION,
     POSITION_TIME,
@@ -45,7 +44,10 @@ and the scales of an observation."""
 @kernel
 def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     w, s, mine = block(world, WORLD), block(seen, SEEN), slice(lane, lane + n)
-    about, m = numbers(constants, ABOUT + PARAMETERS + observation.SIZE), block(memory, LAST + MOST_ACTIONS)[:, :n]
+    about, m = (
+        numbers(constants, ABOUT + PARAMETERS + observation.SIZE),
+        block(memory, LAST + int(numbers(constants, ABOUT)[4]))[:, :n],
+    )
     size, shown, jumped, scales = int(about[4]), int(about[5]), scratch(1)[0, :n], about[ABOUT + PARAMETERS :]
     state, motion, force, since = (
         w[STATE : STATE + STATES, :n],
@@ -101,7 +103,7 @@ class Outcome:
         self.terms, self.ends = np.zeros((len(reward.REWARD_TERMS), lanes)), np.zeros((2, lanes))
         self.rows: Array = np.zeros((info.ROWS, lanes))
         self.seen: NDArray[np.float32] = np.zeros((lanes, observation.SIZE + actions + shown), dtype=np.float32)
-        self._memory: Array = np.zeros((LAST + MOST_ACTIONS, lanes))
+        self._memory: Array = np.zeros((LAST + actions, lanes))
         # Half a control period less: the clock of a jump counts in sums of them.
         about = (policy_period, policy_period - 0.5 * period, impact_speed, actions, shown, *nominal, *observation.SCALES)
         self._constants = [np.array([float(stepped), *about]) for stepped in (False, True)]

@@ -59,9 +59,8 @@ class Simulation:
     episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``force`` (2, N) the hand's, N; ``reference`` and
     ``measurement``; ``since_jump`` (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded;
     ``impacts`` (2, N) m/s, the fastest collision of each piston with an end stop during the last step. ``period`` is that of
-    control, s, and ``periods`` how many of them make a policy step. ``beginning`` and
-    ``closing`` stages run where episodes begin, and at the end of a policy step.
-    ``threads`` share the lanes.
+    control, s, and ``periods`` how many of them make a policy step. ``beginning`` and ``closing`` stages run where episodes
+    begin, and at the end of a policy step. ``threads`` share the lanes.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from agents.residual import authority, unexplained
-from agents.residual.settings import NO_LAW, ResidualSettings
+from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSettings
 from baselines.estimation import disturbance_observer, observers
 from baselines.registry import make_controller
 from baselines.staged import LawStage, StagedController
@@ -23,7 +23,6 @@ from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
     FEEDFORWARD,
-    MOST_ACTIONS,
     OPENING,
     POSITION,
     POSITION_TIME,
@@ -138,7 +137,7 @@ CONSTANTS = (
 action; authority, N; time constant, s, and quickness of the low-pass; speed error, m/s, below which nothing is an oscillation;
 ``FORCE_UNIT``; 1 with a law, 1 where the impedance has a stiffness and 1 where it has a damping. The rig follows."""
 SAMPLED, OBSERVER, PERIOD, NOISE, SIZE, AUTHORITY, CONSTANT, QUICKNESS, LEVEL_ROW, UNIT, HAS_LAW, STIFFENS, DAMPS = range(13)
-SMOOTH, LIMITER = 0, MOST_ACTIONS
+SMOOTH, LIMITER = 0, max(VALVES, *IMPEDANCES.values())
 MET_ROWS = LIMITER + authority.ROWS
 WAYS = MET_ROWS + unexplained.ROWS
 PISTONS = WAYS + 4

@@ -23,7 +23,8 @@ TICK = SINCE_JUMP + 1
 WORLD = TICK + 1
 """Rows of the world."""
 
-MOST_ACTIONS, MOST_SHOWN = 8, 16
+MOST_ACTIONS, MOST_SHOWN = 64, 64
+"""Longest action, and most that an actuation shows of its memory."""
 
 TIME = 0
 """s since the episode began."""

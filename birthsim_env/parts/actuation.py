@@ -32,6 +32,10 @@ class Actuation(Protocol):
     lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
     ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on. ``memory()`` (M, N) is
     what a policy should see of its state, in units that make it roughly [-1, 1], and ``memory_names`` describes its rows.
+
+    The loop stops for ``openings``, once a policy step or once a control period. An actuation that comes with the package has
+    ``stages(lanes, sampled)`` besides, which are compiled into the loop, and where these show a memory the rows ``shown``
+    (M, N), and ``explain(measurement, reference)``, which raises the error for what they could not serve.
     """
 
     size: int

@@ -84,3 +84,38 @@ def test_the_openings_that_an_actuation_keeps_are_not_written_to():
         env.step(np.zeros((2, 3)))
     env.reset(seed=0)
     np.testing.assert_array_equal(actuation.table, table)
+
+
+class Many:
+    """An actuation of any length that shows all that it was told."""
+
+    every_period = False
+
+    def __init__(self, size, shown):
+        self.size, self.names = size, tuple(f"entry {k}" for k in range(size))
+        self.memory_names, self.told = tuple(f"told {k}" for k in range(shown)), np.zeros((shown, 1))
+
+    def begin(self, lanes):
+        self.told[:] = 0.0
+
+    def accept(self, actions):
+        self.told[:] = actions[: len(self.told)]
+
+    def openings(self, plant, measurement, reference):
+        return np.zeros((4, 1))
+
+    def memory(self):
+        return self.told
+
+
+def test_long_actions_and_memories_have_room_up_to_a_length_that_is_said():
+    env = gymnasium.make(PROBE, actuation=Many(64, 64)).unwrapped
+    env.reset(seed=0)
+    action = np.linspace(-1, 1, 64).astype(np.float32)
+    for _ in range(3):
+        observation, *_ = env.step(action)
+        np.testing.assert_array_equal(observation[SIZE:], np.tile(action, 2))
+        np.testing.assert_array_equal(env.simulation.openings, 0)
+    for size, shown in ((65, 0), (4, 65)):
+        with pytest.raises(ValueError, match="allowed: at most 64"):
+            gymnasium.make(PROBE, actuation=Many(size, shown))
