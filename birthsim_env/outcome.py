@@ -44,23 +44,12 @@ and the scales of an observation."""
 @kernel
 def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     w, s, mine = block(world, WORLD), block(seen, SEEN), slice(lane, lane + n)
-    about, m = (
-        numbers(constants, ABOUT + PARAMETERS + observation.SIZE),
-        block(memory, LAST + int(numbers(constants, ABOUT)[4]))[:, :n],
-    )
-    size, shown, jumped, scales = int(about[4]), int(about[5]), scratch(1)[0, :n], about[ABOUT + PARAMETERS :]
-    state, motion, force, since = (
-        w[STATE : STATE + STATES, :n],
-        w[MOTION : MOTION + 4, :n],
-        w[FORCE : FORCE + 2, :n],
-        w[SINCE_JUMP, :n],
-    )
-    asked, hits, action, last = (
-        s[REFERENCE : REFERENCE + REFERENCES, :n],
-        w[IMPACT : IMPACT + 2, :n],
-        s[ACTION : ACTION + size, :n],
-        m[LAST : LAST + size],
-    )
+    about = numbers(constants, ABOUT + PARAMETERS + observation.SIZE)
+    size, shown, m = int(about[4]), int(about[5]), block(memory, LAST + int(about[4]))[:, :n]
+    nominal, scales, jumped = about[ABOUT : ABOUT + PARAMETERS], about[ABOUT + PARAMETERS :], scratch(1)[0, :n]
+    state, motion, hits = w[STATE : STATE + STATES, :n], w[MOTION : MOTION + 4, :n], w[IMPACT : IMPACT + 2, :n]
+    force, since, asked = w[FORCE : FORCE + 2, :n], w[SINCE_JUMP, :n], s[REFERENCE : REFERENCE + REFERENCES, :n]
+    action, last = s[ACTION : ACTION + size, :n], m[LAST : LAST + size]
     failed, succeeded = table2(tables, 1)[0, mine], table2(tables, 1)[1, mine]
     if about[0] > 0.0:
         for i in range(n):
@@ -84,7 +73,7 @@ def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane
     info.describe(s[TIME, :n], since, state, motion, asked, force, hits, w[:PARAMETERS, :n], table2(tables, 2)[:, mine])
     observation.look(
         s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n], s[PRESSURE:USER_FORCE, :n], asked, s[USER_FORCE:REFERENCE, :n],
-        last, s[SHOWN : SHOWN + shown, :n], about[ABOUT : ABOUT + PARAMETERS], scales, singles(tables, 3)[mine],
+        last, s[SHOWN : SHOWN + shown, :n], nominal, scales, singles(tables, 3)[mine],
     )  # fmt: skip
     return 0
 
