@@ -53,7 +53,7 @@ STIR = 1.9
 """Low-passed innovation, in standard deviations of the position noise, that ends a rest: 4.5 of its own."""
 
 
-ESTIMATE, REST, INNOVATION, RELUCTANCE, FRESH, LAST, SLOT, HISTORY = 0, 6, 8, 10, 12, 13, 14, 15
+ESTIMATE, REST, INNOVATION, RELUCTANT, FRESH, LAST, SLOT, HISTORY = 0, 6, 8, 10, 12, 13, 14, 15
 """Rows at which parts of an observer's memory begin: y1, y2, v1, v2, d1, d2; how far each piston rests, 0 to 1; low-passed
 innovations, m; factors of ``REST_TIME``; 1 at a new start; time of the newest sample, s; where in the history the present
 stands; past y1, y2, a ring."""
@@ -69,8 +69,8 @@ def observe(
     ``force`` (2, N) the user's, N, and ``believed`` (2, N), N along the pistons, as known; ``moving`` (N,) 1 where no piston
     may rest.
     """
-    estimate, rest, innovations = memory[ESTIMATE:REST], memory[REST:INNOVATION], memory[INNOVATION:RELUCTANCE]
-    reluctance, history = memory[RELUCTANCE:FRESH], memory[HISTORY:]
+    estimate, rest, innovations = memory[ESTIMATE:REST], memory[REST:INNOVATION], memory[INNOVATION:RELUCTANT]
+    reluctance, history = memory[RELUCTANT:FRESH], memory[HISTORY:]
     depth, held = history.shape[0] // 2, exact.exp(-REST_BANDWIDTH * period)
     motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
     for i in range(estimate.shape[1]):
