@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import pathlib
 import subprocess
 import sys
 
@@ -30,3 +32,23 @@ def test_importing_a_package_loads_no_torch():
     script = "import sys, agents, baselines, birthsim_env; print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_no_module_gives_a_name_twice():
+    """A later constant or function of the same name would take the place of the first without a word."""
+    root, twice = pathlib.Path(__file__).parents[2], []
+    for package in ("birthsim_env", "baselines", "agents", "birthsim_live"):
+        for path in (root / package).rglob("*.py"):
+            named: set[str] = set()
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                targets = node.targets if isinstance(node, ast.Assign) else [node] if hasattr(node, "name") else []
+                targets += [node.target] if isinstance(node, ast.AnnAssign) else []
+                names = [
+                    part.id if isinstance(part, ast.Name) else part.name
+                    for target in targets
+                    for part in (target.elts if isinstance(target, ast.Tuple) else [target])
+                    if isinstance(part, ast.Name) or hasattr(part, "name")
+                ]
+                twice += [f"{path.relative_to(root)}: {name}" for name in names if name in named]
+                named.update(names)
+    assert twice == []
