@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -141,18 +142,16 @@ def measured(jobs: tuple[Job, ...], trees: tuple[Path, ...], budget: float) -> d
     return {key: float(np.median(spent)) for key, spent in times.items()}
 
 
-def first_steps() -> list[tuple[str, float]]:
-    """CPU s of a new process to its first step: nothing compiled yet, each further kind of loop, and all once more.
+def first_steps() -> Iterator[tuple[str, float]]:
+    """CPU s from the start of a new process to the end of its first step: valve mode and every law, compiled and cached.
 
-    Every value belongs to a process of its own, and all share a folder for machine code that is empty at the beginning.
+    All processes share a folder for machine code, which is empty at the beginning: each compiles what those before it have not.
     """
-    laws = from_agents("residual.settings").LAWS
-    kinds = [("valve mode", {"environment": CIRCLE})]
-    kinds += [(f"law {law!r} inside, lab sensors", {"environment": RESIDUAL, "law": law, "sensors": "lab"}) for law in laws]
-    rows = []
+    kinds: dict[str, dict[str, Any]] = {"valve mode": {"environment": CIRCLE}}
+    for law in from_agents("residual.settings").LAWS:
+        kinds[f"{law} inside, lab sensors"] = {"environment": RESIDUAL, "law": law, "sensors": "lab"}
     with tempfile.TemporaryDirectory() as folder:
-        for round_name in ("compiled", "cached"):
-            for name, arguments in kinds:
+        for state in ("compiled", "cached"):
+            for name, arguments in kinds.items():
                 with Process(HERE, Path(folder)) as process:
-                    rows.append((f"first step, {name}, {round_name}", process.measure("first_step", **arguments)))
-    return rows
+                    yield f"{name}, {state}", process.measure("first_step", **arguments)

@@ -181,9 +181,11 @@ def _bench(arguments: argparse.Namespace) -> None:
     budget = arguments.seconds
     if not budget > 0:
         raise ValueError(f"--seconds {budget!r}; allowed: a positive number")
+    if arguments.beside:
+        speed.Process(arguments.beside).close()  # says at once what is wrong with it
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     if arguments.compile:
-        print(f"{machine}; CPU time of a new process to the end of its first step\n")
+        print(f"{machine}; CPU time of new processes to the end of their first steps, one after another\n")
         results = [_shown((name, seconds, "s")) for name, seconds in speed.first_steps()]
     else:
         rows = _rows(budget)
