@@ -29,7 +29,7 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
     assert 0.2 < single["times_as_fast"] < 5.0
     assert ratio["value"] == pytest.approx(one["value"] / two["value"])
     assert "beside" not in one
-    assert "times as fast" in printed
+    assert f"{tmp_path.name:>14} times as fast" in printed
 
 
 def test_a_folder_without_the_project_is_named_at_once(tmp_path, monkeypatch, capsys):

@@ -125,6 +125,16 @@ class Process:
         self.close()
 
 
+def version_of(tree: Path) -> str:
+    """The commit of a checkout, with "-dirty" behind it where files have changed since; the folder's name without git."""
+    line = ["git", "-C", str(tree), "describe", "--always", "--dirty", "--exclude", "*"]
+    try:
+        found = subprocess.run(line, capture_output=True, text=True, check=False).stdout.strip()
+    except OSError:
+        found = ""
+    return found or tree.resolve().name
+
+
 def measured(jobs: tuple[Job, ...], trees: tuple[Path, ...], budget: float) -> dict[tuple[Path, str], float]:
     """Median s per checkout and name of a job over ``ROUNDS`` rounds, which take about ``budget`` s together.
 

@@ -210,7 +210,8 @@ def _environments(beside: Path | None, budget: float) -> list[dict[str, Any]]:
     trees = (speed.HERE, *((beside,) if beside else ()))
     seconds = speed.measured((*speed.SHARED, *speed.LANES, *speed.THREADS), trees, budget)
     if beside:
-        print(f"{'':56}{'this checkout':>14}{beside.resolve().name:>14}{'times as fast':>14}")
+        versions = "".join(f"{speed.version_of(tree):>14}" for tree in trees)
+        print(f"{'':56}{versions}{'times as fast':>14}")
     results = []
     for job in speed.SHARED:
         ours = seconds[speed.HERE, job.name]
