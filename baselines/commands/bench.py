@@ -6,8 +6,8 @@ import argparse
 import os
 import platform
 import re
+import tempfile
 import time
-from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
+from baselines.bench import speed
 from baselines.bench.comparison import default_controllers
+from baselines.bench.stopwatch import seconds_per_call
+from baselines.bench.twin import Twin, has_compiler
 from baselines.commands.shared import run
 from baselines.files import make_folder, write_json
 from baselines.registry import make_controller
@@ -30,25 +33,23 @@ PERIODS = 50
 """Control periods from which a controller's signals are taken: twelve samples of the laboratory's tracker."""
 STEPS_PER_PERIOD = round(POLICY_PERIOD / dynamics.INTEGRATION_STEP)
 
+Row = tuple[str, float, str]
+"""A row of the table: what, how much (NaN where it cannot be had), and its unit or why it cannot be had."""
+
 
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="birthsim-bench", description="Measure the speed of plant, environments and law.")
     parser.add_argument("--seconds", type=float, default=1.0, help="time per measurement (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="folder for bench.json")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--beside", type=Path, metavar="TREE", help="a checkout of another commit to measure in turns with this one"
+    )
+    instead.add_argument(
+        "--compile", action="store_true", help="measure instead how long first steps take, compiled and cached"
+    )
     run(parser, _bench)
-
-
-def seconds_per_call(call: Callable[[], Any], budget: float) -> float:
-    """Median time of one call over about ``budget`` seconds, after one call that may compile."""
-    call()
-    spent: list[float] = []
-    until = time.perf_counter() + budget
-    while time.perf_counter() < until or len(spent) < 3:
-        started = time.perf_counter()
-        call()
-        spent.append(time.perf_counter() - started)
-    return float(np.median(spent))
 
 
 def packed_share() -> tuple[int, int]:
@@ -71,6 +72,29 @@ def _kernel(lanes: int, budget: float) -> float:
         plant.advance_unchecked(command, forces, POLICY_PERIOD)
 
     return lanes / seconds_per_call(policy_step, budget)
+
+
+def _against_c(lanes: int, budget: float) -> tuple[float, float]:
+    """Policy steps/s of the kernel and of its twin in C, by CPU time and in turns; NaN for the twin without a compiler."""
+    plant = birthsim_env.Plant(num_envs=lanes)
+    command = np.random.default_rng(0).uniform(-0.05, 0.05, (4, lanes))
+    forces, start = np.zeros((1, 2, lanes)), plant.state.copy()
+    advances: list[Any] = [dynamics.advance]
+    if has_compiler():
+        with tempfile.TemporaryDirectory() as folder:
+            advances.append(Twin(Path(folder)).advance)
+    spent: list[list[float]] = [[] for _ in advances]
+    until = time.process_time() + budget
+    while time.process_time() < until or len(spent[0]) < 4:
+        for advance, times in zip(advances, spent, strict=True):
+            plant.state[:] = start
+            started = time.process_time()
+            advance(
+                plant.state, command, forces, plant.lane_parameters, STEPS_PER_PERIOD, dynamics.INTEGRATION_STEP, plant.impacts
+            )
+            times.append(time.process_time() - started)
+    speeds = [lanes / float(np.median(times[1:])) for times in spent]
+    return speeds[0], speeds[1] if has_compiler() else float("nan")
 
 
 def _single(budget: float) -> float:
@@ -154,14 +178,62 @@ def _frames(environment: str, budget: float) -> float:
 
 
 def _bench(arguments: argparse.Namespace) -> None:
-    if not arguments.seconds > 0:
-        raise ValueError(f"--seconds {arguments.seconds!r}; allowed: a positive number")
     budget = arguments.seconds
+    if not budget > 0:
+        raise ValueError(f"--seconds {budget!r}; allowed: a positive number")
+    if arguments.beside:
+        speed.Process(arguments.beside).close()  # says at once what is wrong with it
+    machine = f"{platform.machine()}, Python {platform.python_version()}"
+    if arguments.compile:
+        print(f"{machine}; CPU time of new processes to the end of their first steps, one after another\n")
+        results = [_shown((name, seconds, "s")) for name, seconds in speed.first_steps()]
+    else:
+        rows = _rows(budget)
+        print(f"{machine}, one thread; medians over {budget:g} s each\n")
+        results = [_shown(row) for row in rows]
+        print(f"\nenvironments, CPU time, {speed.ROUNDS} processes\n")
+        results += _environments(arguments.beside, budget)
+    if arguments.out is not None:
+        write_json(make_folder(arguments.out) / "bench.json", results)
+
+
+def _shown(row: Row, **more: float) -> dict[str, Any]:
+    """Prints a row, the values ``more`` behind its own, and returns it as JSON takes it."""
+    name, value, unit = row
+    numbers = "".join(f"{n:>14,.0f}" if n >= 1000 else f"{n:>14,.4g}" for n in (value, *more.values()))
+    print(f"{name:56}{numbers}  {unit}", flush=True)
+    return {"what": name.strip(), "value": value, "unit": unit, **more}
+
+
+def _environments(beside: Path | None, budget: float) -> list[dict[str, Any]]:
+    """Rows of the environments, each with that of another checkout and how many times as fast this one is, if one is given."""
+    trees = (speed.HERE, *((beside,) if beside else ()))
+    seconds = speed.measured((*speed.SHARED, *speed.LANES, *speed.THREADS), trees, budget)
+    if beside:
+        versions = "".join(f"{speed.version_of(tree):>14}" for tree in trees)
+        print(f"{'':56}{versions}{'times as fast':>14}")
+    results = []
+    for job in speed.SHARED:
+        ours = seconds[speed.HERE, job.name]
+        value, unit = job.in_unit(ours)
+        more = {}
+        if beside:
+            theirs = seconds[beside, job.name]
+            more = {"beside": job.in_unit(theirs)[0], "times_as_fast": theirs / ours}
+        results.append(_shown((job.name, value, unit), **more))
+    alone = [(job.name, *job.in_unit(seconds[speed.HERE, job.name])) for job in (*speed.LANES, *speed.THREADS)]
+    one, two = (seconds[speed.HERE, job.name] for job in speed.THREADS)
+    return [*results, *map(_shown, [*alone, ("  ratio: two threads to one", one / two, "times")])]
+
+
+def _rows(budget: float) -> list[Row]:
+    """Rows of plant, environments, laws and frames, measured in this process."""
     kernel, lane = _kernel(1024, budget), _kernel(1, budget)
     packed, scalar = packed_share()
+    numba_speed, c_speed = _against_c(256, budget)
     single, reference = _single(budget), _scipy(budget)
     ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
-    rows: list[tuple[str, float, str]] = [
+    return [
         ("plant, 1024 lanes, one core", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
         ("  per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
         ("plant, 1 lane", lane, "policy steps/s"),
@@ -171,6 +243,13 @@ def _bench(arguments: argparse.Namespace) -> None:
             packed,
             f"instructions, beside {scalar} scalar ones for remainders",
         ),
+        ("plant, 256 lanes, CPU time", numba_speed, "policy steps/s"),
+        (
+            "  the same equations in C by hand, gcc -O3 -ffast-math",
+            c_speed,
+            "policy steps/s" if has_compiler() else "no C compiler",
+        ),
+        ("  ratio: kernel to C", numba_speed / c_speed, "times"),
         ("gym.make step, valve mode", single, "policy steps/s"),
         ("  the same plant through solve_ivp (RK45, rtol 1e-6)", reference, "policy steps/s"),
         ("  ratio", single / reference, "times"),
@@ -186,11 +265,6 @@ def _bench(arguments: argparse.Namespace) -> None:
         ("  Gymnasium's CartPole-v1, 600 x 400", theirs, "frames/s"),
         ("  ratio", ours / theirs, "times"),
     ]
-    print(f"{platform.machine()}, Python {platform.python_version()}, one thread; medians over {budget:g} s each\n")
-    for name, value, unit in rows:
-        print(f"{name:56}{value:>14,.4g}  {unit}" if value < 1000 else f"{name:56}{value:>14,.0f}  {unit}")
-    if arguments.out is not None:
-        write_json(make_folder(arguments.out) / "bench.json", [{"what": n.strip(), "value": v, "unit": u} for n, v, u in rows])
 
 
 if __name__ == "__main__":
