@@ -26,7 +26,7 @@ LEVEL = 0.1
 YIELDING = 0.9
 """What a sustained half wave of the size ``LEVEL`` leaves of the authority; one k times as large, its power k; assumed."""
 
-_LOG2_YIELDING = exact.log2(YIELDING)
+_LOG2_YIELDING = exact.number("log2", YIELDING)
 
 LEAST = 0.2
 """Fraction of the authority that is always left; assumed: the law alone oscillates less."""

@@ -50,7 +50,7 @@ and more oscillated (4 of 245 circles had errors of 5 to 16 mm); with 4000 the s
 STIFFENING = 4.0
 """Most that the stiffness is multiplied by."""
 
-_STIFFENING_DOUBLINGS = exact.log2(STIFFENING)
+_STIFFENING_DOUBLINGS = exact.number("log2", STIFFENING)
 
 SOFTEST = 500.0
 """N/m: swings make the law no softer than that, unless less is asked for; the default rig has gains from 110 on."""
@@ -58,7 +58,7 @@ SOFTEST = 500.0
 MOST_DAMPING = 2.0
 """Most that the damping is multiplied by."""
 
-_DAMPING_DOUBLINGS = exact.log2(MOST_DAMPING)
+_DAMPING_DOUBLINGS = exact.number("log2", MOST_DAMPING)
 
 FORCE_UNIT = 100.0
 """N that map to 1 in an observation."""
@@ -215,7 +215,7 @@ class ResidualLaw(StagedController):
         constants = {
             **{"sampled": sampled, "rows": rows, "period": board.control_period, "noise": board.position_noise},
             **{"size": settings.size, "authority": settings.authority, "time_constant": settings.time_constant},
-            **{"quickness": 1.0 - exact.exp(-board.control_period / settings.time_constant)},
+            **{"quickness": 1.0 - exact.number("exp", -board.control_period / settings.time_constant)},
             **{"level": authority.LEVEL, "unit": FORCE_UNIT, "has_law": self._law is not None},
             **{"stiffens": settings.impedance != "fixed", "damps": settings.impedance == "variable"},
         }

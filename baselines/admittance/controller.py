@@ -103,11 +103,11 @@ class AdmittanceBackstepping(StagedController):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         g, rig = self._gains["lab" if sampled else "ideal"], self.parameters
         period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else at.MEASURED_ROWS
-        cells = exact.exp(-(g["pressure_bandwidth"] if sampled else math.inf) * period)
+        cells = exact.number("exp", -(g["pressure_bandwidth"] if sampled else math.inf) * period)
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{"quickness": 1.0 - exact.exp(-period / g["lead_time"]), "least_share": LEAST_SHARE, **g},
+            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_share": LEAST_SHARE, **g},
         }
         fresh = np.zeros(at.PISTONS + rows)
         fresh[[at.ADMITTANCE + 4, at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0

@@ -70,7 +70,7 @@ class ChamberObserver:
     """
 
     def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
-        self._p, self._period, self._share = lane_parameters, period, 1.0 - exact.exp(-bandwidth * period)
+        self._p, self._period, self._share = lane_parameters, period, 1.0 - exact.number("exp", -bandwidth * period)
         self.spools: Array = np.empty((4, 0))
         self.openings: Array = np.empty((4, 0))
 

@@ -148,3 +148,13 @@ def tanh(x: float) -> float:
     # exp(2 |x|) - 1 without the loss of a difference.
     grown = power * _less_one(2.0 * size, doublings) + (power - 1.0)
     return math.copysign(grown / (grown + 2.0), x) if x == x else x
+
+
+@kernel
+def _number(which: int, x: float) -> float:
+    return sine(x) if which == 0 else cosine(x) if which == 1 else exp(x) if which == 2 else log2(x)
+
+
+def number(name: str, x: float) -> float:
+    """``sine``, ``cosine``, ``exp`` or ``log2`` of a number, from Python: a helper called there is compiled anew."""
+    return float(_number(("sine", "cosine", "exp", "log2").index(name), float(x)))

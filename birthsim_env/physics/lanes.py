@@ -126,7 +126,7 @@ def _rows(parameters: Parameters) -> tuple[Any, ...]:
     fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction
     conductance = v.sonic_conductance
     return (
-        *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.sine(g.gamma3), exact.cosine(g.gamma3)),
+        *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.number("sine", g.gamma3), exact.number("cosine", g.gamma3)),
         *(g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
         *(m.mass, m.gravity, m.stop_stiffness, m.stop_damping),
         *(float(f.law == "lugre"), fc1, fc2, f.static_ratio * fc1, f.static_ratio * fc2),

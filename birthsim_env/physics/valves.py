@@ -18,9 +18,8 @@ LINEAR_RATIO = 0.99
 slope at equal pressures would be infinite."""
 
 
-@helper
 def laminar_slope(critical: float) -> float:
-    """-dpsi/dx above ``LINEAR_RATIO``."""
+    """-dpsi/dx above ``LINEAR_RATIO``; ``critical`` may be an array."""
     edge = (LINEAR_RATIO - critical) / (1.0 - critical)
     slope: float = np.sqrt(1.0 - edge * edge) / (1.0 - LINEAR_RATIO)
     return slope
