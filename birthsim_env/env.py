@@ -172,15 +172,15 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""
         episodes = self._episodes
-        rewards, terms, failed = episodes.step(checked_actions([action], 1, episodes.action_size))
+        paid, failed = episodes.step(checked_actions([action], 1, episodes.action_size))
         terminated = bool(failed[0])
         truncated = not terminated and bool(episodes.elapsed[0] >= self._steps)
         info: dict[str, Any] = single_info(episodes.describe())
-        for name, values in terms.items():
-            info[name] = float(values[0])
+        *terms, reward = paid[:, 0].tolist()
+        info.update(zip(REWARD_TERMS, terms, strict=True))
         info["is_success"] = bool(episodes.success[0])
         self._render_human()
-        return episodes.observation()[0], float(rewards[0]), terminated, truncated, info
+        return episodes.observation()[0], reward, terminated, truncated, info
 
     def render(self) -> Any:
         """A frame (height, width, 3), uint8, in mode ``rgb_array``."""

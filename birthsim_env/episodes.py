@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env import reward
 from birthsim_env.assembly import Setup
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.loop.signals import Mask
@@ -73,15 +72,13 @@ class Episodes:
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
         self._path = None
 
-    def step(self, actions: Array) -> tuple[Array, dict[str, Array], NDArray[np.bool_]]:
-        """One policy step; returns rewards (N,), their terms and which lanes have left the physical range."""
+    def step(self, actions: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """One policy step; returns terms of the reward and the reward, (6, N), and which lanes have left the physical range."""
         if not self._seeds:
             raise RuntimeError("step() before reset(): call reset(seed=...) first")
         self.simulation.step(actions)
         self.elapsed += 1
-        terms = self._outcome.terms.copy()
-        failed = self._outcome.ends[0] > 0.0
-        return terms.sum(axis=0), dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
+        return self._outcome.terms.copy(), self._outcome.ends[0] > 0.0
 
     @property
     def success(self) -> NDArray[np.bool_]:

@@ -51,13 +51,16 @@ def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane
     force, since, asked = w[FORCE : FORCE + 2, :n], w[SINCE_JUMP, :n], s[REFERENCE : REFERENCE + REFERENCES, :n]
     action, last = s[ACTION : ACTION + size, :n], m[LAST : LAST + size]
     failed, succeeded = table2(tables, 1)[0, mine], table2(tables, 1)[1, mine]
+    terms = table2(tables, 0)[:, mine]
     if about[0] > 0.0:
         for i in range(n):
             jumped[i] = 1.0 if since[i] < about[2] else 0.0
         reward.assess(
             state, motion, asked, force, jumped, m[MOVED:TALLY], action, last, hits, about[3], about[1],
-            table2(tables, 0)[:, mine], failed,
+            terms, failed,
         )  # fmt: skip
+        for i in range(n):
+            terms[5, i] = terms[0, i] + terms[1, i] + terms[2, i] + terms[3, i] + terms[4, i]
         success.add(motion, asked, force, since, failed, m[TALLY:FRESH], succeeded)
         for k in range(size):
             for i in range(n):
@@ -81,7 +84,7 @@ def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane
 class Outcome:
     """Of N lanes after a policy step, or where their episodes begin.
 
-    ``terms`` (5, N): reward, in the order of ``reward.REWARD_TERMS``; ``ends`` (2, N): 1 in lanes that have left the physical
+    ``terms`` (6, N): the reward's, in the order of ``reward.REWARD_TERMS``, and the reward; ``ends`` (2, N): 1 in lanes that have left the physical
     range, and in those whose episode is successful so far; ``rows`` (info.ROWS, N): the fields of ``info``; ``seen``
     (N, size): observations.
     """
@@ -89,7 +92,7 @@ class Outcome:
     def __init__(
         self, lanes: int, nominal: Array, actions: int, shown: int, policy_period: float, period: float, impact_speed: float
     ) -> None:
-        self.terms, self.ends = np.zeros((len(reward.REWARD_TERMS), lanes)), np.zeros((2, lanes))
+        self.terms, self.ends = np.zeros((len(reward.REWARD_TERMS) + 1, lanes)), np.zeros((2, lanes))
         self.rows: Array = np.zeros((info.ROWS, lanes))
         self.seen: NDArray[np.float32] = np.zeros((lanes, observation.SIZE + actions + shown), dtype=np.float32)
         self._memory: Array = np.zeros((LAST + actions, lanes))

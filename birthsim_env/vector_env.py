@@ -119,13 +119,13 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             raise ValueError(
                 f"lanes {np.flatnonzero(self._ended).tolist()} have ended; allowed: reset(options={{'reset_mask': ...}})"
             )
-        rewards, terms, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
+        paid, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
         if self._ended.any():
             # They have begun when they ended, so that nothing that is lost is integrated further; their first step is undone.
             episodes.begin(self._ended, again=True)
-            for values in (rewards, *terms.values()):
-                values[self._ended] = 0.0
+            paid[:, self._ended] = 0.0
             terminated = terminated & ~self._ended
+        rewards, terms = paid[-1], dict(zip(REWARD_TERMS, paid, strict=False))
         truncated = (episodes.elapsed >= self.steps) & ~terminated
         observation = episodes.observation()
         infos: dict[str, Any] = {**vector_info(episodes.describe()), **terms, "is_success": episodes.success}
