@@ -94,7 +94,7 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(bare):
 
 @pytest.mark.parametrize("ci", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_without_a_browser_the_last_line_says_so_and_in_ci_it_fails(ci, tmp_path):
-    (tmp_path / "hidden.py").write_text("from tests import browser\nbrowser.find_chromium = lambda: None\n")
+    (tmp_path / "hidden.py").write_text("from tests.live import browser\nbrowser.find_chromium = lambda: None\n")
     line = [sys.executable, "-m", "pytest", "-n1", "-p", "hidden", "-p", "no:cacheprovider", "-k", "slow_motion"]
     given = {name: value for name, value in os.environ.items() if name != "CI" and not name.startswith("PYTEST_")}
     given |= {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])} | ({"CI": "true"} if ci else {})
