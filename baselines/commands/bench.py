@@ -136,7 +136,7 @@ def _scipy(budget: float) -> float:
 
 
 def _vector(environment: str, lanes: int, budget: float) -> float:
-    env = gymnasium.make_vec(environment, num_envs=lanes)
+    env = gymnasium.make_vec(environment, num_envs=lanes, num_threads=1)
     env.reset(seed=0)
     actions = np.zeros(env.action_space.shape or (), dtype=np.float32)
     return lanes / seconds_per_call(lambda: env.step(actions), budget)
