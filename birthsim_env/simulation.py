@@ -98,12 +98,13 @@ class Simulation:
         self._sample = 0
         self._ranges, self._begun = ranges, False
         self._sampled, self._opens = self.sensors.sampled, actuation
+        self._made: tuple[Any, ...] = ()
         self._loop: MixedLoop | None = None
         self._look: MixedLoop | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the loops, which know addresses."""
-        return {**self.__dict__, "_loop": None, "_look": None}
+        return {**self.__dict__, "_loop": None, "_look": None, "_made": ()}
 
     @property
     def time(self) -> Array:
@@ -229,9 +230,15 @@ class Simulation:
             self._compiled(self.user_force, "force", self._push),
         ]
         senses = self._compiled(self.sensors, "measure", self._measure)
+        # A part may have made room anew, or be another one.
+        arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
+        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, *looks, senses)))
+        if self._loop is not None and made == self._made:
+            return
         counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
         self._loop = MixedLoop(lanes, *places, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
         self._look = MixedLoop(lanes, *places, [*looks, begins, senses], self.beginning)
+        self._made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
         """The plant by itself, and the actuation by itself: to be timed, on a copy."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -135,6 +135,7 @@ def table4(tables: int, k: int) -> Array:
     return carray(pointer(about[k * TABLE], np.float64), shape)
 
 
+@cache
 def address_of(stage: Any) -> int:
     """Where the machine code of a kernel with the signature of a stage begins; compiled when it is first asked for."""
     if SIGNATURE.args not in stage.overloads:
@@ -147,8 +148,10 @@ def address_of(stage: Any) -> int:
 class Stage:
     """A compiled stage with what is its own.
 
-    ``memory`` (M, N) is carried from period to period; ``constants`` (C,) are the same for all lanes; ``tables``, C-contiguous
-    with lanes as their last axis, are too large to be carried along. ``sees_world`` is False for whatever controls the rig.
+    ``memory`` (M, N) is carried from period to period; ``constants`` (C,) are the same for all lanes; ``tables``, with lanes as
+    their last axis, are too large to be carried along. ``sees_world`` is False for whatever controls the rig. Raises
+    ``ValueError`` for arrays that are not C-contiguous, constants other than float64 and tables of more than four dimensions:
+    a stage is handed no more than their address.
     """
 
     function: Callable[..., int]
@@ -156,3 +159,17 @@ class Stage:
     memory: Array | None = None
     tables: tuple[NDArray[Any], ...] = ()
     sees_world: bool = True
+
+    def __post_init__(self) -> None:
+        for name, array in (("constants", self.constants), *((f"tables[{k}]", table) for k, table in enumerate(self.tables))):
+            if not array.flags.c_contiguous or array.ndim >= TABLE or (name == "constants" and array.dtype != np.float64):
+                raise ValueError(
+                    f"{name} of a stage is {array.dtype} {array.shape}, strides {array.strides}; allowed: C-contiguous, "
+                    f"at most {TABLE - 1} dimensions, constants float64"
+                )
+
+    def key(self) -> tuple[Any, ...]:
+        """Equal for stages that run the same code on the same arrays."""
+        arrays = (*self.tables, *(() if self.memory is None else (self.memory,)))
+        places = tuple((array.__array_interface__["data"][0], array.shape) for array in arrays)
+        return self.function, self.constants.tobytes(), places

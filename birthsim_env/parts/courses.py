@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,9 @@ from birthsim_env.physics.plant import checked
 
 CHECKS = 64
 """Instants of a new episode at which its reference is checked."""
+
+TOGETHER = 16384
+"""Instants times lanes that are sampled in one call: few enough to stay in a processor's cache."""
 
 
 def checked_start(
@@ -38,19 +42,30 @@ def checked_start(
     """
     motion = _sampler("reference", trajectory, 8, lanes, num_envs)
     setpoints = _sampler("stiffness", stiffness, 7, lanes, num_envs)
-    start = np.concatenate([motion(0.0), setpoints(0.0)])
-    instants = np.linspace(0.0, duration, CHECKS)
-    if not all(_is_plain(motion(instant), setpoints(instant), nominal) for instant in instants):
+    instants, together = np.linspace(0.0, duration, CHECKS), max(1, TOGETHER // len(lanes))
+    start = np.concatenate([motion(instants[:1]), setpoints(instants[:1])])
+    groups = (instants[k : k + together] for k in range(0, CHECKS, together))
+    if not all(_is_plain(motion(group), setpoints(group), nominal) for group in groups):
         _explain(trajectory, stiffness, lanes, num_envs, instants, rig)
     return start
 
 
-def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[float], Array]:
-    """What gives the rows (size, L) of a part at an instant, s; where the part can do that, of these lanes alone."""
-    if is_vectorised(part.sample):
-        few = part.some(lanes)
-        return lambda instant: few.sample(np.full(len(lanes), instant))
-    return lambda instant: _of_all(name, part, size, num_envs, instant).take(lanes, axis=1)
+def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:
+    """What gives the rows (size, K L) of a part at K instants, s; where the part can do that, of these lanes alone."""
+    if not is_vectorised(part.sample):
+        return lambda instants: np.concatenate(
+            [_of_all(name, part, size, num_envs, instant).take(lanes, axis=1) for instant in instants], axis=1
+        )
+
+    @cache
+    def repeated(times: int) -> Any:
+        return part.some(np.tile(lanes, times))
+
+    def sample(instants: Array) -> Array:
+        rows: Array = repeated(len(instants)).sample(np.repeat(instants, len(lanes)))
+        return rows
+
+    return sample
 
 
 def _of_all(name: str, part: Any, size: int, num_envs: int, instant: float) -> Array:

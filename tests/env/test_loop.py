@@ -13,10 +13,11 @@ import pytest
 import agents  # noqa: F401  registers the residual environments
 from birthsim_env import StiffnessSchedule, Trajectory, UserForce
 from birthsim_env.loop.loop import Loop, available_threads
+from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.references import Circle
 from birthsim_env.parts.sensors import SENSORS, IdealSensors
-from birthsim_env.parts.user_forces import AlternatingSteps
+from birthsim_env.parts.user_forces import AlternatingSteps, ForceProfile
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 
@@ -96,7 +97,7 @@ def test_a_stop_for_a_users_python_changes_no_bit(own, monkeypatch):
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
 def test_threads_change_no_bit(name, sensors):
     runs = [
-        course(gymnasium.make_vec(name, num_envs=100, num_threads=threads, sensors=sensors, randomize=True), 12)
+        course(gymnasium.make_vec(name, num_envs=130, num_threads=threads, sensors=sensors, randomize=True), 12)
         for threads in (1, 2, 3, 50)
     ]
     for other in runs[1:]:
@@ -123,7 +124,7 @@ def _child(connection, env):
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system does not fork")
 def test_a_fork_has_threads_of_its_own():
-    env = gymnasium.make_vec(CIRCLE, num_envs=70, num_threads=3)
+    env = gymnasium.make_vec(CIRCLE, num_envs=90, num_threads=3)
     expected = course(env, 5)
     here, there = multiprocessing.get_context("fork").Pipe()
     process = multiprocessing.get_context("fork").Process(target=_child, args=(there, env))
@@ -172,3 +173,39 @@ def test_a_users_part_says_what_it_lacks():
     for part, name in ((Trajectory(), "reference"), (UserForce(), "user_force")):
         with pytest.raises(NotImplementedError, match="is missing"):
             gymnasium.make(CIRCLE, **{name: part}).reset(seed=0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "name"),
+    [
+        ({"tables": (np.zeros((4, 3)).T,)}, r"tables\[0\]"),
+        ({"tables": (np.zeros(3), np.zeros((1,) * 5))}, r"tables\[1\]"),
+        ({"constants": np.zeros(4)[::2]}, "constants"),
+        ({"constants": np.zeros(4, dtype=np.float32)}, "constants"),
+    ],
+)
+def test_a_stage_refuses_arrays_that_their_address_does_not_tell(changed, name):
+    with pytest.raises(ValueError, match=f"{name} of a stage is .* allowed: C-contiguous"):
+        Stage(lambda *_: 0, **changed)
+
+
+def test_a_loop_is_built_anew_only_where_a_part_has_other_arrays():
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, user_force=ForceProfile([(0.0, 1.0, 0.0)])).unwrapped
+    env.reset(seed=0)
+    before = env.simulation._loop
+    env.reset(seed=1)
+    assert env.simulation._loop is before
+    # More knots need more room, and what reads them must find it.
+    env.simulation.user_force._fixed = [(0.1 * k, 2.0, 0.0) for k in range(9)]
+    env.reset(seed=1)
+    assert env.simulation._loop is not before
+    np.testing.assert_array_equal(env.simulation.force[0], 2.0)
+
+
+def test_little_work_is_not_shared_out(monkeypatch):
+    used = []
+    monkeypatch.setattr("birthsim_env.loop.loop._pool", lambda process, threads: used.append(threads))
+    env = gymnasium.make_vec(CIRCLE, num_envs=100, num_threads=4, policy_period=0.001)
+    env.reset(seed=0)
+    env.step(np.zeros((100, 4), np.float32))
+    assert used == [], "100 lanes times one period are done sooner than a thread is set to work"

@@ -268,7 +268,7 @@ def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
     kernel = courses._is_plain
     monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].shape[1]) or kernel(*given))
     env.reset(options={"reset_mask": np.arange(50) < 2})
-    assert sizes == [2] * courses.CHECKS
+    assert sum(sizes) == 2 * courses.CHECKS
 
 
 @pytest.mark.parametrize("part", ["reference", "stiffness"])

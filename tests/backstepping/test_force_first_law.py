@@ -12,7 +12,7 @@ from baselines import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from birthsim_env.physics.parameters import Parameters
-from tests.controllers.test_backstepping import as_signals, random_situations
+from tests.backstepping.test_backstepping import as_signals, random_situations
 from tests.oracles import derived_law as derived
 
 assert birthsim_env  # importing it registers the ids

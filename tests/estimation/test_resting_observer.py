@@ -15,7 +15,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.lanes import PRESSURES, Array, parameter_array
 from birthsim_env.physics.parameters import Parameters
-from tests.controllers.test_observers import PERIOD, lane_of, observer, rms
+from tests.estimation.test_observers import PERIOD, lane_of, observer, rms
 
 STUCK = np.array([[0.02], [-0.05]])
 """m: where friction holds both pistons."""

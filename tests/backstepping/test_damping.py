@@ -20,7 +20,7 @@ from baselines.backstepping.gains import (
 from baselines.bench.probes import POSES
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from tests.controllers.test_gains import rigs
+from tests.backstepping.test_gains import rigs
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS
 

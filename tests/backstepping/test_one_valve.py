@@ -14,7 +14,7 @@ from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Cylinder, Parameters
-from tests.controllers.test_backstepping import as_signals, random_situations
+from tests.backstepping.test_backstepping import as_signals, random_situations
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles.closed_loop import FRICTIONLESS

@@ -13,7 +13,7 @@ from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.geometry import joint_force
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from tests.controllers.test_backstepping import many, of_lanes
+from tests.backstepping.test_backstepping import many, of_lanes
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 

@@ -1,0 +1,1 @@
+"""Tests of what laws work out from sensors."""
