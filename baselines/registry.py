@@ -53,7 +53,7 @@ def controller_names() -> list[str]:
 
 
 def split_options(name: str) -> tuple[str, dict[str, Any]]:
-    """``"pid[bandwidth=60,friction_share=0]"`` -> the name and its options; numbers and true or false are what they say.
+    """``"pid[bandwidth=60,friction_fraction=0]"`` -> the name and its options; numbers and true or false are what they say.
 
     Raises ``ValueError`` for options that are no such list.
     """

@@ -1,6 +1,6 @@
 """What a policy is paid, from the true state: to stay on the compliant target, calmly and with little effort.
 
-Every 10 ms pay one, less the share that its costs have of the largest ones. So no step pays less than nothing, and an episode
+Every 10 ms pay one, less its costs as a fraction of the largest ones. So no step pays less than nothing, and an episode
 that ends early, after which nothing is paid, is never worth more than one that goes on, whatever the discount.
 
 Nothing can follow a jump of the hand. What a jump moves the compliant target by is therefore asked for little by little, and

@@ -37,7 +37,7 @@ def _scores() -> dict[str, Any]:
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
     """What is known of an environment: role (``ROLES``) -> its ``controller``, mean ``return`` of an episode, undiscounted,
-    ``error`` (mm, median over episodes of the settled error; None where most are lost), shares ``lost`` and ``success``.
+    ``error`` (mm, median over episodes of the settled error; None where most are lost), fractions ``lost`` and ``success``.
 
     Of the id with its default arguments apart from ``sensors`` and ``randomize`` (rig and scenario together, or neither); an
     environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no scores.

@@ -1,7 +1,7 @@
 """Mutation tester of the small numerical modules: a changed operator or number in them should make some test fail.
 
-``python -m tests.mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the share of killed
-mutants of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant.
+``python -m tests.mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the fraction of
+mutants killed of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant.
 
 Kernels run uncompiled here, so that a mutant needs no compilation: a forked child replaces the code of one function, runs the
 tests of its module until one fails, and ends. The tests that are quick enough uncompiled are found by running each once.
@@ -259,7 +259,7 @@ def interpreted(function: Callable | None = None, **_options: object) -> Callabl
 
 
 def print_results(module: str, results: dict, before: dict) -> None:
-    """The share of killed mutants, the survivors, and what differs from the mutants ``before``."""
+    """The fraction of killed mutants, the survivors, and what differs from the mutants ``before``."""
     mutants = results["mutants"]
     alive = [name for name, mutant in mutants.items() if mutant["killed_by"] is None]
     tests = f"{len(results['tests'])} tests, {len(results['left_out'])} left out, {results['seconds']:.0f} s"

@@ -11,7 +11,7 @@ import gymnasium
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
-from agents.training.shares import told
+from agents.training.time_split import told
 from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
 from baselines.files import make_folder, write_json
 from baselines.side_by_side import side_by_side
@@ -126,7 +126,7 @@ def _report(
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
     print(f"{seconds} s per seed with validation; of the rest")
     for seed, result in zip(seeds, results, strict=True):
-        print(f"seed {seed}: {told(result['curve'][-1]['split'], result['curve'][-1]['environment_share'])}")
+        print(f"seed {seed}: {told(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")
 
 
 if __name__ == "__main__":

@@ -116,7 +116,12 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
 
     for metric in SHOWN:
         rows(metric, "IQM", interquartile_mean)
-    for name, statistic in (("pooled RMS", pooled), ("median", _share(0.5)), ("95 %", _share(0.95)), ("max", _share(1.0))):
+    for name, statistic in (
+        ("pooled RMS", pooled),
+        ("median", _fraction(0.5)),
+        ("95 %", _fraction(0.95)),
+        ("max", _fraction(1.0)),
+    ):
         rows("settled_rms", name, statistic)
     base = sizes(law, "settled_rms")
     matrix = np.stack([sizes(one, "settled_rms") for one in residuals])
@@ -144,5 +149,5 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     return "\n".join(lines)
 
 
-def _share(share: float) -> Callable[[Array], float]:
-    return lambda values: quantile(values, share)
+def _fraction(fraction: float) -> Callable[[Array], float]:
+    return lambda values: quantile(values, fraction)

@@ -137,6 +137,6 @@ def rendered(controllers: Sequence[tuple[str, Controller]], seed: int = 0) -> li
             figures |= {f"hunting_{axis}_mm": 1e3 * answers.hunting[k] for k, axis in enumerate("xy")}
             row = {"setpoint": setpoint, "controller": name, "lost": int(answers.lost.sum()), "cases": len(cases)}
             for label, values in figures.items():
-                row |= {f"{label}_{key}": quantile(values, share) for key, share in (("median", 0.5), ("q95", 0.95))}
+                row |= {f"{label}_{key}": quantile(values, fraction) for key, fraction in (("median", 0.5), ("q95", 0.95))}
             rows.append(row)
     return rows

@@ -1,7 +1,7 @@
 """The authority of a residual yields where the pistons oscillate, and the stiffness of the law where they swing.
 
 A policy has learned from many rigs; on one that is lighter, or has slower valves, than it takes it for, its correction may
-excite what it should calm. As in ``admittance-backstepping``, sustained half waves of the speed error lower the share of the
+excite what it should calm. As in ``admittance-backstepping``, sustained half waves of the speed error lower the fraction of the
 authority that is left, for the rest of the episode; here large ones do more than small ones. One that follows a jump of the
 hand is large after none, and costs nothing.
 

@@ -56,7 +56,7 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
 
     ## Observation space
-    That of `BirthSIMEnv`, and after the last action the smoothed action, the shares of the authority that are left (they fall
+    That of `BirthSIMEnv`, and after the last action the smoothed action, the fractions of the authority left (they fall
     where pistons oscillate), and the forces that an observer finds unexplained on pistons 1 and 2, in units of 100 N: now,
     when they last moved out, and when they last moved in. `observation_names` lists all.
 

@@ -88,7 +88,7 @@ def action_names(settings: ResidualSettings) -> tuple[str, ...]:
 def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
     """What each row of ``ResidualLaw.memory`` says."""
     smooth = (f"smoothed action: {name}" for name in action_names(settings))
-    return (*smooth, *(f"share of the authority on cylinder {i}, 1" for i in (1, 2)), *MET)
+    return (*smooth, *(f"fraction of the authority on cylinder {i}, 1" for i in (1, 2)), *MET)
 
 
 def observation_names(settings: ResidualSettings) -> tuple[str, ...]:

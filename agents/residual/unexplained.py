@@ -27,7 +27,7 @@ ROWS = 6
 @kernel
 def remember(joints: Array, disturbance: Array, p: Array, period: float, seen: Array, met: Array) -> None:
     """``seen`` (4, N) is 1 where cylinder 1, 2 has moved out, in; ``met`` (ROWS, N)."""
-    share = 1.0 - exact.exp(-period / AVERAGE)
+    fraction = 1.0 - exact.exp(-period / AVERAGE)
     for i in range(joints.shape[1]):
         kappa = geometry.pose(
             joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
@@ -40,7 +40,7 @@ def remember(joints: Array, disturbance: Array, p: Array, period: float, seen: A
                 row = 2 * way + cylinder
                 moves = speed > MOVING if way == 0 else speed < -MOVING
                 if moves:
-                    met[2 + row, i] += (share if seen[row, i] > 0.0 else 1.0) * (force - met[2 + row, i])
+                    met[2 + row, i] += (fraction if seen[row, i] > 0.0 else 1.0) * (force - met[2 + row, i])
                     seen[row, i] = 1.0
                 elif seen[row, i] == 0.0:
                     met[2 + row, i] = force

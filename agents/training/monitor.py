@@ -16,7 +16,7 @@ from agents.training.algorithms import network_of
 from agents.training.checkpoint import save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
-from agents.training.shares import split
+from agents.training.time_split import split
 from agents.training.validation import Score, validate
 from birthsim_env.physics.parameters import Parameters
 
@@ -29,7 +29,7 @@ class Monitor(BaseCallback):
 
     ``env`` has the validation worlds, ``stepped`` is what the training steps; ``past`` is what an earlier monitor of the same
     training had written to its checkpoint. ``paper`` has the same worlds under the paper's law, where the training shall end
-    once it is far enough below that law's error. A curve's ``environment_share`` is that of the training's time, without
+    once it is far enough below that law's error. A curve's ``environment_fraction`` is that of the training's time, without
     validation, and its ``split`` says where that went: on plant, law and what stands around them.
     """
 
@@ -91,11 +91,11 @@ class Monitor(BaseCallback):
         figures, law = score.to_dict(), self._past["law"]
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started
-        share = self._stepped.seconds / max(time.perf_counter() - self._started - self._validating, 1e-9)
+        fraction = self._stepped.seconds / max(time.perf_counter() - self._started - self._validating, 1e-9)
         stepped = self._stepped
         parts = split(stepped.env.simulation, stepped.seconds / stepped.steps) if stepped.steps else {}
         self._past["curve"].append(
-            {"steps": self.num_timesteps, "seconds": seconds, "environment_share": share, "split": parts, **figures}
+            {"steps": self.num_timesteps, "seconds": seconds, "environment_fraction": fraction, "split": parts, **figures}
         )  # fmt: skip
         for name in LOGGED:
             if np.isfinite(figures[name]):

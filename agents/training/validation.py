@@ -32,7 +32,7 @@ Lanes = NDArray[np.float64]
 @dataclass(frozen=True)
 class Score:
     """Per lane (N,): settled RMS of sqrt(ex^2 + ey^2), mm; error of the rendered stiffness, %: mean settled error along the
-    push over the displacement asked for; hunting, mm; time with a valve at its limit, %; and the share of the rig's strength
+    push over the displacement asked for; hunting, mm; time with a valve at its limit, %; and the fraction of the rig's strength
     that the world asks for. NaN where an episode says nothing."""
 
     error: Lanes
@@ -61,8 +61,8 @@ class Score:
     def to_dict(self) -> dict[str, float]:
         """The figures of a learning curve; medians where nothing else is said, NaN without a feasible lane."""
 
-        def over_lanes(values: Lanes, share: float = 0.5) -> float:
-            return quantile(values[self.feasible], share)
+        def over_lanes(values: Lanes, fraction: float = 0.5) -> float:
+            return quantile(values[self.feasible], fraction)
 
         return {
             "pooled_mm": self.pooled,

@@ -42,11 +42,11 @@ class AdmittanceBackstepping(StagedController):
             gain, c in 1/s while the reference moves, and rest_gain once it rests; rest_push, how many times as much the
             position error of a resting piston weighs; bandwidth, 1/s, of the observer of disturbances;
             pressure_bandwidth, 1/s, of that of the pressures, where their cells are noisy (``lab`` sensors);
-            friction_share, how much of the believed friction is fed forward along the reference; dead_zone, m, of a resting
+            friction_fraction, how much of the believed friction is fed forward along the reference; dead_zone, m, of a resting
             piston's error; lead_time, s, in which a spool follows; oscillation, m/s, of the speed error above which sustained
             half waves each lower the gain to yielding times itself.
 
-    ``gain_share`` (2, N) says how much of the gain is left across and along cylinder 2. Raises ``ValueError`` for unknown gains
+    ``gain_fraction`` (2, N) is the gain that is left across and along cylinder 2. Raises ``ValueError`` for unknown gains
     and values out of range.
     """
 
@@ -56,7 +56,7 @@ class AdmittanceBackstepping(StagedController):
         "rest_push": (1.0, 8.0),
         "bandwidth": (30.0, 120.0),
         "pressure_bandwidth": (30.0, 1000.0),
-        "friction_share": (0.0, 1.0),
+        "friction_fraction": (0.0, 1.0),
         "dead_zone": (0.0, 5e-5),
         "lead_time": (5e-4, 5e-3),
         "oscillation": (0.02, 0.2),
@@ -68,7 +68,7 @@ class AdmittanceBackstepping(StagedController):
             "rest_gain": 90.0,
             "rest_push": 1.0,
             "bandwidth": 108.0,
-            "friction_share": 1.0,
+            "friction_fraction": 1.0,
             "dead_zone": 0.0,
             "lead_time": 0.0011,
             "oscillation": 0.1,
@@ -80,7 +80,7 @@ class AdmittanceBackstepping(StagedController):
             "rest_push": 2.0,
             "bandwidth": 110.0,
             "pressure_bandwidth": 30.0,
-            "friction_share": 0.943,
+            "friction_fraction": 0.943,
             "dead_zone": 6.2e-6,
             "lead_time": 0.0005,
             "oscillation": 0.092,
@@ -96,7 +96,7 @@ class AdmittanceBackstepping(StagedController):
         self._gains: dict[str, dict[str, float]] = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
 
     @property
-    def gain_share(self) -> Array:
+    def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
         return self._memories[0][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
 
@@ -107,7 +107,7 @@ class AdmittanceBackstepping(StagedController):
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_share": LEAST_SHARE, **g},
+            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_SHARE, **g},
         }
         fresh = np.zeros(at.PISTONS + rows)
         fresh[[at.ADMITTANCE + 4, at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0

@@ -25,11 +25,11 @@ from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
 
 MEMORY_NAMES = (
-    *("gain_share_t", "extreme_t", "since_t", "last_peak_t"),
-    *("gain_share_n", "extreme_n", "since_n", "last_peak_n"),
-    "motion_share",
+    *("gain_fraction_t", "extreme_t", "since_t", "last_peak_t"),
+    *("gain_fraction_n", "extreme_n", "since_n", "last_peak_n"),
+    "motion_fraction",
 )
-"""Rows of what a lane remembers: across and along cylinder 2 the share of c that oscillations have left, the largest speed
+"""Rows of what a lane remembers: across and along cylinder 2 the fraction of c that oscillations have left, the largest speed
 error of this half wave (m/s), the time (s) since it began and the size of the last one; how far the reference was moving of
 late."""
 MEMORY = len(MEMORY_NAMES)
@@ -38,7 +38,7 @@ GAIN_SHARES = [WATCH_T, WATCH_N]
 
 GAIN_NAMES = (
     *("pneumatic_gain", "gain", "rest_gain", "rest_push", "dead_zone"),
-    *("quickness", "oscillation", "yielding", "least_share"),
+    *("quickness", "oscillation", "yielding", "least_fraction"),
 )
 """What ``command`` takes: c4, 1/s; c, 1/s, while the reference moves and while it rests; weight of a resting piston's position
 error; its dead zone, m; fraction of the way that a spool is taken in a period; speed error, m/s, beyond which sustained half
@@ -55,7 +55,7 @@ HALF_WAVE = 0.2
 """s: a longer half wave of the speed error is no oscillation of the loop."""
 
 SUSTAINED = 0.75
-"""A half wave of at least this share of the one before is sustained; a transient dies faster."""
+"""A half wave of at least this fraction of the one before is sustained; a transient dies faster."""
 
 
 @helper
@@ -79,18 +79,18 @@ def sustained(memory: Array, row: int, i: int, error: float, period: float, leve
 
 @helper
 def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> float:
-    """The gain share, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``."""
-    share: float = memory[row, i]
+    """Gain fraction, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``."""
+    fraction: float = memory[row, i]
     if sustained(memory, row + 1, i, error, period, level, 0.0) > 0.0:
-        memory[row, i] = share = max(least, fall * share)
-    return share
+        memory[row, i] = fraction = max(least, fall * fraction)
+    return fraction
 
 
 @helper
 def lead(wanted: float, spool: float, kept: float, quickness: float) -> float:
-    """Opening command that takes a spool of known lag a share ``quickness`` of the way to ``wanted`` in one period.
+    """Opening command that takes a spool of known lag a fraction ``quickness`` of the way to ``wanted`` in one period.
 
-    ``kept`` is exp(-period/tau), the share of the way that the spool leaves by itself.
+    ``kept`` is exp(-period/tau), the fraction of the way that the spool leaves by itself.
     """
     return max(-1.0, min(1.0, spool + quickness * (wanted - spool) / (1.0 - kept)))
 
@@ -143,15 +143,15 @@ def command(
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(motion[4, i], motion[5, i], sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(motion[4, i], motion[5, i], sine, cosine)
 
-        share_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
-        share_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
+        fraction_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
+        fraction_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
         memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * exact.exp(-period / MOTION_TIME))
         c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
         en = (1.0 + (rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
-        jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, share_t * c)
-        jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, share_n * c)
+        jerk_t = across(motion[6, i], motion[7, i], sine, cosine) - jerk_for(at_, dt, et, fraction_t * c)
+        jerk_n = along(motion[6, i], motion[7, i], sine, cosine) - jerk_for(an_, dn, en, fraction_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
         rate1 += p[at.FV1] * mechanics.acceleration1(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity

@@ -34,7 +34,7 @@ MEASURED_ROWS = 5
 """Rows of that observer where speeds are measured; the last is 1 at a new start."""
 
 CONSTANTS = (
-    *("sampled", "rows", "period", "mass", "ratio", "friction_share", "trust", "bandwidth", "noise"),
+    *("sampled", "rows", "period", "mass", "ratio", "friction_fraction", "trust", "bandwidth", "noise"),
     *admittance_law.GAIN_NAMES,
 )
 """Constants of the stage: 1 with sampled positions; rows of the observer of the pistons; control period, s; mass, kg, and

@@ -297,8 +297,8 @@ def inspect(
     """What goes on inside ``command``, for analysis: ``wanted`` (8, N), ``gains`` and their rates (6, N), ``intent`` (6, N)."""
     n = joints.shape[1]
     asked, moved, ahead, behind = np.empty((3, n)), joints.copy(), np.empty((GAINS, n)), np.empty((GAINS, n))
-    for share, there in ((1.0, ahead), (-1.0, behind)):
-        moved[0:2] = joints[0:2] + share * STEP * joints[2:4]
+    for fraction, there in ((1.0, ahead), (-1.0, behind)):
+        moved[0:2] = joints[0:2] + fraction * STEP * joints[2:4]
         choose_gains(moved, reference, p, options[DAMPING_RATIO], believed[4], asked, there, n)
     gain_rates[:] = (ahead - behind) / (2.0 * STEP)
     piston_reference(reference, p, wanted, n)

@@ -18,7 +18,7 @@ from birthsim_env.physics.plant import checked
 
 
 @kernel
-def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, neglected: Array) -> None:
+def _rates(x: Array, u: Array, p: Array, neglected_fraction: float, rates: Array, neglected: Array) -> None:
     gas_t, index = p[at.GAS] * p[at.TEMPERATURE], p[at.INDEX]
     for i in range(x.shape[1]):
         y2, v2, f2, k2, y1, v1, f1, k1 = x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
@@ -32,7 +32,7 @@ def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, n
         neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY])
         lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
         rates[0, i] = v2
-        rates[1, i] = net2 / p[at.MASS] + neglected_share * neglected[i]
+        rates[1, i] = net2 / p[at.MASS] + neglected_fraction * neglected[i]
         rates[2, i] = control_model.force_rate(u[0, i], k2, v2, lp2 + ln2, index, gas_t)
         rates[3, i] = control_model.stiffness_rate(f2, k2, v2, u[0, i], u[1, i], lp2, ln2, index, gas_t)
         rates[4, i] = v1
@@ -41,11 +41,11 @@ def _rates(x: Array, u: Array, p: Array, neglected_share: float, rates: Array, n
         rates[7, i] = control_model.stiffness_rate(f1, k1, v1, u[2, i], u[3, i], lp1, ln1, index, gas_t)
 
 
-def _evaluate(state: ArrayLike, flows: ArrayLike, parameters: Parameters, share: float) -> tuple[Array, Array]:
+def _evaluate(state: ArrayLike, flows: ArrayLike, parameters: Parameters, fraction: float) -> tuple[Array, Array]:
     lanes = np.shape(state)[1] if np.ndim(state) == 2 else 1
     x, u = checked("state", state, (8, lanes), "SI"), checked("flows", flows, (4, lanes), "kg/s")
     rates, neglected = np.empty((8, lanes)), np.empty(lanes)
-    _rates(x, u, parameter_column(parameters), share, rates, neglected)
+    _rates(x, u, parameter_column(parameters), fraction, rates, neglected)
     return rates, neglected
 
 

@@ -33,7 +33,7 @@ DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
 class Evaluation:
     """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
 
-    ``required_strength_ratio`` is the share of the rig's strength that each episode asks for, whatever controls it. ``returns``
+    ``required_strength_ratio`` is the fraction of the rig's strength that each episode asks for. ``returns``
     are the sums of rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
     """
 

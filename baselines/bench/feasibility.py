@@ -25,7 +25,7 @@ MOVING = 1e-3
 
 
 def required_strength_ratio(env: Any) -> Array:
-    """The largest share (N,) of what the cylinders can bear that the present episodes of a vector environment ask for.
+    """The largest fraction (N,) of what the cylinders can bear that the present episodes of a vector environment ask for.
 
     1 and more is beyond the rig. Forces of the hand are those at the places asked for; a compliant target that the rig cannot
     reach counts as infinite.

@@ -64,7 +64,7 @@ MASS = Axis("mass at the end effector (kg)", 1.5, 6.0, 10)
 LAG = Axis("time constant of the valves (ms)", 1.0, 12.0, 12)
 HAND = Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 16, logarithmic=True)
 ASKED = Axis("closed-loop stiffness asked for (N/m)", 1000.0, 4000.0, 7)
-FRICTION = Axis("dry friction, share of the believed one", 0.0, 1.5, 13)
+FRICTION = Axis("dry friction, fraction of the believed one", 0.0, 1.5, 13)
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ def _mass_cases(rig: Parameters, hand: Array, mass: Array) -> Cases:
 
 def _friction_cases(rig: Parameters, hand: Array, scale: Array) -> Cases:
     changed = []
-    for share in scale:
-        levels = share * rig.cylinder1.coulomb_friction, share * rig.cylinder2.coulomb_friction
+    for fraction in scale:
+        levels = fraction * rig.cylinder1.coulomb_friction, fraction * rig.cylinder2.coulomb_friction
         changed.append(rig.replace({f"cylinder{i}.coulomb_friction": level for i, level in enumerate(levels, 1)}))
     return Cases(changed, hand, np.full(len(hand), SETPOINT))
 
@@ -127,7 +127,7 @@ VARIANTS: dict[str, dict[str, dict[str, float]]] = {
     "admittance-backstepping": {
         "as it is": {},
         "gains that never yield": {"yielding": 1.0},
-        "half the friction fed forward": {"friction_share": 0.5},
+        "half the friction fed forward": {"friction_fraction": 0.5},
     }
 }
 """Controller -> label -> options, for a figure that compares them; other controllers are as they are."""

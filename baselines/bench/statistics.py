@@ -37,12 +37,12 @@ def penalize_lost(values: ArrayLike, lost: ArrayLike, applies: bool | None = Non
     return np.where(np.asarray(lost, dtype=np.bool_), penalty, given) if applies else given
 
 
-def quantile(values: ArrayLike, share: float) -> float:
+def quantile(values: ArrayLike, fraction: float) -> float:
     """Quantile by linear interpolation; infinite where it leans on an infinite value, NaN without values. NaNs are ignored."""
     said = np.sort(_said(values))
     if said.size == 0:
         return float("nan")
-    place = share * (said.size - 1)
+    place = fraction * (said.size - 1)
     low, high = said[int(np.floor(place))], said[int(np.ceil(place))]
     return float(high) if low == high or not np.isfinite(high) else float(low + (place - np.floor(place)) * (high - low))
 
@@ -80,7 +80,7 @@ def median_interval(values: ArrayLike) -> tuple[float, float]:
 
 
 def interquartile_mean(values: ArrayLike) -> float:
-    """Mean of the middle half of the values, those at its edges by their share (Agarwal et al. 2021); NaNs are ignored.
+    """Mean of the middle half of the values, those at its edges by their fraction (Agarwal et al. 2021); NaNs are ignored.
 
     Infinite where a lost episode falls into the middle half, NaN without values.
     """

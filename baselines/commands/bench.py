@@ -52,7 +52,7 @@ def main() -> None:
     run(parser, _bench)
 
 
-def packed_share() -> tuple[int, int]:
+def packed_fraction() -> tuple[int, int]:
     """Divisions and square roots of doubles in the integrator's machine code: (packed, scalar) instructions; x86 only."""
     # Machine code from the cache cannot be inspected, so the integrator is compiled once more.
     advance: Any = dynamics.advance
@@ -229,7 +229,7 @@ def _environments(beside: Path | None, budget: float) -> list[dict[str, Any]]:
 def _rows(budget: float) -> list[Row]:
     """Rows of plant, environments, laws and frames, measured in this process."""
     kernel, lane = _kernel(1024, budget), _kernel(1, budget)
-    packed, scalar = packed_share()
+    packed, scalar = packed_fraction()
     numba_speed, c_speed = _against_c(256, budget)
     single, reference = _single(budget), _scipy(budget)
     ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)

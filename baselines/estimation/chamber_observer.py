@@ -38,7 +38,7 @@ def predicted_pressure(
 
 @kernel
 def observe(
-    spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, share: float,
+    spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, fraction: float,
     fresh: Array,
 ) -> None:  # fmt: skip
     """Carries ``spools`` (4, N) and ``pressures`` (4, N) on by one period, in which ``openings`` (4, N) were commanded."""
@@ -57,7 +57,9 @@ def observe(
                 sign * joints[2 + cylinder, i], period, p,
             )  # fmt: skip
             new = fresh[i] > 0.0
-            pressures[chamber, i] = measured[chamber, i] if new else share * measured[chamber, i] + (1.0 - share) * expected
+            pressures[chamber, i] = (
+                measured[chamber, i] if new else fraction * measured[chamber, i] + (1.0 - fraction) * expected
+            )
             spools[chamber, i] = 0.0 if new else openings[chamber, i] + kept * away
 
 
@@ -70,7 +72,7 @@ class ChamberObserver:
     """
 
     def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
-        self._p, self._period, self._share = lane_parameters, period, 1.0 - exact.number("exp", -bandwidth * period)
+        self._p, self._period, self._fraction = lane_parameters, period, 1.0 - exact.number("exp", -bandwidth * period)
         self.spools: Array = np.empty((4, 0))
         self.openings: Array = np.empty((4, 0))
 
@@ -91,7 +93,7 @@ class ChamberObserver:
             self.spools, self.openings = np.zeros((4, lanes)), np.zeros((4, lanes))
             self._pressures, self._fresh = np.zeros((4, lanes)), np.ones(lanes)
         observe(
-            self.spools, self._pressures, self.openings, measured, joints, self._p, self._period, self._share, self._fresh
+            self.spools, self._pressures, self.openings, measured, joints, self._p, self._period, self._fraction, self._fresh
         )  # fmt: skip
         self._fresh[:] = 0.0
         return self._pressures

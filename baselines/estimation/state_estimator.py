@@ -78,7 +78,7 @@ class StateEstimator:
     """The ``Estimate`` of N lanes, one control period at a time, for one kind of sensors.
 
     Arguments: the rig as believed; ``sampled``, whether positions are samples; ``gains`` with bandwidth, 1/s, of the observer
-    of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_share, how much of the
+    of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_fraction, how much of the
     believed friction is fed forward along the motion.
     """
 
@@ -86,7 +86,7 @@ class StateEstimator:
         self._p = p = parameter_column(parameters)
         period = parameters.electronics.control_period
         self._admittance = Admittance(parameters)
-        self._friction, self._friction_share = ReferenceFriction(period, p), gains["friction_share"]
+        self._friction, self._friction_fraction = ReferenceFriction(period, p), gains["friction_fraction"]
         self._chambers = ChamberObserver(period, p, gains["pressure_bandwidth"] if sampled else math.inf)
         self._pistons = (
             PistonObserver(parameters, p, gains["bandwidth"]) if sampled else DisturbanceObserver(period, p, gains["bandwidth"])
@@ -110,7 +110,7 @@ class StateEstimator:
         pressures = self._chambers.update(measurement.pressures, self._joints)
         measurement = replace(measurement, pressures=pressures)
         force = np.ascontiguousarray(measurement.user_force)
-        believed = -self._friction_share * self._friction.update(motion)
+        believed = -self._friction_fraction * self._friction.update(motion)
         moving = is_moving(motion)
         pistons = self._pistons
         if isinstance(pistons, PistonObserver):
@@ -128,7 +128,7 @@ class StateEstimator:
         ``now``, the last situation: friction follows the motion, what was observed besides stays."""
         ahead = self._admittance.forecast(reference, now.force, ticks)
         friction = self._friction.forecast(ahead, ticks)
-        return ahead, now.disturbance_force - now.believed - self._friction_share * friction
+        return ahead, now.disturbance_force - now.believed - self._friction_fraction * friction
 
     def commanded(self, openings: Array) -> None:
         """What the valves are told until the next ``update``: openings (4, N)."""

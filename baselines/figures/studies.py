@@ -171,9 +171,9 @@ def polar_figure(study: Study, folder: Path) -> list[Path]:
     return save(figure, folder, "stiffness_by_direction")
 
 
-def _percent(share: float) -> str:
+def _percent(fraction: float) -> str:
     """Three digits; less than a hundredth of a percent cannot be seen."""
-    return f"{100 * share:.3g} %" if share >= 1e-4 else "< 0.01 %"
+    return f"{100 * fraction:.3g} %" if fraction >= 1e-4 else "< 0.01 %"
 
 
 def _range(rendered: Array) -> str:

@@ -1,7 +1,7 @@
 """What the rivals know of the motion that they follow: where the pistons should be and the forces that this takes.
 
 In the plane the point mass needs P = m (A + g) - Fu for the acceleration A of the motion; along the cylinders, with the
-Jacobian (16) at the reference pose, F* = J^T P + Fext + Fv vd + share Fc sign(vd). The user's force cancels against the
+Jacobian (16) at the reference pose, F* = J^T P + Fext + Fv vd + fraction Fc sign(vd). The user's force cancels against the
 part of A that the admittance owes to it, so that dF*/dt needs no rate of that force.
 """
 
@@ -36,7 +36,7 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 
 @helper
-def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, share: float, needed: Array, n: int) -> None:
+def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, fraction: float, needed: Array, n: int) -> None:
     """Writes ``needed`` (NEEDED, n) for the motion (8, n), its pistons ``wanted`` (8, n) and the user's force (2, n)."""
     for i in range(n):
         v1, v2 = wanted[2, i], wanted[3, i]
@@ -51,8 +51,8 @@ def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, share: f
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         along_rate = sine * jx - cosine * jy - turn * across
         across_rate = -cosine * jx - sine * jy + turn * along
-        drag1, drag1_rate = friction_ahead(v1, wanted[4, i], share * p[at.FC1], p[at.FV1])
-        drag2, drag2_rate = friction_ahead(v2, wanted[5, i], share * p[at.FC2], p[at.FV2])
+        drag1, drag1_rate = friction_ahead(v1, wanted[4, i], fraction * p[at.FC1], p[at.FV1])
+        drag2, drag2_rate = friction_ahead(v2, wanted[5, i], fraction * p[at.FC2], p[at.FV2])
         needed[FORCE1, i] = kappa * across + p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1]) + drag1
         needed[FORCE2, i] = along + p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2]) + drag2
         needed[RATE1, i] = kappa * (across_rate + growth * across) + drag1_rate
@@ -62,7 +62,15 @@ def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, share: f
 
 @kernel
 def prepare(
-    seen: Array, sampled: bool, motion: Array, force: Array, p: Array, share: float, joints: Array, wanted: Array, needed: Array
+    seen: Array,
+    sampled: bool,
+    motion: Array,
+    force: Array,
+    p: Array,
+    fraction: float,
+    joints: Array,
+    wanted: Array,
+    needed: Array,
 ) -> None:
     """Writes the pistons' ``joints`` (4, N): y1, y2, v1, v2, their reference ``wanted`` (8, N), and ``needed`` (NEEDED, N).
 
@@ -80,7 +88,7 @@ def prepare(
         else:
             piston_motion(x, p, y, n)
         piston_reference(r, p, w, n)
-        needed_forces(w, r, f, p, share, d, n)
+        needed_forces(w, r, f, p, fraction, d, n)
         store(y, first, n, joints)
         store(w, first, n, wanted)
         store(d, first, n, needed)

@@ -119,7 +119,7 @@ class LinearQuadratic(TrackingController):
 
     Arguments are those of ``TrackingController``, with the gains integral_tolerance (m s), position_tolerance (m),
     speed_tolerance (m/s) and force_tolerance (N): what counts as much as a force that changes by ``RATE_TOLERANCE``;
-    friction_share; dead_zone.
+    friction_fraction; dead_zone.
     """
 
     KERNEL = staticmethod(command)
@@ -128,7 +128,7 @@ class LinearQuadratic(TrackingController):
         "position_tolerance": (3e-4, 1e-1),
         "speed_tolerance": (1e-2, 3.0),
         "force_tolerance": (1.0, 100.0),
-        "friction_share": (0.0, 1.0),
+        "friction_fraction": (0.0, 1.0),
         "dead_zone": (0.0, 5e-4),
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
@@ -137,7 +137,7 @@ class LinearQuadratic(TrackingController):
             "position_tolerance": 0.001036,
             "speed_tolerance": 0.3138,
             "force_tolerance": 5.517,
-            "friction_share": 0.865,
+            "friction_fraction": 0.865,
             "dead_zone": 0.0,
         },
         "lab": {
@@ -145,7 +145,7 @@ class LinearQuadratic(TrackingController):
             "position_tolerance": 0.0003,
             "speed_tolerance": 0.2182,
             "force_tolerance": 1.6,
-            "friction_share": 0.9396,
+            "friction_fraction": 0.9396,
             "dead_zone": 0.0001245,
         },
     }

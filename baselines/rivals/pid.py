@@ -91,7 +91,7 @@ class PositionPID(TrackingController):
     """Position PID with a pressure loop inside (this module), following the compliant motion.
 
     Arguments are those of ``TrackingController``, with the gains bandwidth: w, 1/s, of the position loop; damping: zeta,
-    of the speed error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_share; dead_zone.
+    of the speed error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_fraction; dead_zone.
     """
 
     KERNEL = staticmethod(command)
@@ -100,7 +100,7 @@ class PositionPID(TrackingController):
         "damping": (0.1, 2.0),
         "integral_rate": (0.5, 30.0),
         "pressure_gain": (40.0, 400.0),
-        "friction_share": (0.0, 1.0),
+        "friction_fraction": (0.0, 1.0),
         "dead_zone": (0.0, 5e-4),
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
@@ -109,7 +109,7 @@ class PositionPID(TrackingController):
             "damping": 0.4617,
             "integral_rate": 30.0,
             "pressure_gain": 395.6,
-            "friction_share": 0.8704,
+            "friction_fraction": 0.8704,
             "dead_zone": 0.0,
         },
         "lab": {
@@ -117,7 +117,7 @@ class PositionPID(TrackingController):
             "damping": 0.5684,
             "integral_rate": 9.951,
             "pressure_gain": 340.8,
-            "friction_share": 0.8328,
+            "friction_fraction": 0.8328,
             "dead_zone": 7.737e-06,
         },
     }

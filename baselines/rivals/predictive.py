@@ -81,7 +81,7 @@ class NonlinearMPC:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
             speed_tolerance, m/s, stiffness_tolerance, N/m, and flow_tolerance, kg/s, what counts as much as a position error
-            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_share of ``StateEstimator``.
+            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_fraction of ``StateEstimator``.
 
     Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
     """
@@ -95,7 +95,7 @@ class NonlinearMPC:
         "flow_tolerance": (2e-4, 5e-3),
         "bandwidth": (30.0, 120.0),
         "pressure_bandwidth": (30.0, 300.0),
-        "friction_share": (0.5, 1.0),
+        "friction_fraction": (0.5, 1.0),
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
@@ -103,7 +103,7 @@ class NonlinearMPC:
             "stiffness_tolerance": 598.6,
             "flow_tolerance": 0.00262,
             "bandwidth": 58.08,
-            "friction_share": 0.9648,
+            "friction_fraction": 0.9648,
         },
         "lab": {
             "speed_tolerance": 0.002222,
@@ -111,7 +111,7 @@ class NonlinearMPC:
             "flow_tolerance": 0.00262,
             "bandwidth": 58.08,
             "pressure_bandwidth": 208.0,
-            "friction_share": 0.9648,
+            "friction_fraction": 0.9648,
         },
     }
 
@@ -173,5 +173,5 @@ class NonlinearMPC:
     def _advance_plan(self) -> None:
         """The plan as the next period will see it: each step's flow moves towards that of the next."""
         plan = self._plan.reshape(len(self._plan), -1, FLOWS)
-        share = (self._period / self._steps[:-1])[:, None]
-        plan[:, :-1] += share * (plan[:, 1:] - plan[:, :-1])
+        fraction = (self._period / self._steps[:-1])[:, None]
+        plan[:, :-1] += fraction * (plan[:, 1:] - plan[:, :-1])

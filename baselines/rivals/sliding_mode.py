@@ -62,7 +62,7 @@ class SlidingMode(TrackingController):
 
     Arguments are those of ``TrackingController``, with the gains surface_rate: r, 1/s, at which errors decay on the surface;
     reaching_rate: h, m/s3, at which the boundary layer is approached; layer_rate: b, 1/s, at which s decays inside, so that
-    the layer is h/b thick; friction_share; dead_zone.
+    the layer is h/b thick; friction_fraction; dead_zone.
     """
 
     KERNEL = staticmethod(command)
@@ -70,7 +70,7 @@ class SlidingMode(TrackingController):
         "surface_rate": (10.0, 100.0),
         "reaching_rate": (100.0, 10000.0),
         "layer_rate": (10.0, 200.0),
-        "friction_share": (0.0, 1.0),
+        "friction_fraction": (0.0, 1.0),
         "dead_zone": (0.0, 5e-4),
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
@@ -78,14 +78,14 @@ class SlidingMode(TrackingController):
             "surface_rate": 72.36,
             "reaching_rate": 2607.0,
             "layer_rate": 14.79,
-            "friction_share": 0.2856,
+            "friction_fraction": 0.2856,
             "dead_zone": 1.763e-05,
         },
         "lab": {
             "surface_rate": 28.38,
             "reaching_rate": 955.9,
             "layer_rate": 46.51,
-            "friction_share": 0.7042,
+            "friction_fraction": 0.7042,
             "dead_zone": 0.0002013,
         },
     }

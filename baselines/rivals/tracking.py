@@ -43,7 +43,7 @@ class TrackingController(ABC):
         gains: those of ``TUNABLE``, SI units; what is not given is the value tuned for the sensors that the controller meets.
 
     ``TUNABLE`` is what ``birthsim-tune`` reads: gain -> (lowest, highest) to try; ``TUNED`` holds what it found, for exact and
-    for sampled positions. All have ``friction_share``, how much of the believed Coulomb friction is fed forward with the sign
+    for sampled positions. All have ``friction_fraction``, how much believed Coulomb friction is fed forward with the sign
     of the reference speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The
     integrals start from the forces that the chambers hold (bumpless start). From sampled positions an observer estimates
     the speeds.
@@ -63,7 +63,7 @@ class TrackingController(ABC):
         self._p = parameter_column(self.parameters)
         self._period = self.parameters.electronics.control_period
         chosen = {kind: {name: float({**tuned, **gains}[name]) for name in self.TUNABLE} for kind, tuned in self.TUNED.items()}
-        self._shares = {kind: values["friction_share"] for kind, values in chosen.items()}
+        self._fractions = {kind: values["friction_fraction"] for kind, values in chosen.items()}
         self._designs = {kind: self._design(values) for kind, values in chosen.items()}
         self._admittance = Admittance(self.parameters)
         self._observer = PistonObserver(self.parameters, self._p)
@@ -102,7 +102,7 @@ class TrackingController(ABC):
             seen = np.concatenate([measurement.position, measurement.velocity])
         joints, wanted, needed = np.empty((4, lanes)), np.empty((8, lanes)), np.empty((NEEDED, lanes))
         kind = "lab" if measurement.sampled else "ideal"
-        prepare(seen, measurement.sampled, motion, force, self._p, self._shares[kind], joints, wanted, needed)
+        prepare(seen, measurement.sampled, motion, force, self._p, self._fractions[kind], joints, wanted, needed)
         openings = np.empty((4, lanes))
         law = (*self._designs[kind], self._integral, self._fresh, openings)
         self.KERNEL(joints, wanted, needed, measurement.pressures, reference.rows, self._p, self._period, *law)

@@ -14,7 +14,7 @@ from birthsim_env.drawing.pen import FINE, Box, Colour, Pen, number
 from birthsim_env.physics.parameters import Air
 
 
-def _share(pressure: float, air: Air) -> float:
+def _fraction(pressure: float, air: Air) -> float:
     """0 at atmospheric pressure, 1 at supply pressure."""
     low, high = air.atmospheric_pressure, air.supply_pressure
     return float(pressure - low) / (high - low)
@@ -22,7 +22,7 @@ def _share(pressure: float, air: Air) -> float:
 
 def pressure_colour(pressure: float, air: Air) -> Colour:
     """Colour of air at an absolute pressure, Pa."""
-    return d.mix(d.LOW_PRESSURE, d.HIGH_PRESSURE, _share(pressure, air))
+    return d.mix(d.LOW_PRESSURE, d.HIGH_PRESSURE, _fraction(pressure, air))
 
 
 class Panel:
@@ -92,10 +92,10 @@ class Panel:
             return
         track, row = self._track, self._row
         for i, (name, pressure) in enumerate(zip(("P1", "N1", "P2", "N2"), pressures, strict=True)):
-            top, share = track.y + i * row, _share(pressure, self._air)
+            top, fraction = track.y + i * row, _fraction(pressure, self._air)
             picture.fill(d.FAINT, (track.x, top + 2, track.width, row - 5))
-            if math.isfinite(share):
-                length = round(min(max(share, 0.0), 1.0) * track.width)
+            if math.isfinite(fraction):
+                length = round(min(max(fraction, 0.0), 1.0) * track.width)
                 picture.fill(d.CAP, (track.x, top + 2, min(length + 1, track.width), row - 5))
                 picture.fill(self.colour(pressure), (track.x, top + 3, length, row - 7))
             self._text.write(picture, name, (self.box.x + self._margin, top + row / 2), d.INK, (0, 0.5))

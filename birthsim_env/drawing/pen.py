@@ -36,15 +36,15 @@ _LARGEST_PIXEL = 30000.0
 FINE = 2
 
 
-def mix(low: Colour, high: Colour, share: float) -> Colour:
-    """Colour ``share`` (0 to 1, clipped) of the way from ``low`` to ``high``; grey where ``share`` is not a number."""
-    if math.isnan(share):
+def mix(low: Colour, high: Colour, fraction: float) -> Colour:
+    """Colour ``fraction`` (0 to 1, clipped) of the way from ``low`` to ``high``; grey where ``fraction`` is not a number."""
+    if math.isnan(fraction):
         return STEEL
-    share = min(max(share, 0.0), 1.0)
+    fraction = min(max(fraction, 0.0), 1.0)
     return (
-        round(low[0] + share * (high[0] - low[0])),
-        round(low[1] + share * (high[1] - low[1])),
-        round(low[2] + share * (high[2] - low[2])),
+        round(low[0] + fraction * (high[0] - low[0])),
+        round(low[1] + fraction * (high[1] - low[1])),
+        round(low[2] + fraction * (high[2] - low[2])),
     )
 
 

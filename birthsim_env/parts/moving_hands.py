@@ -31,12 +31,12 @@ def _waves(time: Array, own: Array, forces: Array) -> None:
     """``own`` (2, W, 3, N): of axis and wave the amplitude (N), angular frequency (rad/s) and phase (rad)."""
     for i in range(time.shape[1]):
         for k in range(time.shape[0]):
-            share = minimum_jerk(time[k, i] / FADE, 0)
+            fraction = minimum_jerk(time[k, i] / FADE, 0)
             for axis in range(2):
                 total = 0.0
                 for w in range(own.shape[1]):
                     total += own[axis, w, 0, i] * exact.sine(own[axis, w, 1, i] * time[k, i] + own[axis, w, 2, i])
-                forces[k, axis, i] = share * total
+                forces[k, axis, i] = fraction * total
 
 
 @kernel

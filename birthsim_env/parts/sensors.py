@@ -118,9 +118,9 @@ def _lab(
         for k in range(depth):
             if queue[k, 2, i] > shown[2, i] and queue[k, 2, i] + latency <= time[i] + 1e-9:
                 step = queue[k, 2, i] - shown[2, i]
-                share = step / (RATE_TIME + step)
+                fraction = step / (RATE_TIME + step)
                 for axis in range(2):
-                    velocity[axis, i] += share * ((queue[k, axis, i] - shown[axis, i]) / step - velocity[axis, i])
+                    velocity[axis, i] += fraction * ((queue[k, axis, i] - shown[axis, i]) / step - velocity[axis, i])
                     shown[axis, i] = queue[k, axis, i]
                 shown[2, i] = queue[k, 2, i]
         for chamber in range(4):

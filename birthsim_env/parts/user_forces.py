@@ -234,12 +234,12 @@ class Pulls(ForceProfile):
 
 @kernel
 def _contraction(
-    time: Array, lasts: float, size: Array, share: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
+    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
     knots: Array,
 ) -> None:  # fmt: skip
     """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
 
-    It carries 1 - ``share``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
+    It carries 1 - ``fraction``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
     a unit vector.
     """
     least = bumps.min()
@@ -251,7 +251,7 @@ def _contraction(
             pushes[more] = exact.sine(math.pi * (least + more) * middle)
         for i in range(lanes.shape[0]):
             push = pushes[bumps[i] - least]
-            force = size[i] * ((1.0 - share[i]) * contraction * contraction + share[i] * push * push)
+            force = size[i] * ((1.0 - fraction[i]) * contraction * contraction + fraction[i] * push * push)
             knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
 
 
@@ -312,7 +312,7 @@ class Contractions(ForceProfile):
         """Draw the forces of the lanes (L,) of a table of knots."""
         time, along = self._time, np.array(exact.direction(self.heading))
         for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
-            size, share = draw(self.amplitude, rng), draw(self.push, rng)
+            size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
             bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
-            drawn = (np.full(len(lanes), number) for number in (size, share, bumps))
+            drawn = (np.full(len(lanes), number) for number in (size, fraction, bumps))
             _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]

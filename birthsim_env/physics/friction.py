@@ -46,7 +46,7 @@ def inverse_level(speed: float, coulomb: float, static: float, stribeck_speed: f
 
 
 @helper
-def sliding_share(ratio: float, breakaway: float, steepness: float) -> float:
+def sliding_fraction(ratio: float, breakaway: float, steepness: float) -> float:
     """alpha, 0 to 1: 0 for q = ``ratio`` up to ``breakaway`` = z_ba/z_ss, 1 from q = 1; ``steepness`` is 1/(1 - breakaway)."""
     s = max(0.0, min(1.0, (ratio - breakaway) * steepness))
     return s * s * (3.0 - 2.0 * s)
@@ -60,9 +60,9 @@ def bristle_rate_by_law(
     scale = stiffness * (abs(speed) if lugre else 1.0) * weakness
     relaxation = scale * (1.0 if lugre else abs(speed))
     along = deflection if speed > 0.0 else -deflection
-    share = 1.0 if lugre else sliding_share(scale * along, breakaway, steepness)
+    fraction = 1.0 if lugre else sliding_fraction(scale * along, breakaway, steepness)
     limit = RELAXATION_LIMIT if lugre else ELASTO_PLASTIC_LIMIT
-    return (speed - share * (relaxation * deflection)) * (limit / max(relaxation, limit))
+    return (speed - fraction * (relaxation * deflection)) * (limit / max(relaxation, limit))
 
 
 @helper

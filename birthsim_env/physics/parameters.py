@@ -85,7 +85,11 @@ class Friction(Part):
     bristle_stiffness: float = quantity(5e4, "N/m", "assumed; s0", above=0, most=5e5)
     bristle_damping: float = quantity(150.0, "N s/m", "assumed; s1", least=0, most=2000)
     breakaway_ratio: float = quantity(
-        0.7, "-", "assumed; z_ba/z_ss, elasto-plastic law only: below this share of the level it is a spring", above=0, most=0.9
+        0.7,
+        "-",
+        "assumed; z_ba/z_ss, elasto-plastic law only: below this fraction of the level it is a spring",
+        above=0,
+        most=0.9,
     )
     sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001)
 

@@ -68,7 +68,7 @@ class Plant:
         """Integrate ``state`` over ``duration`` seconds and return it.
 
         ``opening_command`` (4, num_envs), in [-1, 1], for the valves of chambers P1, N1, P2, N2. ``user_force`` in N is
-        (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal share of the duration.
+        (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal fraction of the duration.
         Raises ``ValueError`` for wrong shapes, values that are not finite or not allowed, and a duration that is not positive.
         """
         if not (isinstance(duration, Real) and math.isfinite(duration) and duration > 0):

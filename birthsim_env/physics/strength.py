@@ -25,15 +25,15 @@ def carried(position: Array, rig: Parameters) -> Array:
 
 def require_carried(position: Array, rig: Parameters) -> None:
     """Raises ``ValueError`` for a rig that can hold its own weight at none of the positions (2, N), m."""
-    shares = carried(position, rig)
-    lane = int(shares.max(axis=0).argmin())
-    cylinder = int(shares[:, lane].argmax())
-    share = float(shares[cylinder, lane])
-    if share > 1.0:
+    fractions = carried(position, rig)
+    lane = int(fractions.max(axis=0).argmin())
+    cylinder = int(fractions[:, lane].argmax())
+    fraction = float(fractions[cylinder, lane])
+    if fraction > 1.0:
         x, y = position[:, lane]
         mass = rig.mechanics.mass
         raise ValueError(
             f"Mechanics.mass = {mass:g} kg is more than this rig can carry: at ({x:.3g}, {y:.3g}) m its weight asks for "
-            f"{100 * share:.0f} % of what cylinder {cylinder + 1} can bear; allowed: less than {mass / share:.3g} kg there, or "
-            "a larger bore or supply pressure"
+            f"{100 * fraction:.0f} % of what cylinder {cylinder + 1} can bear; allowed: less than {mass / fraction:.3g} kg "
+            "there, or a larger bore or supply pressure"
         )

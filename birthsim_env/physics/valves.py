@@ -95,14 +95,16 @@ def opening_for_active_flow(
     drain_p: float,
     fill_n: float,
     drain_n: float,
-    share_p: float,
-    share_n: float,
+    fraction_p: float,
+    fraction_n: float,
     conductance: float,
     leakage: float,
 ) -> float:
-    """Opening of ONE 5/3 valve (chamber N gets the opposite) at which share_p qp - share_n qn is ``active``, kg/s.
+    """Opening of ONE 5/3 valve (chamber N gets the opposite) at which fraction_p qp - fraction_n qn is ``active``, kg/s.
 
-    With ``share = l / (2 L)`` of each chamber the weighted difference is qA of (8).
+    With ``fraction = l / (2 L)`` of each chamber the weighted difference is qA of (8).
     """
-    wanted = active - leakage * (share_p * (fill_p - drain_p) - share_n * (fill_n - drain_n))
-    return opening_for(wanted, share_p * fill_p + share_n * drain_n, share_p * drain_p + share_n * fill_n, conductance)
+    wanted = active - leakage * (fraction_p * (fill_p - drain_p) - fraction_n * (fill_n - drain_n))
+    return opening_for(
+        wanted, fraction_p * fill_p + fraction_n * drain_n, fraction_p * drain_p + fraction_n * fill_n, conductance
+    )

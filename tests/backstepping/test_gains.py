@@ -159,22 +159,22 @@ def test_least_stiffness_is_the_minimum_over_the_gain() -> None:
         assert least == pytest.approx(found.fun, rel=1e-9)
 
 
-@pytest.mark.parametrize("share", [0.99, 0.7, 0.3, 0.05, 0.0])
-def test_a_setpoint_out_of_reach_gets_the_nearest_that_can_be_had(share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.99, 0.7, 0.3, 0.05, 0.0])
+def test_a_setpoint_out_of_reach_gets_the_nearest_that_can_be_had(fraction: float) -> None:
     """With the drag Fv/m_e of any real rig (above 7 1/s) that is the least stiffness; never a negative one."""
     for mass, viscous in rigs(200, 5):
         least = least_stiffness(mass, viscous)
-        rendered = kcl_of_equal_gains()(equal_gain(share * least, mass, viscous), mass, viscous)
+        rendered = kcl_of_equal_gains()(equal_gain(fraction * least, mass, viscous), mass, viscous)
         assert 0 < least <= rendered * (1 + 1e-12)
         if viscous / mass > 7:
             assert rendered == pytest.approx(least, rel=0.01)
 
 
-@pytest.mark.parametrize("drag_share", [0.0, 0.5, 1.0])
-def test_gains_without_static_stiffness_are_refused(drag_share: float) -> None:
+@pytest.mark.parametrize("drag_fraction", [0.0, 0.5, 1.0])
+def test_gains_without_static_stiffness_are_refused(drag_fraction: float) -> None:
     """Where c1 + c2 + c3 is at most Fv/m_e a push is not balanced at all."""
     with pytest.raises(ValueError, match=r"c1 \+ c2 \+ c3 = .* allowed: more than Fv/m_e = 20 1/s"):
-        closed_loop_stiffness(*[20 * drag_share / 3] * 3, 3.0, 60.0)
+        closed_loop_stiffness(*[20 * drag_fraction / 3] * 3, 3.0, 60.0)
     assert closed_loop_stiffness(6.7, 6.7, 6.7, 3.0, 60.0) > 0
 
 

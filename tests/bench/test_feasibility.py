@@ -57,8 +57,8 @@ def columns_at(place: Array, rig: Parameters = RIG) -> Array:
     return rigid_body.jacobians(piston, rig)[0]
 
 
-def share(needed: Array, rig: Parameters = RIG) -> float:
-    """The larger share of both cylinders for the forces ``needed`` (2,), N."""
+def fraction(needed: Array, rig: Parameters = RIG) -> float:
+    """The larger fraction of both cylinders for the forces ``needed`` (2,), N."""
     return float(max(max(n / push, -n / pull) for n, (push, pull) in zip(needed, strengths(rig), strict=True)))
 
 
@@ -68,7 +68,7 @@ def test_holding_still_takes_the_weight_along_each_cylinder(place: tuple[float, 
     masses = env.simulation.plant.lane_parameters[MASS]
     assert np.ptp(masses) > 0.5
     weight = columns_at(np.array(place)).T @ [0.0, 9.81]
-    np.testing.assert_allclose(required_strength_ratio(env), [share(mass * weight) for mass in masses], rtol=1e-9)
+    np.testing.assert_allclose(required_strength_ratio(env), [fraction(mass * weight) for mass in masses], rtol=1e-9)
 
 
 def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_its_force() -> None:
@@ -80,7 +80,7 @@ def test_what_the_hand_asks_for_is_its_work_against_the_pistons_and_grows_with_i
         expected = []
         for push in pushes.T:
             # The most of the whole episode: the weight alone at its start, or the hand's full force.
-            whole = [share(columns_at(place + s * push / 1e5).T @ (weight - s * push)) for s in np.linspace(0, 1, 11)]
+            whole = [fraction(columns_at(place + s * push / 1e5).T @ (weight - s * push)) for s in np.linspace(0, 1, 11)]
             expected.append(max(whole))
         np.testing.assert_allclose(found, expected, rtol=1e-6)
         assert np.all(np.diff(found) >= 0)
@@ -97,7 +97,7 @@ def test_moving_takes_inertia_and_friction() -> None:
         speed = np.linalg.solve(columns, 0.06 * rate * np.array([-way[1], way[0]]))
         needed = columns.T @ (4.0 * (-0.06 * rate**2 * way + [0.0, 9.81]))
         needed += [35.0, 60.0] * speed + 12.0 * np.sign(speed)
-        most = max(most, share(needed, rig))
+        most = max(most, fraction(needed, rig))
     np.testing.assert_allclose(required_strength_ratio(env), most, rtol=1e-9)
 
 

@@ -105,7 +105,9 @@ def test_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
     for figure in drawn:
         labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
         labels += [text.get_text() for text in figure.texts]
-        unitless = [label for label in labels if not re.search(r"\((mm|%|N|N/m|kg|million|normal l/min)\)|N/m|%|share", label)]
+        unitless = [
+            label for label in labels if not re.search(r"\((mm|%|N|N/m|kg|million|normal l/min)\)|N/m|%|fraction", label)
+        ]
         titles = {figure.get_suptitle()}
         assert set(unitless) <= titles
         plt.close(figure)

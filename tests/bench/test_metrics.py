@@ -86,7 +86,7 @@ def test_air_is_in_normal_litres_per_minute_whatever_the_period(period):
     assert expected == pytest.approx(23.2, abs=0.05)
 
 
-def test_saturation_is_the_share_of_time_with_any_valve_at_its_limit():
+def test_saturation_is_the_fraction_of_time_with_any_valve_at_its_limit():
     command = np.zeros((8, 4, 1))
     command[0, 3], command[1, 0], command[2, 1:3], command[3] = 1.0, -1.0, 1.0, 0.9999
     assert measure(8, command=command)["saturation"] == pytest.approx(100 * 3 / 8)

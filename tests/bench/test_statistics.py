@@ -36,11 +36,11 @@ def test_a_lost_episode_is_infinitely_bad_whatever_its_figures_were():
     np.testing.assert_array_equal(penalize_lost([3.0, INF], [True, False], True, LOST_ERROR), [100, INF])
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.95, 1.0])
-def test_quantiles_are_numpys_where_all_is_finite(share):
+@pytest.mark.parametrize("fraction", [0.0, 0.3, 0.5, 0.95, 1.0])
+def test_quantiles_are_numpys_where_all_is_finite(fraction):
     values = np.random.default_rng(1).normal(size=31)
-    assert quantile(values, share) == pytest.approx(np.quantile(values, share), rel=1e-12)
-    assert quantile([*values, NAN], share) == quantile(values, share)
+    assert quantile(values, fraction) == pytest.approx(np.quantile(values, fraction), rel=1e-12)
+    assert quantile([*values, NAN], fraction) == quantile(values, fraction)
 
 
 def test_a_quantile_that_leans_on_a_lost_episode_is_infinite_and_others_are_not():

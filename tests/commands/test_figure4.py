@@ -91,7 +91,7 @@ def test_the_law_follows_the_compliant_target_on_the_plant_with_friction(records
 
 
 def test_the_pushes_are_felt_as_springs_of_the_stiffness_asked_for(records):
-    # While a push is held (its last 0.3 s), the end effector has moved by the force over the setpoint, friction's share aside.
+    # While a push is held (its last 0.3 s), the end effector has moved by the force over the setpoint, but for friction.
     record = records["backstepping", "ideal"]
     for half, setpoint in ((0.0, 2000.0), (8.0, 4000.0)):
         for axis, end in ((0, 2.0), (0, 4.0), (1, 6.0), (1, 7.7)):

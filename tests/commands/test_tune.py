@@ -18,10 +18,10 @@ OWN = """
 import numpy as np
 
 class Own:
-    TUNABLE = {"stiff": (1.0, 10000.0), "share": (0.0, 2.0)}
+    TUNABLE = {"stiff": (1.0, 10000.0), "fraction": (0.0, 2.0)}
 
-    def __init__(self, parameters, stiff=2.0, share=2.0):
-        self.gains = stiff, share
+    def __init__(self, parameters, stiff=2.0, fraction=2.0):
+        self.gains = stiff, fraction
 
     def reset(self, lanes=None):
         pass
@@ -35,7 +35,7 @@ class Upside(Own):
 class Mute(Own):
     TUNABLE = {}
 """
-BOUNDS = {"stiff": (1.0, 10000.0), "share": (0.0, 2.0)}
+BOUNDS = {"stiff": (1.0, 10000.0), "fraction": (0.0, 2.0)}
 BEST = (400.0, 0.6)
 
 
@@ -56,9 +56,9 @@ def trial_costs(monkeypatch):
         if len(tried) == limit[0]:
             limit[0] = 10**6
             raise KeyboardInterrupt
-        stiff, share = controller.gains
-        tried.append((stiff, share))
-        return {"stiff": abs(np.log(stiff / BEST[0])), "share": 3 * abs(share - BEST[1]), "floor": 0.1 * len(sensors)}
+        stiff, fraction = controller.gains
+        tried.append((stiff, fraction))
+        return {"stiff": abs(np.log(stiff / BEST[0])), "fraction": 3 * abs(fraction - BEST[1]), "floor": 0.1 * len(sensors)}
 
     monkeypatch.setattr(tune, "costs", bowl)
     return tried, limit
@@ -70,7 +70,7 @@ def read(path):
 
 def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_costs, monkeypatch, capsys):
     start = tmp_path / "bad.json"
-    start.write_text('{"gains": {"stiff": 1.5, "share": 1.9, "other": 3}}')
+    start.write_text('{"gains": {"stiff": 1.5, "fraction": 1.9, "other": 3}}')
     out = tmp_path / "out"
     status, printed, _ = call("tune", monkeypatch, capsys, "--controller", own, "--trials", 80, "--start", start, "--out", out)
     assert status == 0
@@ -82,7 +82,7 @@ def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_cos
     assert best["cost"] < 0.2 + 0.5, "both sensors have a floor of 0.1 each"
     assert best["gains"] == trials[best["trial"]]["gains"]
     assert best["gains"]["stiff"] == pytest.approx(BEST[0], rel=0.4)
-    assert best["gains"]["share"] == pytest.approx(BEST[1], abs=0.1)
+    assert best["gains"]["fraction"] == pytest.approx(BEST[1], abs=0.1)
     table = {line.split()[0]: line.split()[1:] for line in printed.splitlines() if line.split()}
     for name, value in best["gains"].items():
         assert [float(word) for word in table[name]] == pytest.approx(
@@ -184,7 +184,7 @@ BAD = [
         ("--controller", "pid", "--start", "{tmp}/other.json"),
         "other.json' lacks 'bandwidth'; allowed: JSON with gains: bandwidth",
     ),
-    (("--controller", "{own}:Own", "--start", "{tmp}/beyond.json"), "beyond.json' has share = 2.5; allowed: 0 to 2"),
+    (("--controller", "{own}:Own", "--start", "{tmp}/beyond.json"), "beyond.json' has fraction = 2.5; allowed: 0 to 2"),
     (("--controller", "pid", "--parameters", "nowhere.toml"), "'nowhere.toml'"),
 ]
 
@@ -192,7 +192,7 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "message"), BAD)
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, message, own, tmp_path, monkeypatch, capsys):
     (tmp_path / "other.json").write_text('{"gains": {"damping": 1.0}}')
-    (tmp_path / "beyond.json").write_text('{"gains": {"stiff": 1.0, "share": 2.5}}')
+    (tmp_path / "beyond.json").write_text('{"gains": {"stiff": 1.0, "fraction": 2.5}}')
     given = [argument.format(tmp=tmp_path, own=own.removesuffix(":Own")) for argument in arguments]
     status, printed, complained = call("tune", monkeypatch, capsys, *given, "--out", tmp_path / "out")
     assert (status, printed) == (2, "")

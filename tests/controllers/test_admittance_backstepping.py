@@ -68,10 +68,10 @@ class Law:
         return openings
 
 
-def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, share: float = 1.0) -> tuple[Array, Measurement]:
+def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fraction: float = 1.0) -> tuple[Array, Measurement]:
     """A motion (8, N) that the rig nearly has."""
     rng, measured = np.random.default_rng(seed), rigid_body.seen(now, rig, user)
-    motion = share * np.repeat([1e-4, 2e-3, 0.3, 10.0], 2)[:, None] * rng.uniform(-1, 1, (8, user.shape[1]))
+    motion = fraction * np.repeat([1e-4, 2e-3, 0.3, 10.0], 2)[:, None] * rng.uniform(-1, 1, (8, user.shape[1]))
     motion[:2] += measured.position
     motion[2:4] += measured.velocity
     return motion, measured
@@ -124,7 +124,7 @@ def test_what_rests_is_left_alone_within_the_dead_zone(cylinder: int, resting: f
     sizes = np.array([0.0, 0.3, 0.99, 1.5])
     now = rigid_body.Instant(*(np.repeat(part, len(sizes), axis=1) for part in now))
     nothing = np.zeros((2, len(sizes)))
-    motion, _ = near(now, rig, nothing, seed=1, share=0.0)
+    motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
     pose = rigid_body.pose_of(now.piston, rig)
     along = pose.beam if cylinder == 1 else pose.across
     motion[:2] -= zone * sizes * along
@@ -152,7 +152,7 @@ def test_the_gain_of_rest_takes_over_once_the_reference_has_stopped() -> None:
     rig, lanes, error = Parameters(), 1, 5e-5
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.0, push=0.0)
     nothing = np.zeros((2, lanes))
-    motion, _ = near(now, rig, nothing, seed=1, share=0.0)
+    motion, _ = near(now, rig, nothing, seed=1, fraction=0.0)
     motion[0] -= error
     law, memory, stiffnesses = Law(rig, 60.0, 30.0), remembered(lanes), []
     for tick in range(400):
@@ -185,7 +185,7 @@ def test_the_spool_follows_with_the_lead_time(tau: float, lead_time: float) -> N
 
 @pytest.mark.parametrize("lead_time", [0.0015, 0.01])
 def test_the_law_leads_every_spool_from_where_it_is(lead_time: float) -> None:
-    """After one period the plant's spools have gone the share 1 - exp(-T/lead) of their ways to what the law wants."""
+    """After one period the plant's spools have gone the fraction 1 - exp(-T/lead) of their ways to what the law wants."""
     rig, lanes = ANOTHER, 40
     now = rigid_body.near_balance(rig, lanes, seed=4, speed=0.05, push=3.0)
     nothing = np.zeros((2, lanes))
@@ -208,7 +208,7 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 
 
 def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35) -> Array:
-    """The gain share after each of the speed errors (T,), one per period."""
+    """The gain fraction after each of the speed errors (T,), one per period."""
     memory, row = remembered(1), admittance_law.WATCH_N
     return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least) for error in errors])
 
@@ -219,12 +219,12 @@ TIMES = PERIOD * np.arange(2000)
 @pytest.mark.parametrize("frequency", [4.0, 12.0, 40.0])
 def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: float) -> None:
     """By ``fall`` at each half wave after the second one, never below ``least``."""
-    share = watched(0.1 * np.sin(2 * np.pi * frequency * TIMES))
-    falls = np.round(np.log(share) / np.log(0.9), 9)
+    fraction = watched(0.1 * np.sin(2 * np.pi * frequency * TIMES))
+    falls = np.round(np.log(fraction) / np.log(0.9), 9)
     half_waves = np.floor(2 * frequency * TIMES - 1e-9)
     expected = np.maximum(0.9 ** np.maximum(half_waves - 1, 0), 0.35)
-    assert np.mean(np.abs(share - expected) < 1e-12) > 0.97, "but for the instants of the sign's change"
-    assert share.min() == pytest.approx(max(0.35, 0.9 ** np.floor(2 * frequency * 2 - 2)), rel=0.11)
+    assert np.mean(np.abs(fraction - expected) < 1e-12) > 0.97, "but for the instants of the sign's change"
+    assert fraction.min() == pytest.approx(max(0.35, 0.9 ** np.floor(2 * frequency * 2 - 2)), rel=0.11)
     assert falls.min() == 0
 
 
@@ -232,8 +232,8 @@ def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: floa
 def test_a_decaying_transient_costs_no_gain(kept: float) -> None:
     """Each half wave smaller than SUSTAINED times the one before, whatever its size."""
     decay = np.log(kept) * 2 * 10.0
-    share = watched(2.0 * np.exp(decay * TIMES) * np.sin(2 * np.pi * 10.0 * TIMES))
-    assert share.min() == 1.0
+    fraction = watched(2.0 * np.exp(decay * TIMES) * np.sin(2 * np.pi * 10.0 * TIMES))
+    assert fraction.min() == 1.0
 
 
 def test_small_or_slow_oscillations_and_one_way_errors_cost_no_gain() -> None:
@@ -252,7 +252,7 @@ def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(di
     rig, c, error = Parameters(), 50.0, 5e-5
     now = rigid_body.near_balance(rig, 1, seed=4, speed=0.0, push=0.0)
     nothing, law, memory, pose = np.zeros((2, 1)), Law(rig, 50.0, 50.0), remembered(1), rigid_body.pose_of(now.piston, rig)
-    resting, _ = near(now, rig, nothing, seed=1, share=0.0)
+    resting, _ = near(now, rig, nothing, seed=1, fraction=0.0)
     shaken = {"across": pose.across, "along": pose.beam}[direction]
     for time in TIMES[:245]:
         motion = resting.copy()
@@ -267,7 +267,7 @@ def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(di
         assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)
 
 
-def test_the_gain_share_is_that_of_the_direction() -> None:
+def test_the_gain_fraction_is_that_of_the_direction() -> None:
     """The end effector shakes by 0.1 m/s and 10 Hz about a resting target: across cylinder 2, along it, both, not at all."""
     lanes, rig = 4, Parameters()
     wanted = closed_loop.holding(np.repeat([[0.45], [-0.2]], lanes, axis=1), 2000.0)
@@ -280,9 +280,9 @@ def test_the_gain_share_is_that_of_the_direction() -> None:
         clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
         place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
         law.command(Measurement(clock, place, clock, speed, pressures, nothing, sampled=False), wanted)
-    assert np.array_equal(law.gain_share, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
+    assert np.array_equal(law.gain_fraction, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
     law.reset(np.array([True, False, False, False]))
-    assert np.array_equal(law.gain_share[:, :2], [[1, 1], [1, LEAST_SHARE]])
+    assert np.array_equal(law.gain_fraction[:, :2], [[1, 1], [1, LEAST_SHARE]])
 
 
 def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, Array]:
@@ -300,8 +300,8 @@ def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, A
         return min(time / 0.5, 1.0)
 
     def command(measured: Measurement, wanted: Reference) -> Array:
-        share, rate = ramp(float(measured.time[0])), 2.0 if measured.time[0] < 0.5 else 0.0
-        return law.command(measured, wanted, share * told, rate * told)
+        fraction, rate = ramp(float(measured.time[0])), 2.0 if measured.time[0] < 0.5 else 0.0
+        return law.command(measured, wanted, fraction * told, rate * told)
 
     for _ in closed_loop.run(plant, command, lambda t: wanted, lambda t: ramp(t) * unmeasured, seconds, blind):
         pass

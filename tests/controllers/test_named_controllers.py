@@ -24,11 +24,11 @@ import numpy as np
 @dataclass
 class Own:
     parameters: object
-    share: float = 0.05
+    fraction: float = 0.05
 
     def command(self, measurement, reference):
         assert self.parameters.mechanics.mass == 3.5
-        return np.full((4, measurement.position.shape[1]), self.share) * [[1], [-1], [1], [-1]]
+        return np.full((4, measurement.position.shape[1]), self.fraction) * [[1], [-1], [1], [-1]]
 
     def reset(self, lanes=None):
         pass
@@ -60,18 +60,18 @@ def test_a_controller_from_a_users_own_file_runs_as_named(own):
     result = run(spy, duration=0.1, parameters=rig)
     np.testing.assert_array_equal(np.unique(spy.commands), [-0.05, 0.05])
     assert result.metrics["error_rms_x"][0] > 0
-    assert make_controller(f"{own}:made_by_a_function", rig).share == 0
-    assert make_controller(f"{own}:Own", rig, share=0.2).share == 0.2
+    assert make_controller(f"{own}:made_by_a_function", rig).fraction == 0
+    assert make_controller(f"{own}:Own", rig, fraction=0.2).fraction == 0.2
 
 
 def test_two_files_of_one_name_are_two_controllers(tmp_path):
     made = []
-    for folder, share in (("a", "0.1"), ("b", "0.2")):
+    for folder, fraction in (("a", "0.1"), ("b", "0.2")):
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / "numpy.py"
-        path.write_text(OWN.replace("0.05", share))
+        path.write_text(OWN.replace("0.05", fraction))
         made.append(make_controller(f"{path}:Own", RIG))
-    assert [one.share for one in made] == [0.1, 0.2]
+    assert [one.fraction for one in made] == [0.1, 0.2]
     # A file called numpy.py hides no package.
     import numpy
 

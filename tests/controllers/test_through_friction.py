@@ -202,7 +202,7 @@ def test_one_lane_and_many_and_a_new_start(sensors: str) -> None:
     reset.reset()
     again = AdmittanceBackstepping(BELIEVED)
     assert np.array_equal(reset.command(*record[0]), again.command(*record[0]))
-    assert np.array_equal(reset.gain_share, np.ones((2, 3)))
+    assert np.array_equal(reset.gain_fraction, np.ones((2, 3)))
 
 
 @pytest.mark.parametrize(("gain", "value"), [("rest_push", 6.0), ("dead_zone", 5e-5), ("pressure_bandwidth", 40.0)])
@@ -224,8 +224,8 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
         errors(probes, run_stiffness_test(probes, fixed)),
     )
     assert calm[0] < 0.2 * shaking[0]
-    assert 0.35 <= yielding.gain_share.min() < 1
-    assert np.all(fixed.gain_share == 1)
+    assert 0.35 <= yielding.gain_fraction.min() < 1
+    assert np.all(fixed.gain_fraction == 1)
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
         ({"bandwidth": np.nan}, r"bandwidth = nan; allowed: a positive number"),
         ({"lead_time": np.inf}, r"lead_time = inf; allowed: a positive number"),
         ({"dead_zone": -1e-6}, r"dead_zone = -1e-06; allowed: zero or a positive number"),
-        ({"friction_share": -0.1}, r"friction_share = -0.1; allowed: zero or a positive number"),
+        ({"friction_fraction": -0.1}, r"friction_fraction = -0.1; allowed: zero or a positive number"),
         ({"yielding": 1.1}, r"yielding = 1.1; allowed: at most 1"),
     ],
 )

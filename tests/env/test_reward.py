@@ -35,7 +35,7 @@ def springs(env, time):
 )
 def test_every_term_is_its_formula_of_info(name, period, arguments):
     env = gymnasium.make(name, policy_period=period, **arguments).unwrapped
-    steps, share = min(round(2.5 / period), 1250), period / 0.01
+    steps, fraction = min(round(2.5 / period), 1250), period / 0.01
     _, info = env.reset(seed=1)
     assert [info[term] for term in TERMS] == [0.0] * 5, "nothing has been earned yet"
     last, before, jumps = np.zeros(4), np.zeros(2), []
@@ -55,11 +55,11 @@ def test_every_term_is_its_formula_of_info(name, period, arguments):
         error = info["position"] - target[:2] - asked
         relative = info["velocity"] - target[2:4] - (asked - before) / period
         expected = {
-            "reward_survive": share,
-            "reward_tracking": -share * np.log(1 + np.abs(error).sum() / 1e-3) / LARGEST,
-            "reward_hunting": -share * 0.2 * np.log(1 + np.abs(relative).sum() / 0.01) / LARGEST,
-            "reward_effort": -share * 0.04 * np.mean(action**2) / LARGEST,
-            "reward_action_change": -share * 0.2 * np.abs(action - last).mean() / LARGEST,
+            "reward_survive": fraction,
+            "reward_tracking": -fraction * np.log(1 + np.abs(error).sum() / 1e-3) / LARGEST,
+            "reward_hunting": -fraction * 0.2 * np.log(1 + np.abs(relative).sum() / 0.01) / LARGEST,
+            "reward_effort": -fraction * 0.04 * np.mean(action**2) / LARGEST,
+            "reward_action_change": -fraction * 0.2 * np.abs(action - last).mean() / LARGEST,
         }
         for term, value in expected.items():
             assert info[term] == pytest.approx(value, rel=1e-7, abs=1e-9), term

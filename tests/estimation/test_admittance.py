@@ -50,12 +50,12 @@ def generator(stiffness: Array, mass: float = MASS, ratio: float = DAMPING_RATIO
 def exact_motion(force: Callable[[int], Array], plan: list[Array], ticks: int) -> Array:
     """Offset, speed, acceleration and jerk (ticks, 8) of one lane under a force that is held for every period: by expm.
 
-    Each stiffness of the plan holds for an equal share of the ticks.
+    Each stiffness of the plan holds for an equal fraction of the ticks.
     """
-    state, motion, share = np.zeros(4), np.empty((ticks, 8)), ticks // len(plan)
+    state, motion, fraction = np.zeros(4), np.empty((ticks, 8)), ticks // len(plan)
     for tick in range(ticks):
-        if tick % share == 0:
-            a, b = generator(plan[tick // share])
+        if tick % fraction == 0:
+            a, b = generator(plan[tick // fraction])
             held = expm(PERIOD * np.block([[a, b], [np.zeros((2, 6))]]))
         push = force(tick)
         first = a @ state + b @ push

@@ -169,8 +169,8 @@ def test_shut_chambers_are_compressed_polytropically() -> None:
 @pytest.mark.parametrize("bandwidth", [50.0, 150.0, 600.0])
 @pytest.mark.parametrize("period", [2.5e-4, 1e-3, 4e-3])
 def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None:
-    """Nothing flows: the mean is true, the variance that of a first-order filter, share/(2 - share), uncorrelated cells."""
-    lanes, noise, share = 1000, 500.0, 1 - np.exp(-bandwidth * period)
+    """Nothing flows: the mean is true, the variance a first-order filter's, fraction/(2 - fraction), uncorrelated cells."""
+    lanes, noise, fraction = 1000, 500.0, 1 - np.exp(-bandwidth * period)
     estimator, rng, kept = observer(TIGHT, bandwidth, period), np.random.default_rng(2), []
     settled = math.ceil(8 / (bandwidth * period))
     for tick in range(settled + 60):
@@ -179,7 +179,7 @@ def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None
         if tick >= settled:
             kept.append(estimate - START)
     error = np.array(kept)
-    assert np.mean(error**2) == pytest.approx(noise**2 * share / (2 - share), rel=0.05)
+    assert np.mean(error**2) == pytest.approx(noise**2 * fraction / (2 - fraction), rel=0.05)
     assert np.abs(error.mean(axis=(0, 2))).max() < 0.1 * noise
     assert np.abs(np.corrcoef(error[-1]) - np.eye(4)).max() < 0.15
 
@@ -206,10 +206,10 @@ def test_what_the_model_explains_is_followed_without_lag() -> None:
     cells = pressures + 500.0 * np.random.default_rng(4).normal(size=pressures.shape)
     path = believed(observer(rig, 150.0), openings, times, lambda tick: cells[tick][:, None])[:, 4:]
     filtered = np.empty((5, *cells.shape))
-    for own, share in zip(filtered, (0.1, 0.2, 0.4, 0.6, 0.8), strict=True):
+    for own, fraction in zip(filtered, (0.1, 0.2, 0.4, 0.6, 0.8), strict=True):
         own[0] = cells[0]
         for tick in range(1, len(cells)):
-            own[tick] = own[tick - 1] + share * (cells[tick] - own[tick - 1])
+            own[tick] = own[tick - 1] + fraction * (cells[tick] - own[tick - 1])
     error = np.sqrt(np.mean((path - pressures)[20:] ** 2, axis=0))
     by_filter = np.sqrt(np.mean((filtered - pressures)[:, 20:] ** 2, axis=1)).min(axis=0)
     assert np.all(error < 0.5 * by_filter)

@@ -214,7 +214,7 @@ class Differences:
 def on_the_circle(
     rig: Parameters, setpoints: tuple[float, ...], observed: bool, seconds: float = 5.0
 ) -> tuple[Array, Array, Array]:
-    """Errors of the end effector after 1 s with M setpoints: RMS and maximum on both axes, (2, M), m; and the share of time
+    """Errors of the end effector after 1 s with M setpoints: RMS and maximum on both axes, (2, M), m; and the fraction of time
     with a saturated valve, (M,)."""
     each, lanes = 8, 8 * len(setpoints)
     reference, law = circle(lanes, np.repeat(setpoints, each)), BacksteppingController(rig, weight_compensation=True)

@@ -17,7 +17,7 @@ from birthsim_env.physics.plant import Plant
 from tests.oracles import closed_loop, rigid_body
 
 PERIOD = 1e-3
-GAINS = {"bandwidth": 60.0, "pressure_bandwidth": 150.0, "friction_share": 1.0}
+GAINS = {"bandwidth": 60.0, "pressure_bandwidth": 150.0, "friction_fraction": 1.0}
 RIG = Parameters().replace({"geometry.gamma3": 1.4, "valves.leakage_ratio": 0.0})
 """Its shut chambers hold their air."""
 
@@ -109,11 +109,11 @@ def gliding(tick: int, speed: Array) -> Reference:
 
 
 @either
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_a_share_of_the_friction_is_believed_against_the_motion(sampled: bool, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.4, 1.0])
+def test_a_fraction_of_the_friction_is_believed_against_the_motion(sampled: bool, fraction: float) -> None:
     """Of a steady glide: Fc + (Fs - Fc)/(1 + (v/vs)^2) of each piston, against its speed, whatever the rig itself does."""
     speed = np.array([[0.1, -0.006], [0.05, 0.01]])
-    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware(sampled, friction_share=share)
+    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware(sampled, friction_fraction=fraction)
     for tick in range(501):
         now = part.update(seen(tick, PISTON, pressures, nothing, sampled), gliding(tick, speed))
     v = np.linalg.solve(rigid_body.jacobians(PISTON, RIG), speed.T[..., None])[..., 0].T
@@ -121,7 +121,7 @@ def test_a_share_of_the_friction_is_believed_against_the_motion(sampled: bool, s
     assert np.abs(v).min() < RIG.friction.stribeck_speed
     coulomb = np.array([[RIG.cylinder1.coulomb_friction], [RIG.cylinder2.coulomb_friction]])
     level = coulomb * (1 + (RIG.friction.static_ratio - 1) / (1 + (v / RIG.friction.stribeck_speed) ** 2))
-    np.testing.assert_allclose(now.believed, -share * np.sign(v) * level, rtol=0.01, atol=1e-12)
+    np.testing.assert_allclose(now.believed, -fraction * np.sign(v) * level, rtol=0.01, atol=1e-12)
 
 
 @either
@@ -163,8 +163,8 @@ def test_noise_is_averaged_where_cells_are_noisy_and_nowhere_else() -> None:
         known = exact.update(seen(tick, piston, cells, nothing, False), wanted)
         assert np.array_equal(known.pressures, cells)
         now = averaging.update(seen(tick, piston, cells, nothing, True), wanted)
-    share = 1 - np.exp(-GAINS["pressure_bandwidth"] * PERIOD)
-    assert np.std(now.pressures - pressures) == pytest.approx(noise * np.sqrt(share / (2 - share)), rel=0.1)
+    fraction = 1 - np.exp(-GAINS["pressure_bandwidth"] * PERIOD)
+    assert np.std(now.pressures - pressures) == pytest.approx(noise * np.sqrt(fraction / (2 - fraction)), rel=0.1)
 
 
 def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() -> None:
@@ -278,13 +278,13 @@ def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:
 
 
 @either
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_of_now(sampled: bool, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.4, 1.0])
+def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_of_now(sampled: bool, fraction: float) -> None:
     """Both come true where the push stays, the target goes on with its jerk, and what is observed stays as it is.
 
     Targets turn round on the way, and friction with them. Asking changes nothing.
     """
-    part, kept = aware(sampled, friction_share=share), aware(sampled, friction_share=share)
+    part, kept = aware(sampled, friction_fraction=fraction), aware(sampled, friction_fraction=fraction)
     push, ticks = (
         np.array([[9.0, -4.0], [-6.0, 7.0]]),
         np.arange(1, 26),
@@ -307,4 +307,4 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
         np.testing.assert_allclose(disturbance_force[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
         assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
         later.append(now.believed - believed)
-    assert np.all(np.abs(later).max(axis=0) >= 10 * share)
+    assert np.all(np.abs(later).max(axis=0) >= 10 * fraction)

@@ -53,7 +53,7 @@ def orifice(conductance: float, p_up: float, t_up: float, p_down: float, b: floa
 
 
 @numba.njit
-def plastic_share(z: float, v: float, steady: float, breakaway: float) -> float:
+def plastic_fraction(z: float, v: float, steady: float, breakaway: float) -> float:
     """alpha of the elasto-plastic law: where the bristle leans the way it moves, a cubic from z_ba to z_ss."""
     if z * v <= 0 or abs(z) <= breakaway * steady:
         return 0.0
@@ -116,7 +116,7 @@ def rates(
 
         if law[0] > 0:
             level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
-            alpha = 1.0 if law[0] == 1 else plastic_share(s[12 + c], v, level / law[3], law[6])
+            alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])
             sliding = v - alpha * law[3] * abs(v) / level * s[12 + c]
             ds[12 + c] = sliding
             rubbing = law[3] * s[12 + c] + law[4] * sliding + fv * v

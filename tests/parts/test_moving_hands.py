@@ -72,9 +72,9 @@ def test_the_guiding_hand_is_a_mass_between_two_springs():
     def wanted(t):
         leg = max(0.0, t - CALM) / 2.0
         place = int(leg)
-        share, slope = minimum_jerk(2 * (leg - place))
+        fraction, slope = minimum_jerk(2 * (leg - place))
         way = points[place + 1] - points[place] if t > CALM else np.zeros(2)
-        return first + points[place] + share * way, slope * way
+        return first + points[place] + fraction * way, slope * way
 
     def derivative(t, state):
         where, pace = wanted(t)

@@ -122,7 +122,7 @@ def test_what_is_carried_is_newtons_law():
     """Virtual work: the force along a cylinder times its speed is the weight times the speed at which it rises."""
     rig, place = Parameters(), np.array([[0.45, 0.55], [-0.05, 0.03]])
     spare = rig.air.supply_pressure - rig.air.atmospheric_pressure
-    shares = carried(place, rig)
+    fractions = carried(place, rig)
     for lane in range(2):
         for k, cylinder in enumerate((rig.cylinder1, rig.cylinder2)):
             rise = []
@@ -133,7 +133,7 @@ def test_what_is_carried_is_newtons_law():
                 rise.append(end_effector(moved, rig)[1])
             force = rig.mechanics.mass * rig.mechanics.gravity * (rise[0] - rise[1]) / 2e-3
             strength = spare * (cylinder.area_p if force > 0 else cylinder.area_n)
-            assert shares[k, lane] == pytest.approx(abs(force) / strength, rel=1e-4)
+            assert fractions[k, lane] == pytest.approx(abs(force) / strength, rel=1e-4)
 
 
 def test_a_drawn_rig_that_cannot_carry_its_mass_is_part_of_the_experiment():

@@ -137,8 +137,8 @@ def test_noise_is_normal_with_the_documented_deviation(noise):
         assert abs((values**4).mean() - 3) < 4.5 * math.sqrt(96 / count)
         # In every channel of every lane as well.
         assert np.abs(values.std(axis=0) - 1).max() < 5 / math.sqrt(2 * len(values))
-        share = (np.abs(values) > 2).mean()
-        assert share == pytest.approx(0.0455, abs=4.5 * math.sqrt(0.0455 * 0.9545 / count))
+        fraction = (np.abs(values) > 2).mean()
+        assert fraction == pytest.approx(0.0455, abs=4.5 * math.sqrt(0.0455 * 0.9545 / count))
 
 
 def test_noise_is_independent_over_time_channels_and_lanes(noise):

@@ -58,9 +58,9 @@ def test_transitions_are_minimum_jerk_with_rates_that_fit(transition):
     times = np.linspace(0.0, 3.0, 601)
     schedule = StiffnessSchedule(*TWO, transition=transition)
     rows = course(schedule, times)
-    share = minimum_jerk((times - 0.8) / transition)
-    np.testing.assert_allclose(rows[2], 4600.0 - 1000.0 * share, atol=1e-6)
-    np.testing.assert_allclose(rows[3], 2300.0 - 500.0 * share, atol=1e-6)
+    fraction = minimum_jerk((times - 0.8) / transition)
+    np.testing.assert_allclose(rows[2], 4600.0 - 1000.0 * fraction, atol=1e-6)
+    np.testing.assert_allclose(rows[3], 2300.0 - 500.0 * fraction, atol=1e-6)
     step = 1e-6 * transition
     slope = (course(schedule, times + step)[2:4] - course(schedule, times - step)[2:4]) / (2 * step)
     np.testing.assert_allclose(rows[4:6], slope, atol=2e-5 * np.abs(slope).max())

@@ -141,8 +141,8 @@ def test_contractions_peak_between_40_and_125_newtons_with_4_or_5_pushes():
 @pytest.mark.parametrize("amplitude", [40.0, 125.0])
 @pytest.mark.parametrize("pushes", [4, 5])
 def test_a_contraction_peaks_near_its_amplitude_and_never_above(amplitude, pushes):
-    for share in (0.15, 0.25, 0.35):
-        peak = course(Contractions(amplitude, 1, pushes=(pushes, pushes), push=share), 12.0)[1].max()
+    for fraction in (0.15, 0.25, 0.35):
+        peak = course(Contractions(amplitude, 1, pushes=(pushes, pushes), push=fraction), 12.0)[1].max()
         assert 0.93 * amplitude < peak <= amplitude * (1 + 1e-9)
 
 

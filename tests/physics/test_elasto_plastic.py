@@ -29,7 +29,7 @@ FREE = {"mechanics.gravity": 0.0, "chambers.dead_volume": 10.0, "valves.leakage_
 """No weight, and chambers of 10 m3."""
 
 
-def share(z: float, v: float, steady: float, ratio: float = RATIO, sine: bool = False) -> float:
+def fraction(z: float, v: float, steady: float, ratio: float = RATIO, sine: bool = False) -> float:
     """alpha(z, v): the paper's cases, with its sine or with the cubic that stands for it in the plant."""
     if z * v <= 0 or abs(z) <= ratio * steady:
         return 0.0
@@ -41,7 +41,7 @@ def share(z: float, v: float, steady: float, ratio: float = RATIO, sine: bool = 
 
 def rate(v: float, z: float, level: float, ratio: float = RATIO, sine: bool = False) -> float:
     """dz/dt = v (1 - alpha s0 z sgn(v) / G)."""
-    return v * (1 - share(z, v, level / S0, ratio, sine) * S0 * z * math.copysign(1, v) / level)
+    return v * (1 - fraction(z, v, level / S0, ratio, sine) * S0 * z * math.copysign(1, v) / level)
 
 
 @given(v=st.floats(-10, 10), z=st.floats(-6e-4, 6e-4), level=st.floats(0.5, 40), ratio=st.floats(0.01, 0.9))
@@ -54,7 +54,7 @@ def test_rate_is_the_papers_below_the_limit_and_held_above(v: float, z: float, l
 @given(s=st.floats(-1, 2))
 def test_cubic_is_within_a_hundredth_of_the_papers_sine(s: float) -> None:
     sine = 0.5 * math.sin(math.pi * (min(1.0, max(0.0, s)) - 0.5)) + 0.5
-    assert friction.sliding_share(RATIO + s * (1 - RATIO), RATIO, 1 / (1 - RATIO)) == pytest.approx(sine, abs=0.0101)
+    assert friction.sliding_fraction(RATIO + s * (1 - RATIO), RATIO, 1 / (1 - RATIO)) == pytest.approx(sine, abs=0.0101)
 
 
 def cubic_rate(v: float, z: float, cylinder: int) -> float:
@@ -82,7 +82,7 @@ def one_piston(law: str, **changes: float) -> Plant:
 
 
 def pushed(plant: Plant, push: Array, seconds: float) -> float:
-    """Position of piston 2 after the pushes (K,) along x, each held for its share of ``seconds``, m."""
+    """Position of piston 2 after the pushes (K,) along x, each held for its fraction of ``seconds``, m."""
     plant.advance(np.zeros((4, 1)), np.stack([push, np.zeros_like(push)], axis=1)[:, :, None], seconds)
     return float(plant.state[Y2, 0])
 
@@ -125,7 +125,7 @@ def slow_push(portion: float, ratio: float = RATIO) -> tuple[float, float]:
     full = FS[1] / S0
 
     def creep(z: float) -> float:
-        q = share(z, 1.0, full, ratio) * z / full
+        q = fraction(z, 1.0, full, ratio) * z / full
         return q / (1 - q)
 
     return portion * full, quad(creep, min(ratio, portion) * full, portion * full)[0]

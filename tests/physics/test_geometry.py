@@ -66,9 +66,9 @@ def test_models_are_inverse_over_the_workspace(rig: Parameters) -> None:
     np.testing.assert_allclose(back, piston, rtol=0, atol=1e-12)
 
 
-@given(rig=rigs(), share1=st.floats(-1, 1), share2=st.floats(-1, 1))
-def test_models_are_inverse_for_any_rig(rig: Parameters, share1: float, share2: float) -> None:
-    piston = np.array([share1 * rig.cylinder1.stroke / 2, share2 * rig.cylinder2.stroke / 2])
+@given(rig=rigs(), fraction1=st.floats(-1, 1), fraction2=st.floats(-1, 1))
+def test_models_are_inverse_for_any_rig(rig: Parameters, fraction1: float, fraction2: float) -> None:
+    piston = np.array([fraction1 * rig.cylinder1.stroke / 2, fraction2 * rig.cylinder2.stroke / 2])
     point = geometry.end_effector(piston, rig)
     np.testing.assert_allclose(geometry.inverse_geometry(point, rig), piston, rtol=0, atol=1e-12)
     np.testing.assert_allclose(point, pose(piston, rig).end_effector, rtol=0, atol=1e-12)

@@ -58,7 +58,7 @@ def rough_handling(lanes: int, steps: int, rng: np.random.Generator) -> Iterator
         yield np.choose(kind, [rng.uniform(-1, 1, (4, lanes)), held, bang, constant, swing]), force
 
 
-def volume_shares(plant: Plant, dead_volume: Array) -> Array:
+def volume_fractions(plant: Plant, dead_volume: Array) -> Array:
     """Volume of each chamber in its largest volume, (4, N)."""
     y1, y2 = plant.piston
     columns = np.stack([0.1 + y1, 0.1 - y1, 0.2 + y2, 0.2 - y2])
@@ -78,10 +78,10 @@ def test_a_million_policy_steps_stay_finite_and_explained() -> None:
         plant.advance(command, force, POLICY_PERIOD)
         assert np.isfinite(plant.state).all()
         bar, kelvin, spool = plant.pressures / 1e5, plant.temperatures, plant.state[list(SPOOLS)]
-        share = volume_shares(plant, dead_volume)
-        assert share.min() > 0, "an end stop gave way until a chamber had no volume left"
+        fraction = volume_fractions(plant, dead_volume)
+        assert fraction.min() > 0, "an end stop gave way until a chamber had no volume left"
         squeezed, torn = bar > 20, bar < 0.2
-        assert np.all(share[squeezed] < 0.6), "above 20 bar without being squeezed"
+        assert np.all(fraction[squeezed] < 0.6), "above 20 bar without being squeezed"
         assert np.all(spool[torn] < 0.01), "below 0.2 bar with the supply open"
         outside += np.any(squeezed | torn, axis=0).sum()
         bristle = np.abs(plant.state[[Z1, Z2]])

@@ -162,20 +162,20 @@ def test_valve_stays_shut_where_opening_would_let_air_run_the_other_way() -> Non
     assert valves.opening_for_flow(CL * (fill - drain), fill, drain, C, CL) == 0, "what leaks anyway needs no opening"
 
 
-shares = st.floats(0.5, 8.0)
+fractions = st.floats(0.5, 8.0)
 
 
-@given(pp=inside, pn=inside, tp=warmth, tn=warmth, share_p=shares, share_n=shares, spool=st.floats(-1, 1))
+@given(pp=inside, pn=inside, tp=warmth, tn=warmth, fraction_p=fractions, fraction_n=fractions, spool=st.floats(-1, 1))
 def test_opening_for_active_flow_inverts_one_valve_per_cylinder(
-    pp: float, pn: float, tp: float, tn: float, share_p: float, share_n: float, spool: float
+    pp: float, pn: float, tp: float, tn: float, fraction_p: float, fraction_n: float, spool: float
 ) -> None:
     supplied, exhausted = plant_flows(np.array([pp, pn]), np.array([tp, tn]), np.array([spool, -spool]))
     flow_p, flow_n = supplied - exhausted
-    active = share_p * flow_p - share_n * flow_n
-    at = (*per_conductance(pp, tp), *per_conductance(pn, tn), share_p, share_n, C, CL)
+    active = fraction_p * flow_p - fraction_n * flow_n
+    at = (*per_conductance(pp, tp), *per_conductance(pn, tn), fraction_p, fraction_n, C, CL)
     assert valves.opening_for_active_flow(active, *at) == pytest.approx(spool, abs=1e-12)
     most, least = (
-        share_p * (q[0][0] - q[1][0]) - share_n * (q[0][1] - q[1][1])
+        fraction_p * (q[0][0] - q[1][0]) - fraction_n * (q[0][1] - q[1][1])
         for q in (plant_flows(np.array([pp, pn]), np.array([tp, tn]), np.array([s, -s])) for s in (1.0, -1.0))
     )
     assert valves.opening_for_active_flow(most + 1e-3, *at) == 1

@@ -28,15 +28,15 @@ def new(lanes: int) -> AuthorityLimiter:
 
 
 def watched(limiter: AuthorityLimiter, speeds: Array, targets: Array | None = None) -> Array:
-    """The shares (T, 2, N) while the pistons move with ``speeds`` (T, 2, N) at one place, and the target with ``targets``."""
-    shares, lanes = [], speeds.shape[2]
+    """The fractions (T, 2, N) while the pistons move with ``speeds`` (T, 2, N) at one place, the target with ``targets``."""
+    fractions, lanes = [], speeds.shape[2]
     for k, speed in enumerate(speeds):
         rows = np.zeros((REFERENCES, lanes))
         if targets is not None:
             rows[2:4], _ = by_points.cartesian_velocity(POSE, PISTON[1] + RIG.geometry.k2, *targets[k])
         limiter.update(np.concatenate([np.repeat(PISTON, lanes, axis=1), speed]), Reference(rows))
-        shares.append(limiter.fraction.copy())
-    return np.array(shares)
+        fractions.append(limiter.fraction.copy())
+    return np.array(fractions)
 
 
 def shaken(waves: list[Array], cylinder: int) -> Array:
@@ -47,21 +47,21 @@ def shaken(waves: list[Array], cylinder: int) -> Array:
 
 
 def wave(size: float, frequency: float = 10.0, kept: float = 1.0) -> Array:
-    """A sine (T,) of which every half wave keeps a share of the one before."""
+    """A sine (T,) of which every half wave keeps a fraction of the one before."""
     return size * kept ** (2 * frequency * TIMES) * np.sin(2 * np.pi * frequency * TIMES)
 
 
 @pytest.mark.parametrize("cylinder", [0, 1])
 @pytest.mark.parametrize("size", [1.01, 2.0, 3.5])
-def test_a_sustained_oscillation_lowers_the_share_of_its_own_cylinder_down_to_the_least(cylinder: int, size: float) -> None:
-    share = watched(new(1), shaken([wave(size * LEVEL)], cylinder))[:, :, 0]
-    np.testing.assert_array_equal(share[:, 1 - cylinder], 1.0)
+def test_a_sustained_oscillation_lowers_the_fraction_of_its_own_cylinder_down_to_the_least(cylinder: int, size: float) -> None:
+    fraction = watched(new(1), shaken([wave(size * LEVEL)], cylinder))[:, :, 0]
+    np.testing.assert_array_equal(fraction[:, 1 - cylinder], 1.0)
     # Every half wave after the first two costs a tenth, a larger one more: known once the third has begun.
     half_waves = np.floor(20 * TIMES - 1e-9)
     expected = np.maximum(YIELDING ** (size * np.maximum(half_waves - 1, 0)), LEAST)
-    assert np.mean(np.abs(share[:, cylinder] - expected) < 1e-12) > 0.97, "but for the instants at which the sign changes"
-    assert share[-1, cylinder] == LEAST
-    assert np.all(np.diff(share[:, cylinder]) <= 0)
+    assert np.mean(np.abs(fraction[:, cylinder] - expected) < 1e-12) > 0.97, "but for the instants at which the sign changes"
+    assert fraction[-1, cylinder] == LEAST
+    assert np.all(np.diff(fraction[:, cylinder]) <= 0)
 
 
 @pytest.mark.parametrize("cylinder", [0, 1])
@@ -82,9 +82,9 @@ def test_an_oscillation_that_the_target_asks_for_costs_nothing() -> None:
     speeds = shaken([wave(4 * LEVEL)] * 2, 0) + shaken([wave(4 * LEVEL, 7.0)] * 2, 1)
     targets = speeds.copy()
     targets[:, :, 1] = 0.0
-    share = watched(new(2), speeds, targets)
-    np.testing.assert_array_equal(share[:, :, 0], 1.0)
-    np.testing.assert_array_equal(share[-1, :, 1], LEAST)
+    fraction = watched(new(2), speeds, targets)
+    np.testing.assert_array_equal(fraction[:, :, 0], 1.0)
+    np.testing.assert_array_equal(fraction[-1, :, 1], LEAST)
 
 
 def test_a_reset_gives_a_lane_its_authority_back_and_forgets_its_half_waves() -> None:

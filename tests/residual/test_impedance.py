@@ -159,7 +159,7 @@ def test_a_force_that_no_sensor_tells_of_meets_the_stiffness_that_the_policy_cho
 
 def test_the_stiffness_yields_with_the_authority() -> None:
     """Where one cylinder oscillates, on both axes: each axis moves both cylinders."""
-    shares = np.array([[1.0, 0.5, 1.0], [1.0, 1.0, 0.2]])
+    fractions = np.array([[1.0, 0.5, 1.0], [1.0, 1.0, 0.2]])
     law = ResidualLaw(closed_loop.FRICTIONLESS, ResidualSettings("backstepping", "variable_kp", time_constant=1e-4))
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 1000.0)
     plant = closed_loop.resting_at(wanted, closed_loop.FRICTIONLESS)
@@ -167,7 +167,7 @@ def test_the_stiffness_yields_with_the_authority() -> None:
     law.accept(np.repeat([[0.0], [0.0], [0.8], [0.4]], 3, axis=1))
     for _ in range(3):
         law.command(closed_loop.ideal(plant, 0.0, np.zeros((2, 3))), wanted)
-        law.limiter[[0, authority.CYLINDER]] = shares
+        law.limiter[[0, authority.CYLINDER]] = fractions
     least = [1.0, 0.5, 0.2]
     np.testing.assert_allclose(law.asked.stiffness, 1000 * 4.0 ** (np.outer([0.8, 0.4], least)), rtol=1e-3)
 
@@ -189,8 +189,8 @@ def test_the_last_entry_raises_the_damping_up_to_twice_and_lowers_it_never() -> 
             law.command(seen, wanted)
         factors.append(laws[0].told[4])
         assert not laws[1].told[4].any(), "a fixed impedance tells of no factor"
-    share = 1 - np.exp(-np.arange(200) / 50)[:, None]
-    np.testing.assert_allclose(factors, 2.0 ** np.maximum(share * actions[4], 0), rtol=1e-6)
+    fraction = 1 - np.exp(-np.arange(200) / 50)[:, None]
+    np.testing.assert_allclose(factors, 2.0 ** np.maximum(fraction * actions[4], 0), rtol=1e-6)
     assert MOST_DAMPING == 2.0
 
 

@@ -179,25 +179,25 @@ def test_the_feedforward_force_never_exceeds_the_authority_and_changes_at_the_co
 
 def test_oscillation_costs_authority_and_what_is_left_is_seen(told):
     """Lane 0 is shaken at 7 Hz with all that an action may say; lane 1 is left alone."""
-    env, actions, shares = lanes(2, PROBE, authority=400.0, duration=4.0), np.zeros((2, 2), np.float32), []
+    env, actions, fractions = lanes(2, PROBE, authority=400.0, duration=4.0), np.zeros((2, 2), np.float32), []
     env.reset(seed=0)
-    columns = [env.observation_names.index(f"share of the authority on cylinder {i}, 1") for i in (1, 2)]
+    columns = [env.observation_names.index(f"fraction of the authority on cylinder {i}, 1") for i in (1, 2)]
     for step in range(150):
         actions[0] = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
-        shares.append(env.step(actions)[0][:, columns].T)
-    shares, smooth = np.array(shares), np.zeros(2)
-    np.testing.assert_array_equal(shares[:, :, 1], 1.0)
-    assert np.all(np.diff(shares[:, :, 0], axis=0) <= 0)
-    assert shares[-1, :, 0].min() < 0.5
+        fractions.append(env.step(actions)[0][:, columns].T)
+    fractions, smooth = np.array(fractions), np.zeros(2)
+    np.testing.assert_array_equal(fractions[:, :, 1], 1.0)
+    assert np.all(np.diff(fractions[:, :, 0], axis=0) <= 0)
+    assert fractions[-1, :, 0].min() < 0.5
     for step in range(150):
         action = np.sign(np.sin(2 * np.pi * 7 * 0.01 * step + 0.1))
         for _ in range(10):
             believed = smooth
             smooth = smooth + (1 - np.exp(-1 / 28)) * (action - smooth)
-        # In the last period of a step the share was the one that the policy sees after it.
+        # In the last period of a step the fraction was the one that the policy sees after it.
         force, rate = told[10 * step + 9][:, 0].reshape(2, 2)
-        np.testing.assert_allclose(force, 400 * shares[step, :, 0] * believed, rtol=1e-5, atol=1e-9)
-        np.testing.assert_allclose(rate, 400 * shares[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
+        np.testing.assert_allclose(force, 400 * fractions[step, :, 0] * believed, rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(rate, 400 * fractions[step, :, 0] / 0.028 * (action - believed), rtol=1e-5)
 
 
 def test_an_ended_lane_starts_its_next_episode_with_no_feedforward_force(told, unguarded):
@@ -265,7 +265,7 @@ def test_observations_end_with_the_last_action_and_what_the_law_remembers(argume
     assert names[SIZE + size : SIZE + 2 * size] == [f"smoothed action: {name}" for name in said]
     word = "opening" if "law" in arguments else "believed force"
     assert [word in name for name in said[:2]] == [True, True]
-    assert all("share" in name for name in names[-8:-6])
+    assert all("fraction" in name for name in names[-8:-6])
     assert all(name.startswith("unexplained force on piston") for name in names[-6:])
     assert len(set(names)) == len(names)
     observation, _ = env.reset(seed=0)

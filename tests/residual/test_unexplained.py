@@ -101,8 +101,8 @@ def unexplained(truth: Array) -> tuple[Array, Array]:
     return weight, np.array([[rig.cylinder1.coulomb_friction, rig.cylinder2.coulomb_friction] for rig in RIGS]).T
 
 
-@pytest.mark.parametrize(("sensors", "share", "close"), [("ideal", 0.9, 1.0), ("lab", 0.5, 5.0)])
-def test_friction_opposes_both_ways_and_weight_neither(sensors: str, share: float, close: float) -> None:
+@pytest.mark.parametrize(("sensors", "fraction", "close"), [("ideal", 0.9, 1.0), ("lab", 0.5, 5.0)])
+def test_friction_opposes_both_ways_and_weight_neither(sensors: str, fraction: float, close: float) -> None:
     """Out: what is too heavy, less friction; in: the same and friction. Within 1 N of 57 N with exact sensors.
 
     But for the instants after a turn, while the observer finds out that friction has turned too.
@@ -119,10 +119,10 @@ def test_friction_opposes_both_ways_and_weight_neither(sensors: str, share: floa
                     window = np.flatnonzero(slides[:instant])[-200:]
                     expected = weight[window, cylinder, lane].mean() - sign * friction[cylinder, lane]
                     errors.append(abs(met[instant, 2 + 2 * way + cylinder, lane] - expected))
-        assert np.quantile(errors, share) < close
+        assert np.quantile(errors, fraction) < close
         fast = (np.abs(speed) > 0.02) & (np.arange(len(speed)) > 500)[:, None]
         expected = weight[:, cylinder] - np.sign(speed) * friction[cylinder]
-        assert np.quantile(np.abs(met[:, cylinder] - expected)[fast], share) < close
+        assert np.quantile(np.abs(met[:, cylinder] - expected)[fast], fraction) < close
     # Something was there to be told apart.
     assert np.ptp(met[-1, 2:]) > 50
 

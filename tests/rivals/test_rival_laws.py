@@ -28,13 +28,13 @@ TILTED = Parameters().replace(
 )  # fmt: skip
 
 
-def prepared(joints: Array, force: Array, rig: Parameters, share: float, force_rate: Array | float = 0.0) -> Array:
+def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, force_rate: Array | float = 0.0) -> Array:
     """``needed`` of ``prepare`` for a motion of the joints (8, N), whose jerk lacks the user's ``force_rate`` / m."""
     motion = derived.cartesian(joints, rig).rows[:8].copy()
     motion[6:8] -= force_rate / rig.mechanics.mass
     lanes = joints.shape[1]
     out = np.empty((4, lanes)), np.empty((8, lanes)), np.empty((NEEDED, lanes))
-    prepare(motion[:4].copy(), False, motion, force, parameter_column(rig), share, *out)
+    prepare(motion[:4].copy(), False, motion, force, parameter_column(rig), fraction, *out)
     np.testing.assert_allclose(out[0], joints[:4], atol=1e-12)
     np.testing.assert_allclose(out[1][:6], joints[:6], atol=1e-10)
     return out[2]
@@ -43,11 +43,11 @@ def prepared(joints: Array, force: Array, rig: Parameters, share: float, force_r
 @pytest.mark.parametrize("rig", [Parameters(), TILTED], ids=["default", "tilted"])
 def test_the_needed_force_gives_the_wanted_acceleration(rig: Parameters) -> None:
     """(5), derived in SymPy, with the smoothed friction of the reference and the user's force added by (17)."""
-    rng, lanes, share = np.random.default_rng(1), 50, 0.6
+    rng, lanes, fraction = np.random.default_rng(1), 50, 0.6
     joints = rng.normal(0, 1, (8, lanes)) * np.repeat([0.03, 0.1, 1.0, 10.0], 2)[:, None]
     force = rng.normal(0, 30, (2, lanes))
-    needed = prepared(joints, force, rig, share)
-    believed = {f"{c}.coulomb_friction": share * getattr(rig, c).coulomb_friction for c in ("cylinder1", "cylinder2")}
+    needed = prepared(joints, force, rig, fraction)
+    believed = {f"{c}.coulomb_friction": fraction * getattr(rig, c).coulomb_friction for c in ("cylinder1", "cylinder2")}
     acceleration = derived.accelerations(rig.replace(believed), SIGN_WIDTH, True)
     along = geometry.joint_force(force, joints[:2], rig)
     np.testing.assert_allclose(acceleration(*joints[:4], *(needed[:2] + along)), joints[4:6], atol=1e-9)
@@ -101,7 +101,7 @@ def test_pressure_setpoints_give_force_and_pneumatic_stiffness() -> None:
 def test_pid_openings_step_by_step() -> None:
     """First call: the integral takes what the chambers hold beyond F*. Second: it has grown by the error beyond the zone."""
     rig, gains = TILTED, {"bandwidth": 30.0, "damping": 0.8, "integral_rate": 4.0, "pressure_gain": 90.0}
-    law = PositionPID(rig, **gains, friction_share=0.5, dead_zone=3e-4)
+    law = PositionPID(rig, **gains, friction_fraction=0.5, dead_zone=3e-4)
     wanted = np.array([0.01, -0.04, 0, 0, 0, 0, 0, 0.0])[:, None]
     reference = derived.cartesian(wanted, rig)
     reference.rows[8:10], reference.rows[10:12] = 2000.0, closed_loop.PNEUMATIC_STIFFNESS
@@ -232,7 +232,7 @@ def test_lqr_moves_the_control_model_as_its_linear_model_says() -> None:
     """From 0.1 mm beside the target: every error follows exp((A - B k) t), sampled at 1 kHz."""
     rig, tolerances = FRICTIONLESS, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(
-        rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)), friction_share=0.0, dead_zone=0.0
+        rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)), friction_fraction=0.0, dead_zone=0.0
     )
     offset = np.array([1e-4, -1e-4])
     start, reference, rest, scale = beside_rest(rig, offset)
@@ -258,7 +258,7 @@ def test_sliding_mode_reaches_its_layer_when_predicted_and_decays_there() -> Non
     Weightless: the law takes the weight at the reference pose, and s would otherwise count what it changes on the way there.
     """
     rig, r, reaching, inside = FRICTIONLESS.replace({"mechanics.gravity": 0.0}), 25.0, 15.0, 60.0
-    law = SlidingMode(rig, surface_rate=r, reaching_rate=reaching, layer_rate=inside, friction_share=0.0, dead_zone=0.0)
+    law = SlidingMode(rig, surface_rate=r, reaching_rate=reaching, layer_rate=inside, friction_fraction=0.0, dead_zone=0.0)
     start, reference, _, scale = beside_rest(rig, np.array([-5e-4, 1.2e-3]))
     path = np.array(list(on_the_model(law, rig, start, reference, 0.7)))
     target = start[:2] - np.array([-5e-4, 1.2e-3])

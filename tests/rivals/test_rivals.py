@@ -72,11 +72,11 @@ def papers_law() -> float:
 
 
 @every_rival
-@pytest.mark.parametrize(("lab", "share"), [(False, 0.13), (True, 0.35)], ids=["ideal", "lab"])
-def test_a_rival_stays_on_the_circle(rival: type[TrackingController], lab: bool, share: float, papers_law: float) -> None:
+@pytest.mark.parametrize(("lab", "fraction"), [(False, 0.13), (True, 0.35)], ids=["ideal", "lab"])
+def test_a_rival_stays_on_the_circle(rival: type[TrackingController], lab: bool, fraction: float, papers_law: float) -> None:
     """Measured with exact sensors: PID 0.15, LQR 0.22, sliding mode 0.48 mm RMS; with the tracker 0.70, 0.62 and 1.3 mm."""
     typical, worst = circle_error(rivals(rival, 1)[0].command, HEAVY, lab)
-    assert typical < share * papers_law
+    assert typical < fraction * papers_law
     assert worst < 6e-3
 
 
@@ -245,4 +245,4 @@ def test_signals_over_different_lanes_are_refused(rival: type[TrackingController
 
 def test_rivals_go_by_name() -> None:
     for name, kind in zip(("pid", "lqr", "sliding-mode"), RIVALS, strict=True):
-        assert type(make_controller(name, Parameters(), friction_share=0.25)) is kind
+        assert type(make_controller(name, Parameters(), friction_fraction=0.25)) is kind

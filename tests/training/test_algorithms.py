@@ -114,7 +114,7 @@ def test_settings_reach_the_algorithm(algorithm):
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_the_average_forgets_over_a_twentieth_of_the_training(algorithm):
-    """One parameter steps from 0 to 1: what the average has taken up after a share of the steps is an exponential's."""
+    """One parameter steps from 0 to 1: what the average has taken up after a fraction of the steps is an exponential's."""
     between = 8 * (32 if algorithm == "ppo" else 1)
     model = made(replace(TINY, algorithm=algorithm, steps=20 * 25 * between))[0]
     first, averaged = (next(iter(policy.parameters())) for policy in (model.policy, model.average.module))

@@ -36,7 +36,7 @@ def test_the_interquartile_mean_is_scipys_trimmed_mean(size):
     assert interquartile_mean(values) == pytest.approx(stats.trim_mean(values, 0.25), rel=1e-12)
 
 
-def test_values_at_the_edge_of_the_middle_half_count_by_their_share():
+def test_values_at_the_edge_of_the_middle_half_count_by_their_fraction():
     # Of five the middle half is 2.5 wide: three quarters of the second, the third, three quarters of the fourth.
     assert interquartile_mean([1.0, 2.0, 4.0, 5.0, 100.0]) == pytest.approx((0.75 * 2 + 4 + 0.75 * 5) / 2.5)
     assert interquartile_mean([1.0, 2.0, 3.0, np.inf]) == 2.5

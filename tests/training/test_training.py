@@ -67,7 +67,7 @@ def rollout(env, act, seed):
 
 def steady(curve):
     """A learning curve without its clock, in the words of JSON, which knows that NaN is NaN."""
-    clock = {"seconds", "environment_share", "split"}
+    clock = {"seconds", "environment_fraction", "split"}
     return json.dumps([{name: value for name, value in point.items() if name not in clock} for point in curve])
 
 
@@ -107,7 +107,7 @@ def test_training_gets_better_than_the_law_and_keeps_what_was_best(trained):
     rollouts = 32 * 32
     assert [point["steps"] for point in curve] == [0, *(rollouts * np.ceil(np.array([15e3, 30e3]) / rollouts)).astype(int)]
     assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(curve))
-    assert all(0 < point["environment_share"] < 1 for point in curve[1:])
+    assert all(0 < point["environment_fraction"] < 1 for point in curve[1:])
     assert reached["settings"] == {**SMALL.to_dict(), **RESIDUAL.to_dict(), "rig": Parameters().to_dict()}
 
 
