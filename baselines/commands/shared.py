@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import gymnasium
 
@@ -13,17 +15,55 @@ RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario":
 """The option --randomize -> the environments' argument ``randomize``."""
 
 
+class Ended(KeyboardInterrupt):
+    """A signal asks this process to end; ``number`` is the signal's."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the terminal is gone"}
+"""Signal -> what a command says last; the second one ends it at once."""
+
+
 def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], None]) -> None:
-    """Parse, act, and turn what a user can mend into one line and exit status 2; an interrupt into 130."""
+    """Parse, act, and turn what a user can mend into one line and exit status 2; a signal of ``ENDINGS`` into 128 + its number.
+
+    SIGTERM and SIGHUP end a command as Ctrl-C does: what is complete is kept, and no process or half a file stays behind.
+    """
     arguments = parser.parse_args()
+    words = {signal.Signals[name].value: said for name, said in ENDINGS.items() if name in signal.Signals.__members__}
+    came: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        came.append(number)
+        if len(came) > 1:
+            os.write(2, f"{parser.prog}: {words[number]}\n".encode())
+            os._exit(128 + number)
+        raise Ended(number)
+
+    before = {number: signal.signal(number, end) for number in words}
     try:
         action(arguments)
-    except (ValueError, OSError) as error:
-        print(f"{parser.prog}: error: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        print(f"{parser.prog}: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except ValueError as error:
+        _say(parser, f"error: {error}", 2)
+    except OSError as error:
+        place = "" if error.filename is None else f"{str(error.filename)!r}: "
+        _say(parser, f"error: {place}{error.strerror or error}", 2)
+    except MemoryError:
+        _say(parser, "error: out of memory; allowed: fewer lanes, episodes or jobs", 2)
+    except KeyboardInterrupt as error:
+        number = error.number if isinstance(error, Ended) else int(signal.SIGINT)
+        _say(parser, words[number], 128 + number)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:
+    print(f"{parser.prog}: {words}", file=sys.stderr)
+    raise SystemExit(status) from None
 
 
 def whole(text: str) -> int:
