@@ -80,6 +80,27 @@ def seed_number(text: str) -> int:
     return int(text)
 
 
+JOBS = 2
+"""Processes side by side, unless --jobs says otherwise."""
+
+
+def add_processes(parser: argparse.ArgumentParser) -> None:
+    """Add ``--jobs`` and ``--cluster``."""
+    parser.add_argument("--jobs", type=whole, help=f"processes side by side (default: {JOBS})")
+    parser.add_argument(
+        "--cluster", metavar="ray[:ADDRESS]", help="Ray's workers instead, of a running cluster or of this machine"
+    )
+
+
+def shown_arguments(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The arguments that results depend on, as JSON."""
+    without = ("out", "jobs", "cluster")
+    return {
+        key: value if value is None or isinstance(value, (bool, int, list)) else str(value)
+        for key, value in vars(arguments).items() if key not in without
+    }  # fmt: skip
+
+
 def check_world(environment: str, **arguments: Any) -> None:
     """Raises ``ValueError`` for arguments with which no episode of an environment begins, before anything else is done."""
     env: Any = gymnasium.make(environment, **arguments)
