@@ -8,39 +8,26 @@ from typing import Any
 
 from baselines.side_by_side import LISTENING, ONE_THREAD
 
-ALLOWED = "allowed: ray, or ray:ADDRESS of a running cluster such as ray:10.0.0.1:6379"
-
-
-def check_cluster(cluster: str) -> str:
-    """The address in ``ray[:ADDRESS]``, "" where there is none; ``ValueError`` for anything else and where Ray is missing."""
-    kind, colon, address = cluster.partition(":")
-    if kind != "ray" or (colon and not address):
-        raise ValueError(f"--cluster {cluster!r}; {ALLOWED}")
-    try:
-        import ray  # noqa: F401
-    except ImportError as error:
-        raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
-    return address
-
 
 class RayPool:
-    """As many pieces at once as the cluster has processors; without an address the cluster is this machine's own.
+    """As many pieces at once as the cluster ``ray[:ADDRESS]`` has processors; without an address it is this machine's own.
 
     Every host needs the same version of this package, and what a piece names by path, such as a controller's file.
     """
 
     def __init__(self, cluster: str) -> None:
-        address = check_cluster(cluster)
-        import ray
-
-        self._ray = ray
+        try:
+            import ray
+        except ImportError as error:
+            raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
+        self._ray, address = ray, cluster.partition(":")[2]
         try:
             ray.init(
                 address=address or "local", log_to_driver=False, include_dashboard=False if not address else None,
                 runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
             )  # fmt: skip
         except ConnectionError as error:
-            raise ValueError(f"--cluster {cluster!r}: no cluster answers there; {ALLOWED}") from error
+            raise ValueError(f"--cluster {cluster!r}: no cluster answers there; allowed: ray, or the address of one") from error
         self.width = max(1, int(ray.cluster_resources().get("CPU", 1)))
         self._begun: set[Any] = set()
 
