@@ -29,17 +29,18 @@ class RayPool:
             import ray
         except ImportError as error:
             raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
-        self._ray, address = ray, cluster.partition(":")[2]
+        self._ray: Any = ray
+        address = cluster.partition(":")[2]
         if address:
             _check_that_it_answers(cluster, address)
         try:
-            ray.init(
+            self._ray.init(
                 address=address or "local", log_to_driver=False, include_dashboard=False if not address else None,
                 runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
             )  # fmt: skip
         except ConnectionError as error:
             raise ValueError(f"--cluster {cluster!r}: no cluster answers there; allowed: ray, or the address of one") from error
-        self.width = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        self.width = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         self._begun: set[Any] = set()
 
     def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
