@@ -79,6 +79,8 @@ pictures: $(READY)
 	$(BIN)/birthsim-animate --seed 1 --out docs/forceps.webp
 	$(BIN)/birthsim-evaluate --all --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
+	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
+	cp $(OUT)/robustness/map_0.png docs/robustness.png
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
