@@ -8,7 +8,6 @@ and frozen dataclasses are constants. Nothing in the dictionary can run.
 from __future__ import annotations
 
 import json
-from dataclasses import is_dataclass
 from enum import Enum
 from pathlib import PurePath
 from types import FunctionType, ModuleType
@@ -120,14 +119,16 @@ def _is_plain(value: Any) -> bool:
 def _is_constant(value: Any) -> bool:
     if isinstance(value, (type, ModuleType, FunctionType, PurePath, Enum, bytes, range, frozenset)):
         return True
-    if is_dataclass(value) and value.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+    parameters: Any = getattr(value, "__dataclass_params__", None)
+    if parameters is not None and parameters.frozen:
         return True
     return callable(value) and not _has_attributes(value)
 
 
 def _has_attributes(value: Any) -> bool:
     """Whether what an object keeps is in its attributes."""
-    return type(value).__reduce__ is object.__reduce__ and hasattr(value, "__dict__")
+    kind: Any = type(value)
+    return kind.__reduce__ is object.__reduce__ and hasattr(value, "__dict__")
 
 
 def _to_json(value: Any) -> Any:
@@ -159,13 +160,13 @@ def _decoded(state: State) -> dict[str, Any]:
 def _fits(before: Any, value: Any) -> bool:
     """Whether a value may stand where another one stood; tables may grow along their first axis, and empty ones anyhow."""
     if isinstance(before, np.random.Generator):
-        return isinstance(value, dict) and value.get("bit_generator") == before.bit_generator.state["bit_generator"]
+        return bool(isinstance(value, dict) and value.get("bit_generator") == before.bit_generator.state["bit_generator"])
     if not isinstance(value, np.ndarray) or not isinstance(before, (np.ndarray, np.generic)):
         return True
     if before.size == 0 or value.size == 0:
-        return before.dtype == value.dtype
+        return bool(before.dtype == value.dtype)
     same = before.shape == value.shape or (before.ndim > 1 and before.shape[1:] == value.shape[1:])
-    return before.dtype == value.dtype and same
+    return same and bool(before.dtype == value.dtype)
 
 
 def _foreign(why: str) -> ValueError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ def sealed(arrays: Arrays, about: dict[str, Any]) -> bytes:
     """The content of a file with ``arrays`` and ``about``, which is JSON; the same arguments give the same bytes."""
     # One entry: safetensors writes several in no fixed order.
     text = json.dumps({"sha256": _BLANK.decode(), **about})
-    content = save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, {_KEY: text})
+    content = save({name: np.asarray(array, order="C") for name, array in arrays.items()}, {_KEY: text})
     return content.replace(_BLANK, hashlib.sha256(content).hexdigest().encode(), 1)
 
 

@@ -38,7 +38,11 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
         "last": [model._last_obs, model._last_episode_starts, model._last_original_obs],
         "lanes": _adapter(env).get_state(),
         "memory": _memory(model),
-        "random": [torch.get_rng_state(), np.random.get_state(legacy=False), model.action_space.np_random.bit_generator.state],
+        "random": [
+            torch.get_rng_state(),
+            np.random.get_state(legacy=False),  # noqa: NPY002  Stable-Baselines3 draws its batches from it
+            model.action_space.np_random.bit_generator.state,
+        ],
     }
     arrays: Arrays = {}
     about = {"format": FORMAT, "settings": settings, "content": _flat("", content, arrays)}
@@ -59,8 +63,9 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
         arrays, about = unsealed(path.read_bytes(), FORMAT)
     except ValueError as error:
         raise ValueError(f"{str(path)!r} is {error}; {allowed}") from error
-    its_settings, own = about["settings"], json.loads(json.dumps(settings))
-    other = sorted(name for name in {*its_settings, *own} if its_settings.get(name) != own.get(name))
+    own = json.loads(json.dumps(settings))
+    its = about["settings"] if isinstance(about.get("settings"), dict) else {}
+    other = sorted(name for name in {*its, *own} if its.get(name) != own.get(name))
     if other:
         raise ValueError(
             f"{str(path)!r} is of a training with other {', '.join(other)}; allowed: the same settings, or a folder of its own"
@@ -91,7 +96,7 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
             getattr(buffer, name)[: len(memory[name])] = memory[name]
     of_torch, of_numpy, of_actions = content["random"]
     torch.set_rng_state(torch.from_numpy(of_torch))
-    np.random.set_state(of_numpy)
+    np.random.set_state(of_numpy)  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = of_actions
     past: dict[str, Any] = content["past"]
     return past

@@ -51,8 +51,8 @@ class Monitor(BaseCallback):
             self._due, self._best = 0.0, b""
             if self._reached["law"]["infeasible"] == env.num_envs:
                 raise ValueError(
-                    f"all {env.num_envs} validation worlds ask for more than the rig's strength, so that no policy could be told "
-                    "from another; allowed: a rig that is stronger or carries less, milder randomization, or another environment"
+                    f"all {env.num_envs} validation worlds ask for more than the rig's strength, so that no policy could be "
+                    "told from another; allowed: a stronger rig, milder randomization, or another environment"
                 )
         else:
             self._reached, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()

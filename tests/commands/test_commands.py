@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from agents.policy.files import WEIGHTS
+from agents.policy.files import NAME
 from agents.policy.seeds import policy_folders
 from baselines.files import write_json
 from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
@@ -51,7 +51,7 @@ def test_the_scripts_of_the_package_are_these_commands():
             "train",
             (
                 *("config", "env", "algorithm", "law", "impedance", "steps", "until", "seed", "seeds", "jobs", "sensors"),
-                *("randomize", "authority", "parameters", "resume", "out"),
+                *("randomize", "authority", "parameters", "out"),
             ),
         ),
     ],
@@ -70,9 +70,9 @@ def damaged(tmp_path_factory):
     """A policy folder with a flipped byte."""
     folder = tmp_path_factory.mktemp("policies") / "damaged"
     shutil.copytree(policy_folders("circle")[0], folder)
-    content = bytearray((folder / WEIGHTS).read_bytes())
+    content = bytearray((folder / NAME).read_bytes())
     content[-1] ^= 1
-    (folder / WEIGHTS).write_bytes(content)
+    (folder / NAME).write_bytes(content)
     return folder
 
 
@@ -89,7 +89,11 @@ BAD = [
     ("evaluate", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
     ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that"),
     ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim-train wrote"),
-    ("evaluate", ("--controller", "residual", "--policy", "{damaged}"), "policy.safetensors is not the file that policy.json"),
+    (
+        "evaluate",
+        ("--controller", "residual", "--policy", "{damaged}"),
+        "policy.safetensors is damaged: its checksum is of another",
+    ),
     ("evaluate", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
     ("evaluate", ("--episodes", "-3"), "--episodes: '-3'; allowed: a whole number >= 1"),
     ("evaluate", ("--episodes", "some"), "--episodes: 'some'; allowed: a whole number >= 1"),
