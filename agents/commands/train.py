@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,12 @@ def _train(arguments: argparse.Namespace) -> None:
     ]
     print(described(rig, training.randomize))
     results: dict[int, dict[str, Any]] = {}
-    side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    try:
+        side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    except BaseException:
+        if arguments.jobs > 1:
+            print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
+        raise
     _report(training, residual, list(seeds), [results[k] for k in range(len(work))])
     print(f"written to {arguments.out}/")
 

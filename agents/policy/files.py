@@ -16,7 +16,7 @@ from agents.residual.settings import ResidualSettings
 from baselines.files import finite, whole_file
 
 FORMAT = "birthsim-residual-3"
-NAME = "policy.safetensors"
+WEIGHTS = "policy.safetensors"
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,20 @@ def policy_content(policy: Policy) -> bytes:
 def save_policy(policy: Policy | bytes, folder: Path) -> None:
     """Write the file of a policy, or of its content; it appears whole or not at all."""
     folder.mkdir(parents=True, exist_ok=True)
-    with whole_file(folder / NAME) as file:
+    with whole_file(folder / WEIGHTS) as file:
         file.write(policy if isinstance(policy, bytes) else policy_content(policy))
 
 
 def load_policy(folder: str | Path) -> Policy:
     """Read a policy folder; raises ``ValueError`` that says what is missing, damaged or foreign."""
     folder = Path(folder)
-    allowed = f"allowed: a folder that birthsim-train wrote, with {NAME}"
-    if not (folder / NAME).is_file():
-        raise ValueError(f"policy = {str(folder)!r} has no {NAME}; {allowed}")
+    allowed = f"allowed: a folder that birthsim-train wrote, with {WEIGHTS}"
+    if not (folder / WEIGHTS).is_file():
+        raise ValueError(f"policy = {str(folder)!r} has no {WEIGHTS}; {allowed}")
     try:
-        arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+        arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
     except ValueError as error:
-        raise ValueError(f"policy = {str(folder)!r}: {NAME} is {error}; {allowed}") from error
+        raise ValueError(f"policy = {str(folder)!r}: {WEIGHTS} is {error}; {allowed}") from error
     try:
         count = sum(name.endswith(".weight") for name in arrays)
         layers = tuple((arrays[f"{k}.weight"], arrays[f"{k}.bias"]) for k in range(count))

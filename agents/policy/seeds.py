@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.policy.files import NAME, load_policy
+from agents.policy.files import WEIGHTS, load_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, number, penalize_lost, quantile
@@ -32,10 +32,10 @@ def policy_folders(path: str | Path) -> list[Path]:
     Raises ``ValueError`` where there is none.
     """
     folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(path)
-    if (folder / NAME).is_file():
+    if (folder / WEIGHTS).is_file():
         return [folder]
     found = sorted(
-        (place.parent for place in folder.glob(f"seed_*/{NAME}") if place.parent.name.removeprefix("seed_").isdecimal()),
+        (place.parent for place in folder.glob(f"seed_*/{WEIGHTS}") if place.parent.name.removeprefix("seed_").isdecimal()),
         key=lambda place: int(place.name.removeprefix("seed_")),
     )
     if not found:

@@ -10,12 +10,13 @@ import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy.files import NAME as POLICY
+from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.algorithms import make_model
 from agents.training.checkpoint import NAME as CHECKPOINT
 from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
+from agents.training.events import EVENTS, events_in
 from agents.training.monitor import Monitor, described
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.shifted_reward import ShiftedReward
@@ -40,7 +41,7 @@ def train(
     and without its checkpoint, and where no validation world is within the rig's strength.
     """
     if not (folder / CHECKPOINT).exists():
-        for name in (POLICY, "training.json"):
+        for name in (WEIGHTS, "training.json"):
             if (folder / name).exists():
                 raise ValueError(f"{str(folder)!r} has {name} but not its {CHECKPOINT}; allowed: another folder")
     torch.set_num_threads(1)
@@ -57,7 +58,7 @@ def train(
     # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
     paid = ShiftedReward(env, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else env
     normalized = VecNormalize(paid, gamma=settings.discount)
-    model = make_model(settings, normalized, str(folder / "tensorboard"))
+    model = make_model(settings, normalized, str(folder / EVENTS))
     normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
     past = load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))
     done = model.num_timesteps
@@ -66,7 +67,8 @@ def train(
     callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
     try:
         if done < settings.steps and not callback.enough:
-            model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
+            with events_in(folder / EVENTS):
+                model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
     except KeyboardInterrupt:
         print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
         raise

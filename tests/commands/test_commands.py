@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from agents.policy.files import NAME
+from agents.policy.files import WEIGHTS
 from agents.policy.seeds import policy_folders
 from baselines.files import write_json
 from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
@@ -70,9 +70,9 @@ def damaged(tmp_path_factory):
     """A policy folder with a flipped byte."""
     folder = tmp_path_factory.mktemp("policies") / "damaged"
     shutil.copytree(policy_folders("circle")[0], folder)
-    content = bytearray((folder / NAME).read_bytes())
+    content = bytearray((folder / WEIGHTS).read_bytes())
     content[-1] ^= 1
-    (folder / NAME).write_bytes(content)
+    (folder / WEIGHTS).write_bytes(content)
     return folder
 
 

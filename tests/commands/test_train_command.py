@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.policy.files import NAME, load_policy
+from agents.policy.files import WEIGHTS, load_policy
 from agents.training.checkpoint import NAME as CHECKPOINT
 from baselines.files import own_folder
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
@@ -17,7 +17,7 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
     assert done.returncode == 0, done.stderr
     assert [path.name for path in folder.iterdir()] == ["seed_3"]
     own = folder / "seed_3"
-    assert {path.name for path in own.iterdir()} - {".lock"} == {NAME, CHECKPOINT, "training.json", "tensorboard"}
+    assert {path.name for path in own.iterdir()} - {".lock"} == {WEIGHTS, CHECKPOINT, "training.json", "tensorboard"}
     reached, policy = strict(own / "training.json"), load_policy(own)
     assert policy.training["reached"] == reached["policy"]
     assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 3)
@@ -60,7 +60,7 @@ def test_train_goes_on_where_its_folder_stopped_and_refuses_the_folder_of_anothe
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
     assert after == before
     # A policy that came from elsewhere is not written over.
-    for name in (NAME, "training.json"):
+    for name in (WEIGHTS, "training.json"):
         own = tmp_path / name.partition(".")[0] / "seed_3"
         own.mkdir(parents=True)
         (own / name).write_bytes((folder / "seed_3" / name).read_bytes())
@@ -95,7 +95,7 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
     # A seed trained alone, in this very process, becomes the same policy.
     status, _, complained = call("train", monkeypatch, capsys, *options, "--seed", 6, "--out", tmp_path / "alone")
     assert status == 0, complained
-    alone, together = ((tmp_path / place / "seed_6" / NAME).read_bytes() for place in ("alone", "out"))
+    alone, together = ((tmp_path / place / "seed_6" / WEIGHTS).read_bytes() for place in ("alone", "out"))
     assert alone == together
     evaluate = ("--env", "BirthSIM/Probe-v1", "--policy", tmp_path / "out", "--episodes", 1, "--out", tmp_path / "evaluated")
     status, printed, complained = call("evaluate", monkeypatch, capsys, *evaluate)

@@ -16,7 +16,7 @@ from safetensors import safe_open
 from safetensors.numpy import load, save
 
 from agents.policy.controller import ResidualController, observation_size
-from agents.policy.files import FORMAT, NAME, Policy, load_policy, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
@@ -49,16 +49,16 @@ def folder(tmp_path):
 
 def rewrite(folder, **changes):
     """Change what is said about the arrays, and vouch for the result; None removes an entry."""
-    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
     about = {name: value for name, value in {**about, **changes}.items() if value is not None}
-    (folder / NAME).write_bytes(sealed(arrays, about))
+    (folder / WEIGHTS).write_bytes(sealed(arrays, about))
 
 
 def replace_arrays(folder, **changes):
     """Change arrays (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
-    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
     arrays = {**arrays, **{name.replace("_", "."): value for name, value in changes.items()}}
-    (folder / NAME).write_bytes(sealed({name: value for name, value in arrays.items() if value is not None}, about))
+    (folder / WEIGHTS).write_bytes(sealed({name: value for name, value in arrays.items() if value is not None}, about))
 
 
 def assert_refused(folder, message):
@@ -75,7 +75,7 @@ def assert_refused(folder, message):
 
 def test_a_round_trip_is_exact(folder):
     read = load_policy(folder)
-    assert sorted(path.name for path in folder.iterdir()) == [NAME]
+    assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
     assert (read.environment, read.settings, read.training) == (ENVIRONMENT, SETTINGS, POLICY.training)
     for name in ("mean", "variance"):
         np.testing.assert_array_equal(getattr(read.network, name), getattr(POLICY.network, name), strict=True)
@@ -128,10 +128,10 @@ def about_as_others_read_it(path):
 def test_others_read_arrays_and_json(tmp_path):
     """Some figures say nothing, hunting where the reference never rests; JSON has no word for NaN but null."""
     save_policy(Policy(network(), ENVIRONMENT, SETTINGS, {"reached": {"hunting_mm": float("nan")}}), tmp_path)
-    about = about_as_others_read_it(tmp_path / NAME)
+    about = about_as_others_read_it(tmp_path / WEIGHTS)
     assert about["training"]["reached"]["hunting_mm"] is None
     assert (about["format"], about["environment"], len(about["sha256"])) == (FORMAT, ENVIRONMENT, 64)
-    np.testing.assert_array_equal(load((tmp_path / NAME).read_bytes())["mean"], network().mean)
+    np.testing.assert_array_equal(load((tmp_path / WEIGHTS).read_bytes())["mean"], network().mean)
 
 
 def test_the_same_policy_is_the_same_bytes_in_another_process(folder):
@@ -141,7 +141,7 @@ def test_the_same_policy_is_the_same_bytes_in_another_process(folder):
     )
     again = folder.parent / "again"
     subprocess.run([sys.executable, "-c", program, str(folder), str(again)], cwd=ROOT, check=True)
-    assert (again / NAME).read_bytes() == (folder / NAME).read_bytes()
+    assert (again / WEIGHTS).read_bytes() == (folder / WEIGHTS).read_bytes()
 
 
 def test_eleven_layers_come_back_in_order(tmp_path):
@@ -158,7 +158,7 @@ def test_writing_again_replaces_the_policy_whole(folder):
     read = load_policy(folder)
     assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v1", {"steps": 9})
     assert len(read.network.layers) == 2
-    assert sorted(path.name for path in folder.iterdir()) == [NAME]
+    assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
 
 
 def test_a_write_that_is_cut_off_leaves_the_old_file(folder, monkeypatch):
@@ -169,18 +169,18 @@ def test_a_write_that_is_cut_off_leaves_the_old_file(folder, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         save_policy(Policy(network(hidden=(4,), seed=5), ENVIRONMENT, ResidualSettings(), {}), folder)
     assert load_policy(folder).settings == SETTINGS
-    assert [path.name for path in folder.iterdir()] == [NAME]
+    assert [path.name for path in folder.iterdir()] == [WEIGHTS]
 
 
 def test_a_folder_without_a_policy_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "empty").mkdir()
     for name in ("file", "empty", "nowhere"):
-        assert_refused(tmp_path / name, rf"has no {NAME}; allowed: a folder that birthsim-train wrote, with {NAME}")
+        assert_refused(tmp_path / name, rf"has no {WEIGHTS}; allowed: a folder that birthsim-train wrote, with {WEIGHTS}")
 
 
 def test_every_flipped_bit_is_noticed(folder):
-    content = (folder / NAME).read_bytes()
+    content = (folder / WEIGHTS).read_bytes()
     # All of the header's bytes, and some of the arrays'.
     header = 8 + int.from_bytes(content[:8], "little")
     rng = np.random.default_rng(0)
@@ -189,30 +189,30 @@ def test_every_flipped_bit_is_noticed(folder):
         flipped[place] ^= 1 << int(rng.integers(8))
         with pytest.raises(ValueError, match=r"^(no birthsim-residual-3 or )?damaged"):
             unsealed(bytes(flipped), FORMAT)
-    (folder / NAME).write_bytes(flipped)
+    (folder / WEIGHTS).write_bytes(flipped)
     assert_refused(
-        folder, f"{NAME} is damaged: its checksum is of another content; allowed: a folder that birthsim-train wrote"
+        folder, f"{WEIGHTS} is damaged: its checksum is of another content; allowed: a folder that birthsim-train wrote"
     )
 
 
 def test_a_file_that_is_cut_off_or_longer_is_noticed(folder):
-    content = (folder / NAME).read_bytes()
+    content = (folder / WEIGHTS).read_bytes()
     for part in (content[:-4], content[:20], b"", content + b"0", content[:200]):
-        (folder / NAME).write_bytes(part)
+        (folder / WEIGHTS).write_bytes(part)
         assert_refused(folder, "damaged")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1, 2]", "3", "null", '{"format": 3}', "\xff", '{"a": ' * 5000])
 def test_what_is_said_about_other_arrays_is_refused(folder, text):
     for metadata in (None, {"other": text}, {"birthsim": text}):
-        (folder / NAME).write_bytes(save({"mean": np.zeros(3)}, metadata))
-        assert_refused(folder, f"{NAME} is no {FORMAT} or damaged; allowed: a folder that birthsim-train wrote")
+        (folder / WEIGHTS).write_bytes(save({"mean": np.zeros(3)}, metadata))
+        assert_refused(folder, f"{WEIGHTS} is no {FORMAT} or damaged; allowed: a folder that birthsim-train wrote")
 
 
 @pytest.mark.parametrize("form", ["other-1", "birthsim-residual-4", "birthsim-checkpoint-1", 3, None, ["birthsim"]])
 def test_another_format_is_called_foreign(folder, form):
-    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
-    (folder / NAME).write_bytes(sealed(arrays, {**about, "format": form}))
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    (folder / WEIGHTS).write_bytes(sealed(arrays, {**about, "format": form}))
     assert_refused(folder, rf"of the foreign format .*, not '{FORMAT}'")
 
 
@@ -312,7 +312,7 @@ class Trap:
 
 def test_a_pickle_under_another_name_is_refused_and_not_opened(folder, tmp_path):
     trap = tmp_path / "sprung"
-    (folder / NAME).write_bytes(pickle.dumps(Trap(trap)))
+    (folder / WEIGHTS).write_bytes(pickle.dumps(Trap(trap)))
     assert_refused(folder, f"is no {FORMAT} or damaged")
     assert not trap.exists()
     # The trap is a real one.

@@ -13,7 +13,7 @@ from itertools import pairwise
 import gymnasium
 import pytest
 
-from agents.policy.files import NAME as POLICY
+from agents.policy.files import WEIGHTS
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor
 from agents.training import trainer as training
@@ -81,14 +81,14 @@ STEP, CHECK, ROLLOUT = "_on_step", "_check", "_on_rollout_start"
 def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, monkeypatch, capsys, changes, places):
     settings = replace(TINY, **changes)
     expected = train(settings, RESIDUAL, tmp_path / "whole")
-    policy = (tmp_path / "whole" / POLICY).read_bytes()
+    policy = (tmp_path / "whole" / WEIGHTS).read_bytes()
     for k, (method, count) in enumerate(places):
         folder = tmp_path / str(k)
         killed(monkeypatch, settings, folder, method, count)
         capsys.readouterr()
         reached = train(settings, RESIDUAL, folder)
         assert "steps are there and are kept" in capsys.readouterr().out
-        assert (folder / POLICY).read_bytes() == policy
+        assert (folder / WEIGHTS).read_bytes() == policy
         assert steady(reached["curve"]) == steady(expected["curve"])
         assert steady([reached["law"], reached["policy"]]) == steady([expected["law"], expected["policy"]])
         assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(reached["curve"]))
@@ -101,7 +101,7 @@ def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch)
         killed(monkeypatch, TINY, tmp_path / "cut", "_on_step", 40)
     reached = train(TINY, RESIDUAL, tmp_path / "cut")
     assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / POLICY).read_bytes() == (tmp_path / "whole" / POLICY).read_bytes()
+    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
 
 
 @pytest.mark.usefixtures("brief")
@@ -120,10 +120,10 @@ def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, na
         patch.setattr(monitor, name, dies)
         with pytest.raises(Killed):
             train(TINY, RESIDUAL, tmp_path / "cut")
-    (tmp_path / "cut" / POLICY).unlink()
+    (tmp_path / "cut" / WEIGHTS).unlink()
     reached = train(TINY, RESIDUAL, tmp_path / "cut")
     assert steady(reached["curve"]) == steady(expected["curve"])
-    assert (tmp_path / "cut" / POLICY).read_bytes() == (tmp_path / "whole" / POLICY).read_bytes()
+    assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
 
 
 @pytest.mark.usefixtures("brief")
@@ -171,5 +171,5 @@ def test_a_process_that_is_killed_ends_with_the_same_policy(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "of 4,096 steps are there and are kept" in done.stdout
     cut, whole = (tmp_path / place / "seed_0" for place in ("out", "whole"))
-    assert (cut / POLICY).read_bytes() == (whole / POLICY).read_bytes()
+    assert (cut / WEIGHTS).read_bytes() == (whole / WEIGHTS).read_bytes()
     assert steady(strict(cut / "training.json")["curve"]) == steady(strict(whole / "training.json")["curve"])

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import threading
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -12,7 +15,7 @@ import numpy as np
 import pytest
 
 from agents.policy.controller import ResidualController
-from agents.policy.files import NAME, load_policy
+from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor, validation
 from agents.training import trainer as training
@@ -168,6 +171,31 @@ def test_every_validation_is_in_the_events_at_its_own_step(trained, events):
     assert set(events["validation/pooled_mm"]) == {point["steps"] for point in reached["curve"]}
 
 
+@pytest.mark.parametrize("writes", [0, 1, 5, 30])
+def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_path, monkeypatch, capsys, short_probe, writes):
+    """TensorBoard writes in a thread of its own."""
+    from tensorboard.summary.writer.record_writer import RecordWriter
+
+    done, write = [], RecordWriter.write
+
+    def full(self, data):
+        done.append(data)
+        if len(done) > writes:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(self, data)
+
+    hook = threading.excepthook
+    with monkeypatch.context() as patch:
+        patch.setattr(RecordWriter, "write", full)
+        with pytest.raises(OSError, match="No space left on device") as caught:
+            train(BRIEF, RESIDUAL, tmp_path)
+    assert caught.value.filename == str(tmp_path / "tensorboard")
+    assert "Traceback" not in capsys.readouterr().err
+    assert threading.excepthook is hook
+    # With room again, the same command goes on.
+    assert train(BRIEF, RESIDUAL, tmp_path)["curve"][-1]["steps"] == BRIEF.steps
+
+
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
@@ -176,7 +204,7 @@ def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_pa
     )
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
         reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
-        results.append((reached["curve"], (tmp_path / name / NAME).read_bytes()))
+        results.append((reached["curve"], (tmp_path / name / WEIGHTS).read_bytes()))
     (one, file), (again, twin), (other, stranger) = results
     assert steady(one) == steady(again)
     assert file == twin
@@ -331,7 +359,7 @@ def test_a_training_that_could_not_tell_policies_apart_does_not_begin(tmp_path, 
         ValueError, match=r"all 4 validation worlds ask for more than the rig's strength.*; allowed: a stronger rig"
     ):
         train(BRIEF, RESIDUAL, tmp_path)
-    assert not (tmp_path / NAME).exists()
+    assert not (tmp_path / WEIGHTS).exists()
 
 
 def test_a_score_pools_lanes_by_their_mean_square():
