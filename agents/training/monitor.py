@@ -56,7 +56,7 @@ class Monitor(BaseCallback):
                 )
         else:
             self._reached, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
-            save_policy(self._best, folder)
+            self.keep()
         curve = self._reached["curve"]
         self._before = curve[-1]["seconds"] if curve else 0.0
         self._bar = tqdm(
@@ -125,7 +125,11 @@ class Monitor(BaseCallback):
         past = {"reached": self._reached, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
         save_checkpoint(self._folder, self.model, self.training_env, self.describe(), past)  # type: ignore[arg-type]
         if self._reached["policy"] is figures:
-            save_policy(self._best, self._folder)
+            self.keep()
+
+    def keep(self) -> None:
+        """Write the best policy so far."""
+        save_policy(self._best, self._folder)
 
     def describe(self) -> dict[str, Any]:
         """The settings that a checkpoint must share."""

@@ -70,7 +70,9 @@ def train(
             with events_in(folder / EVENTS):
                 model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
     except KeyboardInterrupt:
-        print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
+        if (folder / CHECKPOINT).exists():
+            callback.keep()
+            print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
         raise
     finally:
         callback.close()

@@ -153,7 +153,7 @@ BAD = [
     ("train", ("--authority", "nan"), "authority = nan; allowed: more than 0, at most 500"),
     ("train", ("--randomize", "some"), "--randomize: invalid choice: 'some' (choose from"),
     ("train", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 (kg)"),
-    ("train", ("--out", "{tmp}/own.py"), "own.py/seed_0'"),
+    ("train", ("--out", "{tmp}/own.py"), "own.py' is a file; allowed: a folder"),
 ]
 
 

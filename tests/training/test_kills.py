@@ -13,11 +13,11 @@ from itertools import pairwise
 import gymnasium
 import pytest
 
-from agents.policy.files import WEIGHTS
+from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor
 from agents.training import trainer as training
-from agents.training.checkpoint import NAME
+from agents.training.checkpoint import NAME, save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
 from tests.console import COMMANDS, PATIENCE, ROOT, run, strict
@@ -124,6 +124,19 @@ def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, na
     reached = train(TINY, RESIDUAL, tmp_path / "cut")
     assert steady(reached["curve"]) == steady(expected["curve"])
     assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
+
+
+@pytest.mark.usefixtures("brief")
+def test_an_interrupt_between_the_two_files_writes_the_policy_as_well(tmp_path, monkeypatch, capsys):
+    def interrupted(*args):
+        save_checkpoint(*args)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(monitor, "save_checkpoint", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(TINY, RESIDUAL, tmp_path)
+    assert "interrupted after 0 steps: policy and checkpoint are kept in " in capsys.readouterr().out
+    assert load_policy(tmp_path).settings == RESIDUAL
 
 
 @pytest.mark.usefixtures("brief")
