@@ -92,9 +92,9 @@ compare: $(READY)
 
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
-	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --resume --out $(OUT)/training/$$name || exit 1; \
+	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; \
 	  for seed in 0 1 2 3 4; do mkdir -p $(POLICIES)/$$name/seed_$$seed && \
-	    cp $(OUT)/training/$$name/seed_$$seed/policy.* $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
+	    cp $(OUT)/training/$$name/seed_$$seed/policy.safetensors $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
 
 learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
