@@ -82,8 +82,8 @@ oldest: $(READY)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests
-	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests
+	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci
+	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 

@@ -1,6 +1,7 @@
 """A bill of materials (CycloneDX, JSON): the installed environment, and the files of others that the wheel itself carries.
 
-``sbom.py PYTHON OUT``: PYTHON is the interpreter of the environment, OUT the file to write. cyclonedx-py must stand beside the interpreter that runs this.
+``sbom.py PYTHON OUT``: PYTHON is the interpreter of the environment, OUT the file to write. cyclonedx-py must stand beside the
+interpreter that runs this.
 """
 
 from __future__ import annotations
@@ -34,11 +35,18 @@ def uplot() -> dict[str, Any]:
     ]
     licence = [{"license": {"id": "MIT"}}]
     return {
-        "type": "library", "bom-ref": reference, "purl": reference, "name": "uplot", "version": found[1], "licenses": licence, "components": files
-    }  # fmt: skip
+        "type": "library",
+        "bom-ref": reference,
+        "purl": reference,
+        "name": "uplot",
+        "version": found[1],
+        "licenses": licence,
+        "components": files,
+    }
 
 
 def main(python: str, out: str) -> None:
+    """Writes the bill."""
     tool = Path(sys.executable).with_name("cyclonedx-py")
     command = [str(tool), "environment", python, "--pyproject", str(ROOT / "pyproject.toml"), "--output-reproducible"]
     done = subprocess.run([*command, "--gather-license-texts"], check=True, capture_output=True, text=True)

@@ -1,7 +1,7 @@
 """Real clients, each in a virtual environment of its own, on the wheel that a release would publish.
 
-``python -m tests.weekly [NAME ...] [--keep] [--out FOLDER]``. One client after another: a fresh environment, the wheel, the client, its tests, and
-the environment is removed (``--keep`` leaves it), so that the disk holds one of them, up to 2.5 GB.
+``python -m tests.weekly [NAME ...] [--keep] [--out FOLDER]``. One client after another gets a fresh environment, the wheel and
+its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ ROOT = HERE.parent.parent
 class Client:
     """What stands in the client's environment beside the wheel.
 
-    ``alone`` are packages whose own demands are left out; ``freed`` are names of ``constraints.txt`` that the client needs otherwise.
+    ``alone`` are packages that are installed without what they ask for. ``freed`` are names of ``constraints.txt`` that the
+    client needs in another version.
     """
 
     extras: str
@@ -40,7 +41,8 @@ CLIENTS = {
     "torchrl": Client(extras="[agents]", needs=("torchrl==0.14.1",)),
     # Never ray[rllib]: it pins gymnasium 1.2.2. These are what RLlib imports.
     "rllib": Client(
-        extras="[agents]", needs=("ray==2.60.0", "dm-tree", "lz4", "ormsgpack", "pyarrow", "pandas", "tensorboardX", "pydantic", "requests")
+        extras="[agents]",
+        needs=("ray==2.60.0", "dm-tree", "lz4", "ormsgpack", "pyarrow", "pandas", "tensorboardX", "pydantic", "requests"),
     ),
     # Its table writer asks for python-dateutil below 3; its player imports requests without asking for it.
     "rl_zoo": Client(extras="[agents]", needs=("rl_zoo3==2.9.2", "requests"), freed=("python-dateutil",)),
@@ -50,7 +52,9 @@ CLIENTS = {
 def wheel(out: Path) -> Path:
     """Builds the wheel of this checkout."""
     shutil.rmtree(out, ignore_errors=True)
-    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(out), str(ROOT)], check=True)
+    subprocess.run(
+        [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(out), str(ROOT)], check=True
+    )
     return next(out.glob("birthsim-*.whl"))
 
 
@@ -85,7 +89,18 @@ def attempt(name: str, built: Path, out: Path, keep: bool) -> bool:
         return False
     installed = time.perf_counter()
     # -P: the checkout in the working directory or beside the tests must not take the place of the wheel.
-    tests = [str(python), "-P", "-m", "pytest", "-c", str(HERE / "pytest.ini"), "--rootdir", str(HERE), "--confcutdir", str(HERE)]
+    tests = [
+        str(python),
+        "-P",
+        "-m",
+        "pytest",
+        "-c",
+        str(HERE / "pytest.ini"),
+        "--rootdir",
+        str(HERE),
+        "--confcutdir",
+        str(HERE),
+    ]
     fine = subprocess.run(
         [*tests, "--basetemp", str(folder / "temporary"), str(HERE / f"test_{name}.py")],
         cwd=folder / "work",

@@ -22,6 +22,7 @@ def pytest_sessionstart():
 @pytest.fixture
 def example():
     """Runs a file of ``examples/`` on the stiffness test and returns the scores it prints."""
+
     def run(name, steps=45_000):
         command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v1", str(steps)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)

@@ -17,10 +17,19 @@ STEPS = 150_000
 def trained(tmp_path_factory):
     """The file's own names after a training.
 
-    It was written for Gymnasium 0.28, where ``TransformObservation`` took two arguments. Gymnasium 1 wants the space too; this is all that is mended.
+    It was written for Gymnasium 0.28, where ``TransformObservation`` took two arguments. Gymnasium 1 wants the space too.
+    Nothing else is mended.
     """
     file = Path(importlib.util.find_spec("cleanrl").submodule_search_locations[0]) / "ppo_continuous_action.py"
-    settings = {"num-envs": 16, "num-steps": 128, "num-minibatches": 8, "gamma": 0.96, "learning-rate": 1e-3, "anneal-lr": False, "cuda": False}
+    settings = {
+        "num-envs": 16,
+        "num-steps": 128,
+        "num-minibatches": 8,
+        "gamma": 0.96,
+        "learning-rate": 1e-3,
+        "anneal-lr": False,
+        "cuda": False,
+    }
     arguments = [f"--{name}={value}" for name, value in settings.items()]
     torch.set_num_threads(1)
     with pytest.MonkeyPatch.context() as patch:

@@ -61,7 +61,19 @@ def test_the_checker_has_nothing_to_say(name):
         lambda env: wrappers.TransformObservation(env, lambda observation: observation, env.observation_space),
         lambda env: wrappers.Autoreset(env),
     ],
-    ids=["clip", "flatten", "checker", "order", "statistics", "rescale", "dtype", "limit", "reward", "observation", "autoreset"],
+    ids=[
+        "clip",
+        "flatten",
+        "checker",
+        "order",
+        "statistics",
+        "rescale",
+        "dtype",
+        "limit",
+        "reward",
+        "observation",
+        "autoreset",
+    ],
 )
 def test_a_wrapper_that_changes_nothing_changes_no_bit(wrap, actions, bare):
     seen, paid = rollout(wrap(circle()), actions)
@@ -140,7 +152,9 @@ def test_both_vector_environments_run_as_the_native_one(name, vector):
 
 def test_vector_wrappers_say_the_same_of_both():
     def wrapped(worlds):
-        return wrappers.vector.NormalizeReward(wrappers.vector.NormalizeObservation(wrappers.vector.RecordEpisodeStatistics(worlds)))
+        return wrappers.vector.NormalizeReward(
+            wrappers.vector.NormalizeObservation(wrappers.vector.RecordEpisodeStatistics(worlds))
+        )
 
     name, lanes = "BirthSIM/Probe-v1", 4
     native = wrapped(gym.make_vec(name, num_envs=lanes, randomize=True, max_episode_steps=30))
