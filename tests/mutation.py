@@ -38,7 +38,16 @@ MODULES = {
     "birthsim_env.physics.chambers": ("chambers",),
     "birthsim_env.physics.valves": ("valve_inverse", "valves"),
     "birthsim_env.physics.control_model": ("strict_feedback", "valve_inverse", "control_model"),
+    "birthsim_env.physics.dynamics": ("dynamics", "valves", "mechanics", "chambers", "friction", "elasto_plastic", "plant"),
+    "birthsim_env.physics.equilibrium": ("equilibrium", "plant", "elasto_plastic", "mechanics"),
+    "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
+    "birthsim_env.physics.exact": ("exact",),
     "baselines.backstepping.gains": ("gains", "damping"),
+    "baselines.backstepping.law": ("backstepping", "damping", "backstepping_lanes", "one_valve", "force_first_law", "lyapunov"),
+    "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
+    "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
+    "baselines.admittance.law": ("admittance_backstepping",),
+    "baselines.valve_inverse": ("valve_inverse", "backstepping", "one_valve", "force_first"),
 }
 """The test files (``tests/*/test_*.py``) that concern a module, the quickest first."""
 
