@@ -20,6 +20,7 @@ import json
 import math
 import os
 import resource
+import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -28,6 +29,8 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import pytest
+
+from tests.uncompiled import switch_off
 
 HERE = Path(__file__).parent
 
@@ -198,7 +201,8 @@ def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], N
     _, status, usage = os.wait4(child, 0)
     with os.fdopen(reader) as pipe:
         said = pipe.read()
-    return said or ("time limit" if status else None), usage.ru_utime + usage.ru_stime
+    ended = "time limit" if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL) else "a crash"
+    return said or (ended if status else None), usage.ru_utime + usage.ru_stime
 
 
 class Tester:
@@ -261,14 +265,6 @@ class Tester:
         return found | {"seconds": total}
 
 
-def interpreted(function: Callable | None = None, **_options: object) -> Callable:
-    """Stands in for ``numba.njit``: the function as it is, also under the name ``py_func``."""
-    if function is None:
-        return interpreted
-    function.py_func = function
-    return function
-
-
 def print_results(module: str, results: dict, before: dict) -> None:
     """The fraction of killed mutants, the survivors, and what differs from the mutants ``before``."""
     mutants = results["mutants"]
@@ -293,8 +289,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write the report, as JSON")
     options = parser.parse_args()
     before = json.loads(options.before.read_text()) if options.before else {}
-    os.environ |= {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    importlib.import_module("numba").njit = interpreted
+    switch_off()
     found = {}
 
     def report(module: str, results: dict) -> None:
