@@ -1,10 +1,10 @@
 """Measurements and page of the verification report.
 
-    python -m tests.verification balances                # a quarter of a minute
-    python -m tests.verification mutation REPORT.json    # what tests.mutation --out wrote
-    python -m tests.verification coverage                # minutes
-    python -m tests.verification accuracy FOLDER         # what birthsim-verify --out wrote
-    python -m tests.verification report                  # docs/verification.md from what is stored
+python -m tests.verification balances                # a quarter of a minute
+python -m tests.verification mutation REPORT.json    # what tests.mutation --out wrote
+python -m tests.verification coverage                # minutes
+python -m tests.verification accuracy FOLDER         # what birthsim-verify --out wrote
+python -m tests.verification report                  # docs/verification.md from what is stored
 """
 
 from __future__ import annotations

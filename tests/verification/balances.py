@@ -1,6 +1,6 @@
 """Balances of the plant in figures: mass and energy of the chambers, mechanical energy of the pistons.
 
-    python -m tests.verification balances
+python -m tests.verification balances
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Mutation scores as the report has them: a summary of what ``tests.mutation`` writes, with hashes and judgements.
 
-    python -m tests.mutation --out out/mutation.json && python -m tests.verification mutation out/mutation.json
+python -m tests.mutation --out out/mutation.json && python -m tests.verification mutation out/mutation.json
 """
 
 from __future__ import annotations

@@ -29,7 +29,9 @@ def measure() -> dict[str, Any]:
         there = Path(folder)
         (there / "tests.json").write_text(json.dumps(tests), encoding="utf-8")
         line = [sys.executable, "-m", "tests.verification.reached", folder]
-        done = subprocess.run(line, cwd=sources.ROOT, env={**os.environ, **SETTINGS}, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            line, cwd=sources.ROOT, env={**os.environ, **SETTINGS}, capture_output=True, text=True, check=False
+        )
         if done.returncode:
             raise RuntimeError(f"tests uncompiled ended with {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
         files = json.loads((there / "coverage.json").read_text(encoding="utf-8"))["files"]
