@@ -97,6 +97,7 @@ def test_a_summary_counts_and_lists_what_survived():
         module: {
             "tests": {"t": 1.0},
             "left_out": {},
+            "every": 1,
             "seconds": 1.6,
             "mutants": {name: {**killed, "killed_by": None}, "other": killed},
         }
@@ -131,14 +132,16 @@ def test_stages_run_as_plain_python():
     script = (
         "import sys; from tests.uncompiled import switch_off\n"
         "if len(sys.argv) > 1: switch_off()\n"
-        "import numpy as np; from baselines import BacksteppingController; from birthsim_env.physics.parameters import Parameters\n"
+        "import numpy as np; from baselines import BacksteppingController\n"
+        "from birthsim_env.physics.parameters import Parameters\n"
         "from tests.backstepping.test_backstepping import as_signals, random_situations\n"
         "rig = Parameters(); s = random_situations(rig, 0.01, True, 5, np.random.default_rng(5))\n"
         "print(BacksteppingController(rig).command(*as_signals(s, rig)).tobytes().hex())"
     )
-    runs = [[sys.executable, "-c", script, *more] for more in ([], ["uncompiled"])]
-    said = [
-        subprocess.run(run, cwd=sources.ROOT, capture_output=True, text=True, check=True).stdout.split()[-1] for run in runs
-    ]
-    compiled, plain = (np.frombuffer(bytes.fromhex(text)) for text in said)
+    said = []
+    for more in ([], ["uncompiled"]):
+        line = [sys.executable, "-c", script, *more]
+        done = subprocess.run(line, cwd=sources.ROOT, capture_output=True, text=True, check=True)
+        said.append(np.frombuffer(bytes.fromhex(done.stdout.split()[-1])))
+    compiled, plain = said
     np.testing.assert_allclose(plain, compiled, rtol=1e-9)

@@ -14,7 +14,7 @@ import json
 import shutil
 from pathlib import Path
 
-from tests.verification import balances, mutants, report, sources, reached
+from tests.verification import balances, mutants, reached, report, sources
 
 ACCURACY = (
     *("baselines/bench/accuracy.py", "baselines/bench/motions.py", "baselines/bench/second_model.py"),

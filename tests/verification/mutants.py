@@ -16,8 +16,8 @@ from tests.verification import sources
 
 JUDGEMENTS = Path(__file__).parent / "survivors.toml"
 VERDICTS = ("equivalent", "numerical", "out of reach", "missing test")
-"""Equivalent: no input tells it from the original, but for unused scratch. Numerical: it changes results by less than any
-tolerance that means something. Out of reach: only inputs that the callers exclude tell them apart. Missing test: a test would."""
+"""Equivalent: no input tells it from the original, or it changes unused scratch. Numerical: it changes results by less than
+any tolerance that means something. Out of reach: only inputs that callers exclude tell them apart. Missing test: one would."""
 
 
 def summary(results: dict[str, Any]) -> dict[str, Any]:
@@ -28,6 +28,7 @@ def summary(results: dict[str, Any]) -> dict[str, Any]:
         files = [sources.path_of(module)]
         files += [str(path.relative_to(sources.ROOT)) for name in MODULES[module] for path in TESTS.rglob(f"test_{name}.py")]
         found[module] = {
+            "every": result["every"],
             "tried": len(mutants),
             "killed": sum(mutant["killed_by"] is not None for mutant in mutants.values()),
             "seconds": round(result["seconds"]),

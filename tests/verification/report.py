@@ -14,9 +14,9 @@ HERE = Path(__file__).parent
 
 INTRODUCTION = """# Verification
 
-This page says how the physics and the laws were checked, and what the checks found. `make verify` measures accuracy and balances
-and writes the page anew; `make verify-slow` (some 40 minutes of one core) also measures mutation scores and coverage. The
-page is generated: edit `tests/verification/`, not this file.
+This page says how the physics and the laws were checked, and what the checks found. `make verify` measures accuracy and
+balances and writes the page anew; `make verify-slow` ({minutes} minutes of one core) also measures mutation scores and
+coverage. The page is generated: edit `tests/verification/`, not this file.
 """
 
 EQUATIONS = """## Equations
@@ -26,11 +26,11 @@ Numbers in brackets are the paper's. Each equation is computed in one place and 
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim-verify` measures its error against a second model of the rig:
-other coordinates, other states, and SciPy's DOP853 with a tolerance of 1e-11. The rigs are the nominal one, two extreme corners,
-random corners and random draws of the documented ranges of randomisation. Two motions of 0.5 s are measured: short puffs
-in which both pistons stick and slip, and strong swings with valves to 0.7 and jerks of 80 N. The error is the largest at any of
-the 50 marks.
+The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim-verify` measures its error against a second model of the
+rig: other coordinates, other states, and SciPy's DOP853 with a tolerance of 1e-11. The rigs are the nominal one, two extreme
+corners, random corners and random draws of the documented ranges of randomisation. Two motions of 0.5 s are measured: short
+puffs in which both pistons stick and slip, and strong swings with valves to 0.7 and jerks of 80 N. The error is the largest at
+any of the 50 marks.
 
 {worst}
 
@@ -50,7 +50,9 @@ sums with what the chambers hold. The gap is the largest of any chamber, relativ
 MUTATION = """## Mutation scores
 
 `python -m tests.mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
-until one fails. The score is the share of changes that some test notices.
+until one fails. The score is the share of changes that some test notices. "One in 3" means that every third change was tried.
+Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of data
+and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.
 """
 
 SURVIVORS = """### Survivors
@@ -75,7 +77,16 @@ every test named here exists and that every bound stands in its file.
 
 def page() -> str:
     """The whole page."""
-    parts = (INTRODUCTION, equations(), accuracy(), balances(), mutation(), coverage(), promises())
+    seconds = sources.load("coverage")["seconds"] + sum(one["seconds"] for one in sources.load("mutation").values())
+    parts = (
+        INTRODUCTION.format(minutes=round(seconds / 60)),
+        equations(),
+        accuracy(),
+        balances(),
+        mutation(),
+        coverage(),
+        promises(),
+    )
     return "\n".join(parts)
 
 
@@ -141,9 +152,10 @@ def balances() -> str:
     ]
     adiabat, mechanical = found["adiabat"], found["mechanical"]
     more = (
-        f"Insulated chambers, squeezed by up to {100 * adiabat['squeezed']:.0f} %, keep P V^gamma to {adiabat['drift']:.1e}. Kinetic and "
-        f"potential energy change by the work of pressures and hand less that of friction; over 2 s and {mechanical['work_j']:.0f} J the "
-        f"gap is {mechanical['gap']:.1e} of the work, which is the error of the trapezoids that sum it up."
+        f"Insulated chambers, squeezed by up to {100 * adiabat['squeezed']:.0f} %, keep P V^gamma to {adiabat['drift']:.1e}. "
+        "Kinetic and potential energy change by the work of pressures and hand less that of friction; over 2 s and "
+        f"{mechanical['work_j']:.0f} J the gap is {mechanical['gap']:.1e} of the work, which is the error of the trapezoids "
+        "that sum it up."
     )
     heads = ["motion", "lanes", "step (ms)", "gap of mass", "gap of energy"]
     return f"{BALANCES}\n{basis(found)}\n{table(heads, rows)}\n{more}\n"
@@ -157,7 +169,7 @@ def mutation() -> str:
         left = len(one["left_out"])
         rows.append(
             [
-                f"`{sources.path_of(module)}`", str(one["tried"]), str(one["killed"]), f"{100 * mutants.score(one):.1f} %",
+                f"`{sources.path_of(module)}`", "all" if one["every"] == 1 else f"one in {one['every']}", str(one["tried"]), str(one["killed"]), f"{100 * mutants.score(one):.1f} %",
                 f"{len(one['tests'])} ({left} left out)", one["commit"], stale,
             ]
         )  # fmt: skip
@@ -167,8 +179,8 @@ def mutation() -> str:
             place = f"`{Path(sources.path_of(module)).name}`, `{name.split(':')[1]}`"
             alive.append([place, f"`{change}`", verdict["verdict"], verdict["reason"]])
     tried, killed = (sum(one[key] for one in found.values()) for key in ("tried", "killed"))
-    rows.append(["all", str(tried), str(killed), f"{100 * killed / tried:.1f} %", "", "", ""])
-    heads = ["module", "changes", "noticed", "score", "tests", "commit", "up to date"]
+    rows.append(["together", "", str(tried), str(killed), f"{100 * killed / tried:.1f} %", "", "", ""])
+    heads = ["module", "sample", "changes", "noticed", "score", "tests", "commit", "up to date"]
     counts = ", ".join(f"{sum(row[2] == verdict for row in alive)} {verdict}" for verdict in mutants.VERDICTS)
     survivors = table(["where", "change", "verdict", "why"], alive)
     return f"{MUTATION}\n{table(heads, rows)}\n{SURVIVORS}\n{len(alive)} survivors: {counts}.\n\n{survivors}"
@@ -180,12 +192,9 @@ def coverage() -> str:
     for path, one in found["files"].items():
         missed, jumps = one["lines_missed"], one["branches_missed"]
         words = [*(f"line {line}" for line in missed), *(f"{start} to {end}" for start, end in jumps if start not in missed)]
-        rows.append(
-            [
-                f"`{path}`", f"{one['lines'] - len(missed)} of {one['lines']}", f"{one['branches'] - len(jumps)} of {one['branches']}",
-                ", ".join(words) or "none",
-            ]
-        )  # fmt: skip
+        lines, branches = one["lines"], one["branches"]
+        reached = [f"{lines - len(missed)} of {lines}", f"{branches - len(jumps)} of {branches}"]
+        rows.append([f"`{path}`", *reached, ", ".join(words) or "none"])
     text = COVERAGE.format(tests=found["tests"])
     return f"{text}\n{basis(found)}\n{table(['file', 'lines', 'branches', 'missed'], rows)}"
 
