@@ -22,6 +22,7 @@ import os
 import resource
 import signal
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -205,6 +206,25 @@ def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], N
     return said or (ended if status else None), usage.ru_utime + usage.ru_stime
 
 
+def run_here(item: pytest.Item, seconds: float) -> str | None:
+    """Why a test does not pass within so many CPU seconds of this process, or None."""
+
+    def stop(*_: object) -> None:
+        raise TimeoutError("time limit")
+
+    before = signal.signal(signal.SIGPROF, stop)
+    started = time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+    failed, item.session.testsfailed = item.session.testsfailed, 0
+    slow = time.process_time() - started >= seconds
+    return ("time limit" if slow else "fails") if failed else None
+
+
 class Tester:
     """A pytest plugin that runs the collected tests of each module once per mutant."""
 
@@ -236,7 +256,9 @@ class Tester:
         concerned = [item for item in items if item.path.stem.removeprefix("test_") in MODULES[module]]
         for item in concerned:
             if item.nodeid not in self.measured:
-                self.measured[item.nodeid] = run_in_child([item], self.limit, lambda: None)
+                # In this process first: what oracles derive once and keep, every child then inherits.
+                refused = run_here(item, self.limit)
+                self.measured[item.nodeid] = (refused, 0.0) if refused else run_in_child([item], self.limit, lambda: None)
         chosen, left_out, total = [], {}, 0.0
         for item in sorted(concerned, key=lambda item: self.measured[item.nodeid][1]):
             failed, seconds = self.measured[item.nodeid]
@@ -250,9 +272,7 @@ class Tester:
     def examine(self, module: ModuleType, items: list[pytest.Item]) -> dict:
         """CPU seconds of the tests and of all mutants; the tests left out; what killed each mutant, None where it survived."""
         chosen, left_out = self.select(module.__name__, items)
-        for item in chosen:  # here too: what oracles derive once and keep, every child then inherits
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
-        cost, kills = {item.nodeid: run_in_child([item], self.limit, lambda: None)[1] for item in chosen}, Counter()
+        cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter()
         control, together = run_in_child(chosen, 2 * self.budget + 5, lambda: None)
         if control:
             raise RuntimeError(f"{module.__name__} without a change: {control}")

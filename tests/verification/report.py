@@ -50,9 +50,9 @@ sums with what the chambers hold. The gap is the largest of any chamber, relativ
 MUTATION = """## Mutation scores
 
 `python -m tests.mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
-until one fails. The score is the share of changes that some test notices. "One in 3" means that every third change was tried.
-Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of data
-and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.
+until one fails. The score is the share of changes that some test notices. "One in 3": every third change was tried.
+Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of
+data and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.
 """
 
 SURVIVORS = """### Survivors
@@ -167,12 +167,9 @@ def mutation() -> str:
     for module, one in found.items():
         stale = "no" if sources.changed(one["sources"]) else "yes"
         left = len(one["left_out"])
-        rows.append(
-            [
-                f"`{sources.path_of(module)}`", "all" if one["every"] == 1 else f"one in {one['every']}", str(one["tried"]), str(one["killed"]), f"{100 * mutants.score(one):.1f} %",
-                f"{len(one['tests'])} ({left} left out)", one["commit"], stale,
-            ]
-        )  # fmt: skip
+        sample = "all" if one["every"] == 1 else f"one in {one['every']}"
+        counts = [sample, str(one["tried"]), str(one["killed"]), f"{100 * mutants.score(one):.1f} %"]
+        rows.append([f"`{sources.path_of(module)}`", *counts, f"{len(one['tests'])} ({left} left out)", one["commit"], stale])
         for name, mutant in one["survivors"].items():
             verdict = judged.get(name, {"verdict": "not judged", "reason": ""})
             change = mutant["change"].replace("|", "\\|")
@@ -181,9 +178,9 @@ def mutation() -> str:
     tried, killed = (sum(one[key] for one in found.values()) for key in ("tried", "killed"))
     rows.append(["together", "", str(tried), str(killed), f"{100 * killed / tried:.1f} %", "", "", ""])
     heads = ["module", "sample", "changes", "noticed", "score", "tests", "commit", "up to date"]
-    counts = ", ".join(f"{sum(row[2] == verdict for row in alive)} {verdict}" for verdict in mutants.VERDICTS)
+    verdicts = ", ".join(f"{sum(row[2] == verdict for row in alive)} {verdict}" for verdict in mutants.VERDICTS)
     survivors = table(["where", "change", "verdict", "why"], alive)
-    return f"{MUTATION}\n{table(heads, rows)}\n{SURVIVORS}\n{len(alive)} survivors: {counts}.\n\n{survivors}"
+    return f"{MUTATION}\n{table(heads, rows)}\n{SURVIVORS}\n{len(alive)} survivors: {verdicts}.\n\n{survivors}"
 
 
 def coverage() -> str:
