@@ -47,7 +47,15 @@ MODULES = {
     "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
     "birthsim_env.physics.exact": ("exact",),
     "baselines.backstepping.gains": ("gains", "damping"),
-    "baselines.backstepping.law": ("backstepping", "damping", "backstepping_lanes", "one_valve", "force_first_law", "lyapunov"),
+    "baselines.backstepping.law": (
+        "law_kernel",
+        "backstepping",
+        "damping",
+        "backstepping_lanes",
+        "one_valve",
+        "force_first_law",
+        "lyapunov",
+    ),
     "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
     "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
     "baselines.admittance.law": ("admittance_law", "admittance_backstepping"),
@@ -231,6 +239,7 @@ class Tester:
     def __init__(self, options: argparse.Namespace, report: Callable[[str, dict], None]) -> None:
         self.modules, self.every, self.report = options.module, options.every, report
         self.limit, self.budget = options.limit, options.budget
+        self.again = json.loads(options.again.read_text()) if options.again else {}
         self.measured: dict[str, tuple[str | None, float]] = {}
 
     @pytest.hookimpl(tryfirst=True)
@@ -279,6 +288,10 @@ class Tester:
         found, total = {"tests": dict(cost), "left_out": left_out, "every": self.every, "mutants": {}}, 0.0
         for mutant in list(mutants_of(module))[:: self.every]:
             chosen.sort(key=lambda item: cost[item.nodeid] / (1 + kills[item.nodeid]))
+            known = self.again.get(module.__name__, {}).get("mutants", {}).get(mutant.name, {})
+            if known.get("change") == mutant.change and known["killed_by"] is not None:
+                found["mutants"][mutant.name] = known
+                continue
             killer, seconds = run_in_child(chosen, PATIENCE * together + 5, mutant.apply)
             kills[killer] += 1
             total += seconds
@@ -310,6 +323,7 @@ def main() -> None:
         "--budget", type=float, default=BUDGET, metavar="S", help="CPU seconds per survivor (default: %(default)s)"
     )
     parser.add_argument("--before", type=Path, metavar="FILE", help="report of an earlier run to compare with")
+    parser.add_argument("--again", type=Path, metavar="FILE", help="report of the same sources: try only what survived there")
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write the report, as JSON")
     options = parser.parse_args()
     before = json.loads(options.before.read_text()) if options.before else {}
