@@ -1,36 +1,84 @@
-"""Folders and files that appear whole or not at all."""
+"""Folders and files that appear whole or not at all, and folders that one process has to itself."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
+import shutil
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from filelock import FileLock, Timeout
+
+_PARTIAL = ".partial"
+_HOST = socket.gethostname().replace("-", "_")
+
 
 def make_folder(path: Path) -> Path:
-    """The folder ``path``, made if it is missing; ``ValueError`` where that cannot be."""
+    """The folder ``path``, made if it is missing, without what killed processes left; ``ValueError`` where that cannot be."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
     except OSError as error:
         raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
+    for leftover in path.rglob(f".*{_PARTIAL}"):
+        if not _is_written(leftover):
+            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
     return path
 
 
 @contextmanager
+def own_folder(path: Path) -> Iterator[Path]:
+    """The folder ``path``, made if it is missing, which no other process has at the same time; ``ValueError`` where one has.
+
+    The system frees the folder when the process ends, whatever ends it.
+    """
+    make_folder(path)
+    try:
+        with FileLock(path / ".lock", timeout=0):
+            yield path
+    except Timeout:
+        raise ValueError(
+            f"--out {str(path)!r} is in use by another process; allowed: to wait for it, or another folder"
+        ) from None
+
+
+@contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised."""
-    partial = path.with_name(f"{path.name}.partial")
+    """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
+
+    It is on the disk before it has its name. A process that is killed leaves a hidden file, which ``make_folder`` removes.
+    """
+    partial = _partial(path)
     try:
         with partial.open("wb") as file:
             yield file
+            file.flush()
+            os.fsync(file.fileno())
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_results(folder: Path) -> Iterator[Path]:
+    """A folder for several files that belong together: at the end they replace those in ``folder``, one rename each.
+
+    Where something is raised, such as for a full disk, ``folder`` stays as it was.
+    """
+    place = _partial(folder / "results")
+    place.mkdir()
+    try:
+        yield place
+        for path in sorted(place.iterdir()):
+            path.replace(folder / path.name)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -51,3 +99,33 @@ def finite(content: Any) -> Any:
     if isinstance(content, (list, tuple)):
         return [finite(value) for value in content]
     return None if isinstance(content, float) and not math.isfinite(content) else content
+
+
+def is_alive(host: str, process: int) -> bool:
+    """Whether a process may still run: one of another host always may."""
+    if host != _HOST:
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def this_process() -> tuple[str, int]:
+    """Host and number of this process."""
+    return _HOST, os.getpid()
+
+
+def _partial(path: Path) -> Path:
+    """The hidden name of what this process writes and ``path`` will be."""
+    host, process = this_process()
+    return path.with_name(f".{path.name}.{host}-{process}{_PARTIAL}")
+
+
+def _is_written(partial: Path) -> bool:
+    """Whether the process that writes a hidden file may still run."""
+    host, _, process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2].rpartition("-")
+    return not process.isdecimal() or is_alive(host, int(process))

@@ -1,53 +1,141 @@
-"""Work in several processes at once."""
+"""Work in several processes at once: on this machine by joblib's processes, on several by Ray."""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
-import warnings
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from typing import Any, Protocol, TypeVar
 
-from joblib import Parallel, delayed
-from joblib.externals.loky.process_executor import BrokenProcessPool
+from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor
 from tqdm import tqdm
 
 T = TypeVar("T")
 
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMBA", "NUMEXPR")
+}
+"""Environment variables of a process that works beside others."""
+
+LISTENING = 0.5
+"""s between two looks at what is complete: a signal waits no longer."""
+
+
+_END: tuple[Any, ...] = ("no more pieces",)
+
+
+class Pool(Protocol):
+    """Where pieces of work run: ``width`` at once. ``submit`` begins one, ``done`` returns those that are complete after
+    ``LISTENING`` at most, ``result`` gives what one returned or raises what it raised, ``close`` ends all at once."""
+
+    width: int
+
+    def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any: ...
+    def done(self, begun: list[Any]) -> list[Any]: ...
+    def result(self, begun: Any) -> Any: ...
+    def close(self) -> None: ...
+
 
 def side_by_side(
-    work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], jobs: int, take: Callable[[int, T], None]
+    work: Callable[..., T], pieces: Iterable[tuple[Any, ...] | None], jobs: int, take: Callable[[int, T], None],
+    cluster: str | None = None,
 ) -> None:  # fmt: skip
-    """Call ``take(k, work(*pieces[k]))`` for every piece, in the order in which they end.
+    """Call ``take(k, work(*piece))`` for every piece, the k-th drawn from ``pieces``, in the order in which they end.
 
-    ``jobs`` processes work side by side, each with one thread; with one job, this process works itself. What is raised, by a
-    piece, by ``take`` or by Ctrl-C, ends all processes at once and is raised here; ``OSError`` where a process dies.
+    ``jobs`` processes work side by side, each with one thread; with one job, this process works itself. With a ``cluster``,
+    "ray" or "ray:ADDRESS", Ray's workers do, as many as have a processor. A piece is drawn when there is room for it; None says
+    that there is none at present, and another is drawn later. What is raised, by a piece, by ``take`` or by Ctrl-C, ends all
+    processes at once and is raised here; ``OSError`` where a process dies.
     """
-    if min(jobs, len(pieces)) <= 1:
-        for k, piece in enumerate(pieces):
-            take(k, work(*piece))
-        return
-    pool = Parallel(
-        min(jobs, len(pieces)), "loky", return_as="generator_unordered", pre_dispatch="all", batch_size=1, max_nbytes=None,
-        inner_max_num_threads=1, initializer=_begin_worker,
-    )  # fmt: skip
-    results = pool(delayed(_numbered)(k, work, piece) for k, piece in enumerate(pieces))
+    pool = _pool(jobs, cluster)
+    source, drawn, more = iter(pieces), 0, True
+    begun: dict[Any, int] = {}
     try:
-        for k, result in results:
-            take(k, result)
+        while more or begun:
+            nothing_now = False
+            while more and len(begun) < pool.width and not nothing_now:
+                piece = next(source, _END)
+                more, nothing_now = piece is not _END, piece is None
+                if more and piece is not None:
+                    begun[pool.submit(work, piece)] = drawn
+                    drawn += 1
+            if not begun and more:
+                time.sleep(LISTENING)
+            for one in pool.done(list(begun)) if begun else ():
+                take(begun.pop(one), pool.result(one))
     except BrokenProcessPool as error:
         raise OSError("a process that computed has died, of lack of memory perhaps; what is complete is kept") from error
     finally:
-        # joblib warns of what it ends.
-        with warnings.catch_warnings(action="ignore", category=UserWarning):
-            results.close()
+        pool.close()
 
 
-def _numbered(number: int, work: Callable[..., T], piece: tuple[Any, ...]) -> tuple[int, T]:
-    return number, work(*piece)
+def _pool(jobs: int, cluster: str | None) -> Pool:
+    if cluster is not None:
+        from baselines.cluster import RayPool
+
+        return RayPool(cluster)
+    return ThisProcess() if jobs <= 1 else Processes(jobs)
 
 
-def _begin_worker() -> None:
-    """Ctrl-C reaches the whole process group: the parent ends its workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class ThisProcess:
+    """Each piece is computed where it is submitted."""
+
+    width = 1
+
+    def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
+        future: Future[Any] = Future()
+        future.set_result(work(*piece))
+        return future
+
+    def done(self, begun: list[Any]) -> list[Any]:
+        return begun
+
+    def result(self, begun: Any) -> Any:
+        return begun.result()
+
+    def close(self) -> None:
+        pass
+
+
+class Processes:
+    """joblib's processes."""
+
+    def __init__(self, jobs: int) -> None:
+        self.width = jobs
+        self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
+        self._begun: list[Any] = []
+
+    def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
+        self._begun.append(self._executor.submit(work, *piece))
+        return self._begun[-1]
+
+    def done(self, begun: list[Any]) -> list[Any]:
+        return list(wait(begun, LISTENING, FIRST_COMPLETED).done)
+
+    def result(self, begun: Any) -> Any:
+        self._begun.remove(begun)
+        return begun.result()
+
+    def close(self) -> None:
+        # joblib's thread looks up what has been submitted, and a shutdown takes that away: first it must have looked.
+        while any(not one.running() and not one.done() for one in self._begun):
+            time.sleep(0.01)
+        self._executor.shutdown(wait=True, kill_workers=bool(self._begun))
+
+
+def _begin_worker(parent: int) -> None:
+    """Ctrl-C reaches the whole process group: the parent ends its workers, and a worker ends itself once the parent is gone."""
+    for ending in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(ending, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LISTENING)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent watch", daemon=True).start()

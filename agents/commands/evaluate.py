@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 
 import birthsim_env
 from agents.residual.settings import NO_LAW
-from baselines.bench.evaluation import Evaluation, evaluate, overview, table
-from baselines.commands.evaluate_all import JOBS, evaluate_all
+from baselines.bench.evaluation import merged, overview, table
+from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
+from baselines.bench.tasks import Result, run_tasks
+from baselines.commands.evaluate_all import evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, check_world, policy_of, run, seed_number, whole
-from baselines.files import make_folder, write_json, write_text
-from baselines.registry import controller_names, make_controller
+from baselines.commands.shared import (
+    JOBS,
+    RANDOMIZE,
+    add_processes,
+    check_world,
+    policy_of,
+    run,
+    seed_number,
+    shown_arguments,
+    whole,
+)
+from baselines.files import make_folder, whole_results, write_json, write_text
+from baselines.registry import controller_names
 from birthsim_env.parts.randomization import described
 
 
@@ -25,8 +38,8 @@ def main() -> None:
         description="Evaluate controllers: the same seeds, so the same worlds, for each of them. With --all on every "
         "environment, with every sensor model, on the rig as given and on rigs drawn at random, and how the stiffness feels.",
         epilog="Without --policy every named controller runs; with it the trained residual runs beside those named, or else "
-        "beside the paper's law and the one that it sits on. With --all what the output folder holds of the same settings, rig "
-        "and code is kept, so that an interrupted run goes on.",
+        "beside the paper's law and the one that it sits on. What the output folder holds of the same settings, rig and "
+        "code is kept, so that an interrupted run goes on.",
     )
     parser.add_argument(
         "--all", action="store_true", help="compare under all conditions; --env, --sensors, --randomize narrow them"
@@ -57,7 +70,7 @@ def main() -> None:
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)
     add_set(parser)
-    parser.add_argument("--jobs", type=whole, help=f"processes side by side, with --all (default: {JOBS})")
+    add_processes(parser)
     studies = parser.add_mutually_exclusive_group()
     studies.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
     studies.add_argument("--studies-only", action="store_true", help="with --all: nothing but these studies, some minutes")
@@ -78,8 +91,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
             raise ValueError("--reference or --user-force with --all; allowed: without it, --all has its own moving hands")
         evaluate_all(arguments)
         return
-    if arguments.jobs is not None or arguments.no_studies or arguments.studies_only:
-        raise ValueError("--jobs, --no-studies and --studies-only; allowed: with --all")
+    if arguments.no_studies or arguments.studies_only:
+        raise ValueError("--no-studies and --studies-only; allowed: with --all")
     arguments.env = arguments.env or "BirthSIM/Circle-v1"
     arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
@@ -97,28 +110,32 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         names = ["backstepping", *laws] if names == ["residual"] else names
         names = list(dict.fromkeys([*names, "residual"]))
     names = with_options([name for name in names if name != "residual"], arguments.set)
-    controllers = [(name, make_controller(name, rig)) for name in names]
-    known = len(controllers)
+    world = {
+        "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize], **environment_parts(arguments),
+    }  # fmt: skip
+    check_world(arguments.env, parameters=rig, **world)
+    span = arguments.episodes, arguments.seed
+    pieces = {name: evaluation_tasks(name, controller_settings(name, rig), arguments.env, world, *span) for name in names}
+    known = len(pieces)
+    if policies:
+        from agents.policy.files import WEIGHTS
     for place in policies:
         name = "residual" if len(policies) == 1 else f"residual {place.name}"
-        controllers.append((name, make_controller("residual", rig, policy=place)))
-    setting = {
-        "parameters": rig, "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize],
-        **environment_parts(arguments),
-    }  # fmt: skip
-    check_world(arguments.env, **setting)
-    folder, drawn = make_folder(arguments.out), described(rig, setting["randomize"])
+        # The code of policies counts, which lies here; a policy that has been trained anew is another one.
+        own = {
+            "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": rig.to_dict(), "policy": str(place),
+        }  # fmt: skip
+        pieces[name] = evaluation_tasks(name, own, arguments.env, world, *span, work=evaluate_learned)
+    folder, drawn = make_folder(arguments.out), described(rig, world["randomize"])
     print(drawn)
-    evaluations: list[Evaluation] = []
-    for name, controller in controllers:
-        try:
-            evaluations.append(evaluate(arguments.env, controller, name, arguments.episodes, arguments.seed, **setting))
-        except KeyboardInterrupt:
-            if not evaluations:
-                raise
-            break
-        if len(evaluations[-1].seeds) < arguments.episodes:
-            break  # interrupted: what is complete is written, and no further controller is begun
+    jobs = arguments.jobs or JOBS
+    done, failures = run_tasks(
+        [task for tasks in pieces.values() for task in tasks], folder, jobs, "episodes", arguments.cluster
+    )
+    if failures:
+        name, problem = next(iter(failures.items()))
+        raise ValueError(f"{len(failures)} pieces failed, the first {name}: {problem}; what is complete is kept")
+    evaluations = [gathered(name, [done[task.name] for task in tasks]) for name, tasks in pieces.items()]
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures.runs import error_over_time
 
@@ -126,26 +143,34 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     caption += f"randomised: {arguments.randomize}"
     caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in environment_parts(arguments).items())
     classical, learned = evaluations[:known], evaluations[known:]
-    # A seed that was interrupted is kept, but the table over seeds compares the same episodes.
-    complete = [one for one in learned if len(one.seeds) == arguments.episodes]
     text, pictures = table(evaluations), "error_over_time"
-    if len(complete) > 1:
-        from agents.policy.seeds import learning_curves, merged, seed_table
+    if len(learned) > 1:
+        from agents.policy.seeds import learning_curves, seed_table
         from agents.reports.learning_curves import draw_learning_curves
 
-        together = merged(complete, f"residual, {len(complete)} seeds")
+        together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]
-        text = "\n\n".join([table(evaluations), *(seed_table(one, complete) for one in classical)])
+        text = "\n\n".join([table(evaluations), *(seed_table(one, learned) for one in classical)])
         pictures += ", learning_curves"
-        draw_learning_curves(learning_curves(policies), folder)
     lines = [caption, "", overview(evaluations)]
-    write_text(folder / "evaluation.md", f"{caption}\n\n{drawn}\n\n{text}\n")
-    shown = {key: str(value) for key, value in vars(arguments).items()}
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
-    write_json(folder / "evaluation.json", {"arguments": shown, "rig": rig.to_dict(), "results": results})
-    error_over_time(evaluations, caption, folder)
+    with whole_results(folder) as place:
+        write_text(place / "evaluation.md", f"{caption}\n\n{drawn}\n\n{text}\n")
+        write_json(
+            place / "evaluation.json", {"arguments": shown_arguments(arguments), "rig": rig.to_dict(), "results": results}
+        )
+        # The only file that differs from run to run.
+        write_json(place / "times.json", {"us_per_lane_and_call": {one.controller: one.cost for one in evaluations}})
+        error_over_time(evaluations, caption, place)
+        if len(learned) > 1:
+            draw_learning_curves(learning_curves(policies), place)
     print("\n".join(lines))
-    print(f"\nwritten to {folder}/: evaluation.md (every metric), evaluation.json, {pictures} (.png, .svg)")
+    print(f"\nwritten to {folder}/: evaluation.md (every metric), evaluation.json, times.json, {pictures} (.png, .svg)")
+
+
+def evaluate_learned(**settings: Any) -> Result:
+    """A piece of a residual policy's evaluation."""
+    return evaluate_piece(**settings)
 
 
 def _policies(path: str | None) -> tuple[list[Path], list[str]]:

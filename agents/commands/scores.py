@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 from collections.abc import Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +11,13 @@ import numpy as np
 
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
-from baselines.bench.comparison import ENVIRONMENTS, default_controllers, file_stem
+from baselines.bench.comparison import ENVIRONMENTS, default_controllers
 from baselines.bench.evaluation import DISCOUNTS, evaluate
+from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
-from baselines.commands.shared import run, seed_number, whole
-from baselines.files import make_folder, write_json, write_text
+from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole
+from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import UNCONTROLLED, make_controller
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import Parameters
@@ -38,7 +37,7 @@ def main() -> None:
     )
     parser.add_argument("--episodes", type=whole, default=64, help="per controller and condition (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=70000, help="seed of the first episode (default: %(default)s)")
-    parser.add_argument("--jobs", type=whole, default=2, help="processes side by side (default: %(default)s)")
+    add_processes(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for scores.json and scores.md")
     run(parser, _scores)
 
@@ -52,7 +51,7 @@ def _scores(arguments: argparse.Namespace) -> None:
         (where, controller): _task(where, controller, seed, arguments)
         for where in conditions for controller, seed in _contestants(where[0])
     }  # fmt: skip
-    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs, "scores")
+    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "scores", arguments.cluster)
     if failures:
         name, problem = next(iter(failures.items()))
         raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first {name}: {problem}")
@@ -65,8 +64,9 @@ def _scores(arguments: argparse.Namespace) -> None:
         known = _roles(rows)
         scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
         lines.append(f"## {short}, {sensors} sensors, {RIGS[rig]} rig\n\n{_table(rows, known)}")
-    write_json(folder / "scores.json", {"code": code_stamp(), "seed": arguments.seed, "scores": scores})
-    write_text(folder / "scores.md", "\n\n".join(lines) + "\n")
+    with whole_results(folder) as place:
+        write_json(place / "scores.json", {"code": code_stamp("agents"), "seed": arguments.seed, "scores": scores})
+        write_text(place / "scores.md", "\n\n".join(lines) + "\n")
     print("\n\n".join(lines))
 
 
@@ -96,16 +96,9 @@ def _task(where: tuple[str, str, bool], controller: str, policy: str, arguments:
     settings = {
         "controller": controller, "policy": policy, "environment": environment, "sensors": sensors, "randomize": randomize,
         "episodes": arguments.episodes, "seed": arguments.seed,
-        "network": _digest(SHIPPED / policy) if policy else "",
+        "network": file_hash(str(SHIPPED / policy / WEIGHTS)) if policy else "",
     }  # fmt: skip
     return Task(stem, "policies" if policy else controller, score_cell, settings)
-
-
-@cache
-def _digest(folder: Path) -> str:
-    """Hash of a policy's weights and of the sources that run it."""
-    sources = sorted(SHIPPED.parent.glob("*.py"))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in (folder / WEIGHTS, *sources))).hexdigest()
 
 
 def score_cell(

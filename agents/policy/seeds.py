@@ -65,23 +65,6 @@ def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
     return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
 
 
-def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
-    """All episodes of several evaluations as one."""
-    whole = Evaluation(name)
-    for one in evaluations:
-        whole.seeds += one.seeds
-        whole.lost += one.lost
-        whole.required_strength_ratio += one.required_strength_ratio
-        whole.success += one.success
-        for discount, values in one.returns.items():
-            whole.returns[discount] += values
-        for metric in UNITS:
-            whole.metrics[metric] += one.metrics[metric]
-        whole.traces += one.traces
-    whole.cost = float(np.median([one.cost for one in evaluations]))
-    return whole
-
-
 def pooled(values: Array) -> float:
     """RMS of all values, mm, of which an infinite one, a lost episode, counts as ``LOST_ERROR``."""
     return float(np.sqrt(np.mean(np.square(penalize_lost(values, np.isinf(values), True, LOST_ERROR)))))

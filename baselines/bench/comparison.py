@@ -6,21 +6,20 @@ episode to episode in every cell; the plant is the rig as its owner describes it
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
+from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.bench.tasks import Result, Task
-from baselines.registry import CONTROLLERS, SLOW, make_controller, split_options
+from baselines.registry import CONTROLLERS, SLOW, make_controller
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.parameters import Parameters
 
@@ -93,23 +92,6 @@ def all_conditions(
     return [*own, *(Conditions(*chosen) for chosen in moving)]
 
 
-def file_stem(name: str) -> str:
-    """A controller's name as that of a file; those that are none get a hash, so that no two share a stem."""
-    stem = re.sub(r"[^\w.-]+", "-", name)
-    return stem if stem == name else f"{stem.strip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-
-
-def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
-    """What a result of a controller depends on: its name, a hash of its file if it has one, and the rig as a dictionary.
-
-    Raises ``ValueError`` for a name that is no controller.
-    """
-    make_controller(name, rig)
-    path = Path(split_options(name)[0].rpartition(":")[0])
-    source = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
-    return {"controller": name, "source": source, "rig": rig.to_dict()}
-
-
 def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, seed: int) -> Task:
     """The task that computes one cell of the controller with these ``controller_settings``."""
     name = settings["controller"]
@@ -144,6 +126,12 @@ def gather(named: dict[tuple[str, Conditions], Result]) -> Cells:
     return cells
 
 
+def costs(cells: Cells) -> dict[str, float]:
+    """Controller -> median over its cells of its time per lane and call, us, which differs from run to run."""
+    names = dict.fromkeys(name for name, _ in cells)
+    return {name: float(np.median([cell.cost for cell in cells.values() if cell.controller == name])) for name in names}
+
+
 def statistics(cells: Cells) -> list[dict[str, Any]]:
     """Per cell its figures, for tables and JSON.
 
@@ -169,6 +157,6 @@ def statistics(cells: Cells) -> list[dict[str, Any]]:
         found.append({
             "controller": controller, "environment": conditions.environment, "sensors": conditions.sensors,
             "plant": conditions.plant, "hand": conditions.hand, "episodes": len(cell.lost), "lost": int(sum(cell.lost)),
-            "cost_us_per_lane_and_call": cell.cost, **figures,
+            **figures,
         })  # fmt: skip
     return found

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from baselines.bench.comparison import METRICS, REFERENCE
 from baselines.bench.statistics import number
 
@@ -68,15 +66,14 @@ def overview(figures: Figures) -> str:
         for cell in figures if not cell.get("hand")
     }  # fmt: skip
     columns = [c for c in COLUMNS if any(key[1:] == (c.environment, c.sensors, c.plant) for key in found)]
-    rows = [["controller", *(column.title for column in columns), "lost episodes", "cost per call, us"]]
+    rows = [["controller", *(column.title for column in columns), "lost episodes"]]
     for name in controllers_of(figures):
         row = [name]
         for column in columns:
             cell = found.get((name, column.environment, column.sensors, column.plant))
             row.append("-" if cell is None else column.text(cell))
         own = [cell for cell in figures if cell["controller"] == name]
-        cost = float(np.median([cell["cost_us_per_lane_and_call"] for cell in own]))
-        rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}", number(cost)])
+        rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
     return markdown(rows)
 
 
@@ -111,8 +108,6 @@ def full(figures: Figures) -> str:
                     rows.append([f"{metric}, {METRICS[metric]}", cell["controller"], interval(mine), *tail])
         for cell in here:
             rows.append(["lost episodes", cell["controller"], f"{cell['lost']} of {cell['episodes']}", "", "", ""])
-        for cell in here:
-            rows.append(["cost per call, us", cell["controller"], number(cell["cost_us_per_lane_and_call"]), "", "", ""])
         hand = f", moving hand: {where[3]}" if where[3] else ""
         sections.append("## {}, {} sensors, {} plant".format(*where) + f"{hand}\n\n{markdown(rows)}")
     return "\n\n".join(sections)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,7 +35,8 @@ class Evaluation:
     """Figures of one controller: per episode, over all, and the tracking error over time (T, episodes, 2), m.
 
     ``required_strength_ratio`` is the fraction of the rig's strength that each episode asks for. ``returns``
-    are the sums of rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end.
+    are the sums of rewards per episode for each of ``DISCOUNTS``, ``success`` is ``info["is_success"]`` at the end. ``cost`` is
+    the controller's time per lane and call, us, which differs from run to run.
     """
 
     controller: str
@@ -59,7 +61,6 @@ class Evaluation:
             "units": UNITS,
             "summary": jsonable(self.summary()),
             "lost_episodes": int(sum(self.lost)),
-            "cost_us_per_lane_and_call": self.cost,
             "episodes": self.metrics,
             "lost": self.lost,
             "required_strength_ratio": self.required_strength_ratio,
@@ -97,6 +98,23 @@ def evaluate(
         print(f"interrupted: {len(result.seeds)} of {episodes} episodes are complete and kept")
     result.cost = float(np.median(spent))
     return result
+
+
+def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
+    """All episodes of several evaluations as one."""
+    whole = Evaluation(name)
+    for one in evaluations:
+        whole.seeds += one.seeds
+        whole.lost += one.lost
+        whole.required_strength_ratio += one.required_strength_ratio
+        whole.success += one.success
+        for discount, values in one.returns.items():
+            whole.returns[discount] += values
+        for metric in UNITS:
+            whole.metrics[metric] += one.metrics[metric]
+        whole.traces += one.traces
+    whole.cost = float(np.median([one.cost for one in evaluations]))
+    return whole
 
 
 def _run_batch(
@@ -190,10 +208,8 @@ def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
             row += [number(summary[name][key]) for key in (statistic, "q95", "max")]
         lines.append("| " + " | ".join(row) + " |")
     lost, success, paid = ["lost episodes", ""], ["successful episodes", ""], ["return, mean", ""]
-    cost = ["control cost per lane and call", "us"]
     for evaluation in evaluations:
         lost += [f"{sum(evaluation.lost)} of {len(evaluation.lost)}", "", ""]
         success += [f"{sum(evaluation.success)} of {len(evaluation.success)}", "", ""]
         paid += [f"{np.mean(evaluation.returns[1.0] or [np.nan]):.4g}", "", ""]
-        cost += [number(evaluation.cost), "", ""]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid, cost))])
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid))])

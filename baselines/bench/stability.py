@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from baselines.bench.pieces import file_stem
 from baselines.bench.probes import Window, board_limit
+from baselines.bench.tasks import Result, Task
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
@@ -142,10 +144,8 @@ class Verdict:
     lost: Mask
 
 
-def judge(
-    cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0, tick: Callable[[], object] = lambda: None
-) -> Verdict:
-    """Hold, push and release every lane, a case each. ``tick`` is called once per control period."""
+def judge(cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0) -> Verdict:
+    """Hold, push and release every lane, a case each."""
     rigs, lanes = cases.rigs, len(cases.hand)
     board, plant = rigs[0].electronics, Plant(rigs, lanes)
     rows = np.zeros((REFERENCES, lanes))
@@ -177,16 +177,10 @@ def judge(
             force = push - cases.hand * (motion[:2] + 0.5 * step * motion[2:] - held)
             plant.advance_unchecked(openings, np.ascontiguousarray(force[None]), step)
             np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
-        tick()
     span = window.span().max(axis=0)
     lost = ~np.isfinite(span) | (impacts > board_limit(rigs))
     with np.errstate(divide="ignore"):
         return Verdict(span, ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / cases.hand)), lost)
-
-
-def periods(rig: Parameters) -> int:
-    """Control periods, and calls of ``tick``, of one ``judge``."""
-    return round(END / rig.electronics.control_period)
 
 
 def variants_of(controller: str) -> dict[str, dict[str, float]]:
@@ -194,23 +188,46 @@ def variants_of(controller: str) -> dict[str, dict[str, float]]:
     return VARIANTS.get(controller, {controller: {}})
 
 
+def describe_map(key: str, rig: Parameters, points: int | None = None) -> dict[str, Any]:
+    """What a map of ``MAPS`` shows, as JSON: the values along ``x`` and ``y``, and where the controller believes itself.
+
+    ``points`` is the number of values along each axis.
+    """
+    chart = MAPS[key]
+    x, y = (
+        {"label": axis.label, "values": axis.values(points).tolist(), "logarithmic": axis.logarithmic}
+        for axis in (chart.x, chart.y)
+    )
+    return {"title": chart.title, "x": x, "y": y, "believed": list(chart.believed(rig))}
+
+
 def draw_map(
-    chart: Map, controller: str, rig: Parameters, sensors: str = "ideal", points: int | None = None, seed: int = 0,
-    tick: Callable[[], object] = lambda: None,
-) -> dict[str, Any]:  # fmt: skip
-    """One map as JSON: the values along ``x`` and ``y``, where the controller believes itself, and per variant rows over y of
-    ``motion_mm`` (NaN where lost) and ``stable``. ``points`` is the number of values along each axis."""
+    controller: str, source: str, rig: dict[str, Any], key: str, options: dict[str, float], sensors: str = "ideal",
+    points: int | None = None, seed: int = 0,
+) -> Result:  # fmt: skip
+    """One map for a controller with ``options``: rows over y of ``motion_mm`` (None where lost) and ``stable``.
+
+    ``source`` only tells controllers of different files apart.
+    """
+    chart, believed = MAPS[key], Parameters.from_dict(rig)
     x, y = chart.x.values(points), chart.y.values(points)
     across, up = (side.ravel() for side in np.meshgrid(x, y))
-    cases, shape, found = chart.cases(rig, across, up), (len(y), len(x)), {}
-    for label, options in variants_of(controller).items():
-        verdict = judge(cases, make_controller(controller, rig, **options), sensors, seed, tick)
-        motion = np.where(verdict.lost, np.nan, 1e3 * verdict.motion).reshape(shape)
-        found[label] = {"motion_mm": motion.tolist(), "stable": verdict.stable.reshape(shape).tolist()}
+    verdict = judge(chart.cases(believed, across, up), make_controller(controller, believed, **options), sensors, seed)
+    motion, shape = np.where(verdict.lost, np.nan, 1e3 * verdict.motion), (len(y), len(x))
+    return {"motion_mm": motion.reshape(shape).tolist(), "stable": verdict.stable.reshape(shape).tolist()}
+
+
+def stability_tasks(
+    maps: Sequence[str], settings: dict[str, Any], sensors: str, points: int | None, seed: int
+) -> dict[tuple[str, str], Task]:
+    """(map, variant) -> task, for the controller given by its ``controller_settings``."""
+    own, name = {"sensors": sensors, "points": points, "seed": seed}, settings["controller"]
     return {
-        "title": chart.title, "x": {"label": chart.x.label, "values": x.tolist(), "logarithmic": chart.x.logarithmic},
-        "y": {"label": chart.y.label, "values": y.tolist(), "logarithmic": chart.y.logarithmic},
-        "believed": list(chart.believed(rig)), "variants": found,
+        (key, label): Task(
+            f"pieces/{file_stem(name)}/{key}-{file_stem(label)}", key, draw_map,
+            {**settings, "key": key, "options": options, **own},
+        )
+        for key in maps for label, options in variants_of(name).items()
     }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.bench.comparison import file_stem
+from baselines.bench.pieces import file_stem
 from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.bench.tasks import Result, Task

@@ -8,22 +8,21 @@ from typing import Any
 
 import birthsim_env
 from baselines.bench import comparison
-from baselines.bench.comparison import Conditions, all_conditions, cell_task, controller_settings, default_controllers
+from baselines.bench.comparison import Conditions, all_conditions, cell_task, default_controllers
 from baselines.bench.comparison_tables import full, losses, overview
+from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
 from baselines.bench.tasks import Result, code_stamp, run_tasks
 from baselines.commands.parts import with_options
-from baselines.files import make_folder, write_json, write_text
+from baselines.commands.shared import JOBS, shown_arguments
+from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import CONTROLLERS, SLOW, split_options
 from birthsim_env.parts.randomization import described
 from birthsim_env.physics.parameters import Parameters
 
 NARROWED = {"scenario": "nominal", "all": "randomised"}
 """The option --randomize -> the one plant that is then compared."""
-
-JOBS = 2
-"""Processes side by side, unless --jobs says otherwise."""
 
 
 def evaluate_all(arguments: argparse.Namespace) -> None:
@@ -45,11 +44,13 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
     quick = [own for own in settings if split_options(own["controller"])[0] not in SLOW]
     studies = {} if arguments.no_studies else study_tasks(quick, rig)
     print(f"randomised plant: {described(rig, True)}")
-    done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison")
-    felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies")
-    figures = comparison.statistics(comparison.gather({key: done[t.name] for key, t in cells.items() if t.name in done}))
+    done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison", arguments.cluster)
+    felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies", arguments.cluster)
+    gathered = comparison.gather({key: done[task.name] for key, task in cells.items() if task.name in done})
     found = {key: felt[task.name] for key, task in studies.items() if task.name in felt}
-    _write(arguments, rig, figures, found, folder)
+    with whole_results(folder) as place:
+        written = _write(arguments, rig, gathered, found, place)
+    print(f"written to {folder}/: {', '.join(written)} (each picture as .svg too)")
     problems = {**failures, **failed}
     if problems:
         name, problem = next(iter(problems.items()))
@@ -73,25 +74,25 @@ def _conditions(arguments: argparse.Namespace) -> list[Conditions]:
 
 
 def _write(
-    arguments: argparse.Namespace, rig: Parameters, figures: list[dict[str, Any]], studies: dict[tuple[str, str], Result],
+    arguments: argparse.Namespace, rig: Parameters, cells: comparison.Cells, studies: dict[tuple[str, str], Result],
     folder: Path,
-) -> None:  # fmt: skip
+) -> list[str]:  # fmt: skip
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures.comparison import draw_comparison
     from baselines.figures.studies import draw_studies
 
+    figures = comparison.statistics(cells)
     by_study: dict[str, dict[str, Result]] = {}
     for (study, label), result in studies.items():
         by_study.setdefault(study, {})[label] = result
-    shown = {
-        key: value if value is None or isinstance(value, (int, list)) else str(value) for key, value in vars(arguments).items()
-    }
     content = {
-        "arguments": shown, "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
+        "arguments": shown_arguments(arguments), "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
         "cells": jsonable(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)
-    files = ["comparison.json"]
+    # The only file that differs from run to run.
+    write_json(folder / "times.json", {"us_per_lane_and_call": comparison.costs(cells)})
+    files = ["comparison.json", "times.json"]
     if not arguments.studies_only:
         text = f"{overview(figures)}\n\n{losses(figures)}"
         caption = (
@@ -102,5 +103,4 @@ def _write(
         print(f"{caption}\n\n{text}\n")
         files.append("comparison.md")
     drawn = [*draw_comparison(figures, folder), *draw_studies(by_study, folder)]
-    files += sorted({path.stem + ".png" for path in drawn})
-    print(f"written to {folder}/: {', '.join(files)} (each picture as .svg too)")
+    return files + sorted({path.stem + ".png" for path in drawn})

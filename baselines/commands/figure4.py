@@ -14,7 +14,7 @@ from tqdm import tqdm
 import birthsim_env
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import run
-from baselines.files import make_folder, whole_file, write_json
+from baselines.files import make_folder, whole_file, whole_results, write_json
 from baselines.registry import controller_names, make_controller
 from birthsim_env.physics.lanes import Array
 from birthsim_env.success import SETTLED
@@ -102,12 +102,13 @@ def _figure4(arguments: argparse.Namespace) -> None:
     controller = with_options([arguments.controller], arguments.set)[0]
     make_controller(controller, rig)
     folder = make_folder(arguments.out)
-    record = record_run(controller, arguments.sensors, rig, folder / "rig.png")
-    result = figures_of(record, rig)
     from baselines.figures.runs import figure4
 
-    figure4(record, folder)
-    write_json(folder / "figure4.json", result)
+    with whole_results(folder) as place:
+        record = record_run(controller, arguments.sensors, rig, place / "rig.png")
+        result = figures_of(record, rig)
+        figure4(record, place)
+        write_json(place / "figure4.json", result)
     if result["lost"]:
         raise ValueError(
             f"{controller} lost the end effector after {result['duration_s']:.3g} s: a piston ran "

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import gymnasium
 
@@ -13,17 +15,55 @@ RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario":
 """The option --randomize -> the environments' argument ``randomize``."""
 
 
+class Ended(KeyboardInterrupt):
+    """A signal asks this process to end; ``number`` is the signal's."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the terminal is gone"}
+"""Signal -> what a command says last; the second one ends it at once."""
+
+
 def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], None]) -> None:
-    """Parse, act, and turn what a user can mend into one line and exit status 2; an interrupt into 130."""
+    """Parse, act, and turn what a user can mend into one line and exit status 2; a signal of ``ENDINGS`` into 128 + its number.
+
+    SIGTERM and SIGHUP end a command as Ctrl-C does: what is complete is kept, and no process or half a file stays behind.
+    """
     arguments = parser.parse_args()
+    words = {signal.Signals[name].value: said for name, said in ENDINGS.items() if name in signal.Signals.__members__}
+    came: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        came.append(number)
+        if len(came) > 1:
+            os.write(2, f"{parser.prog}: {words[number]}\n".encode())
+            os._exit(128 + number)
+        raise Ended(number)
+
+    before = {number: signal.signal(number, end) for number in words}
     try:
         action(arguments)
-    except (ValueError, OSError) as error:
-        print(f"{parser.prog}: error: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        print(f"{parser.prog}: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except ValueError as error:
+        _say(parser, f"error: {error}", 2)
+    except OSError as error:
+        place = "" if error.filename is None else f"{str(error.filename)!r}: "
+        _say(parser, f"error: {place}{error.strerror or error}", 2)
+    except MemoryError:
+        _say(parser, "error: out of memory; allowed: fewer lanes, episodes or jobs", 2)
+    except KeyboardInterrupt as error:
+        number = error.number if isinstance(error, Ended) else int(signal.SIGINT)
+        _say(parser, words[number], 128 + number)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:
+    print(f"{parser.prog}: {words}", file=sys.stderr)
+    raise SystemExit(status) from None
 
 
 def whole(text: str) -> int:
@@ -33,11 +73,43 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def cluster_name(text: str) -> str:
+    """``ray`` or ``ray:ADDRESS``, for argparse."""
+    kind, colon, address = text.partition(":")
+    if kind != "ray" or (colon and not address):
+        raise argparse.ArgumentTypeError(f"{text!r}; allowed: ray, or ray:ADDRESS of a running cluster, as ray:10.0.0.1:6379")
+    return text
+
+
 def seed_number(text: str) -> int:
     """A seed that NumPy and PyTorch take, for argparse."""
     if not text.isdecimal() or int(text) >= 2**32:
         raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to {2**32 - 1}")
     return int(text)
+
+
+JOBS = 2
+"""Processes side by side, unless --jobs says otherwise."""
+
+
+def add_processes(parser: argparse.ArgumentParser) -> None:
+    """Add ``--jobs`` and ``--cluster``."""
+    parser.add_argument("--jobs", type=whole, help=f"processes side by side (default: {JOBS})")
+    parser.add_argument(
+        "--cluster",
+        type=cluster_name,
+        metavar="ray[:ADDRESS]",
+        help="Ray's workers instead, of a running cluster or of this machine",
+    )
+
+
+def shown_arguments(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The arguments that results depend on, as JSON."""
+    without = ("out", "jobs", "cluster")
+    return {
+        key: value if value is None or isinstance(value, (bool, int, list)) else str(value)
+        for key, value in vars(arguments).items() if key not in without
+    }  # fmt: skip
 
 
 def check_world(environment: str, **arguments: Any) -> None:

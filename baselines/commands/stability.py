@@ -6,14 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from baselines.bench import stability
-from baselines.bench.stability import MAPS
+from baselines.bench.pieces import controller_settings
+from baselines.bench.stability import MAPS, describe_map, stability_tasks
+from baselines.bench.tasks import run_tasks
 from baselines.commands.parts import add_set, with_options
-from baselines.commands.shared import run, seed_number, whole
-from baselines.files import make_folder, write_json
-from baselines.registry import make_controller
+from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole
+from baselines.files import make_folder, whole_results, write_json
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import load_parameters
 
@@ -36,6 +35,7 @@ def main() -> None:
     parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
     parser.add_argument("--parameters", help="TOML file of the rig as the controller believes it (default: the paper's)")
     add_set(parser)
+    add_processes(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for stability.json and the figures")
     run(parser, _stability)
 
@@ -43,25 +43,27 @@ def main() -> None:
 def _stability(arguments: argparse.Namespace) -> None:
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     rig, name = load_parameters(arguments.parameters), with_options([arguments.controller], arguments.set)[0]
-    make_controller(name, rig)
+    settings = controller_settings(name, rig)
     from baselines.figures.stability import stability_figure
 
     folder, chosen = make_folder(arguments.out), list(dict.fromkeys(arguments.map or MAPS))
-    variants, charts = stability.variants_of(name), {}
-    total = len(chosen) * len(variants) * stability.periods(rig)
-    with tqdm(total=total, desc="stability", unit=" periods", leave=False) as bar:
-        for key in chosen:
-            bar.set_postfix_str(key, refresh=False)
-            charts[key] = stability.draw_map(
-                MAPS[key], name, rig, arguments.sensors, arguments.points, arguments.seed, bar.update
-            )
+    tasks = stability_tasks(chosen, settings, arguments.sensors, arguments.points, arguments.seed)
+    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "stability", arguments.cluster)
+    if failures:
+        raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first: {next(iter(failures.values()))}")
+    charts = {
+        key: {**describe_map(key, rig, arguments.points), "variants": {
+            label: done[task.name] for (place, label), task in tasks.items() if place == key
+        }} for key in chosen
+    }  # fmt: skip
     setting: dict[str, Any] = {
         "controller": name, "sensors": arguments.sensors, "seed": arguments.seed, "believed": rig.to_dict(),
         "limits": {"motion_mm": 1e3 * stability.MOST_MOTION, "force_of_the_hand_n": stability.MOST_FORCE},
     }  # fmt: skip
-    write_json(folder / "stability.json", {**setting, "maps": charts})
     heading = f"{name}, {arguments.sensors} sensors"
-    drawn = [path for key in chosen for path in stability_figure(key, charts[key], heading, folder)]
+    with whole_results(folder) as place:
+        write_json(place / "stability.json", {**setting, "maps": charts})
+        drawn = [path for key in chosen for path in stability_figure(key, charts[key], heading, place)]
     print(f"{heading}: stable up to and including, from the left of the map\n")
     for chart in charts.values():
         print(_table(chart))

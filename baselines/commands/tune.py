@@ -30,7 +30,7 @@ from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import check_world, run, seed_number, whole
 from baselines.controller import Controller
-from baselines.files import make_folder, write_json
+from baselines.files import own_folder, whole_results, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
 from birthsim_env.parts.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.seeding import stream
@@ -120,16 +120,22 @@ def costs(
     return parts
 
 
-def open_study(folder: Path, setting: dict[str, Any]) -> Study:
-    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
+def check_optuna() -> None:
+    """Raises ``ValueError`` where Optuna is missing, before anything is made."""
     try:
-        import optuna
-        from optuna.storages import JournalStorage
-        from optuna.storages.journal import JournalFileBackend
+        import optuna  # noqa: F401
     except ImportError as error:
         raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
+
+
+def open_study(folder: Path, setting: dict[str, Any]) -> Study:
+    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
+    import optuna
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    path = make_folder(folder) / "trials.journal"
+    path = folder / "trials.journal"
     try:
         storage = JournalStorage(JournalFileBackend(str(path)))
         study = optuna.create_study(storage=storage, study_name="birthsim-tune", load_if_exists=True)
@@ -208,28 +214,31 @@ def _tune(arguments: argparse.Namespace) -> None:
     }  # fmt: skip
     check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
     print(described(rig, True))
-    study = open_study(arguments.out, setting)
-    kept = len(complete(study)[: arguments.trials])
-    bar = tqdm(total=arguments.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
-    try:
-        numbers = (arguments.lanes, arguments.seed, arguments.trials)
-        for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
-            bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
-            bar.update()
-    except KeyboardInterrupt:
-        if not (kept := len(complete(study))):
-            raise
-        print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
-    finally:
-        bar.close()
-    trials = [
-        {"gains": trial.params, "cost": trial.value, "parts": trial.user_attrs["parts"]}
-        for trial in complete(study)[: arguments.trials]
-    ]
-    first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
-    place = {"trial": trials.index(best), "trials": len(trials)}
-    write_json(arguments.out / "trials.json", {**setting, "trials": trials})
-    write_json(arguments.out / "gains.json", {**setting, **best, **place})
+    check_optuna()
+    with own_folder(arguments.out) as folder:
+        study = open_study(folder, setting)
+        kept = len(complete(study)[: arguments.trials])
+        bar = tqdm(total=arguments.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
+        try:
+            numbers = (arguments.lanes, arguments.seed, arguments.trials)
+            for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
+                bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
+                bar.update()
+        except KeyboardInterrupt:
+            if not (kept := len(complete(study))):
+                raise
+            print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
+        finally:
+            bar.close()
+        trials = [
+            {"gains": trial.params, "cost": trial.value, "parts": trial.user_attrs["parts"]}
+            for trial in complete(study)[: arguments.trials]
+        ]
+        first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
+        place = {"trial": trials.index(best), "trials": len(trials)}
+        with whole_results(folder) as results:
+            write_json(results / "trials.json", {**setting, "trials": trials})
+            write_json(results / "gains.json", {**setting, **best, **place})
     print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
     print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
     for part, value in best["parts"].items():

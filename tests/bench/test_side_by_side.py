@@ -1,9 +1,13 @@
-"""Work in several processes: one thread each, and an end at once."""
+"""Work in several processes: one thread each, an end at once, and no worker that outlives its parent."""
 
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -14,13 +18,27 @@ def threads(number):
     return number, os.environ["OMP_NUM_THREADS"], os.environ["NUMBA_NUM_THREADS"]
 
 
-def test_every_process_has_one_thread_and_results_come_with_their_numbers():
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_pieces_are_drawn_as_there_is_room_and_results_come_with_their_numbers(jobs):
+    taken = {}
+
+    def pieces():
+        for k in range(5):
+            if k == 3:
+                yield None  # nothing at present
+            assert k - len(taken) < jobs
+            yield (k, 2)
+
+    side_by_side(divmod, pieces(), jobs, taken.__setitem__)
+    assert taken == {k: divmod(k, 2) for k in range(5)}
+
+
+def test_every_process_has_one_thread():
     taken = {}
     side_by_side(threads, [(k,) for k in range(5)], 2, taken.__setitem__)
     assert taken == {k: (k, "1", "1") for k in range(5)}
 
 
-@pytest.mark.filterwarnings("error")
 def test_what_the_caller_raises_ends_the_workers_at_once():
     began = time.monotonic()
 
@@ -35,3 +53,52 @@ def test_what_the_caller_raises_ends_the_workers_at_once():
 def test_what_a_piece_raises_is_raised_here():
     with pytest.raises(ZeroDivisionError):
         side_by_side(divmod, [(1, 1), (1, 0), (1, 2)], 2, lambda number, result: None)
+
+
+def test_a_process_that_dies_is_an_error_that_says_so():
+    with pytest.raises(OSError, match="has died"):
+        side_by_side(os._exit, [(1,), (1,)], 2, lambda number, result: None)
+
+
+PARENT = """
+import os, sys, time
+from pathlib import Path
+from baselines.side_by_side import side_by_side
+from tests.bench.test_side_by_side import wait_beside
+if __name__ == "__main__":
+    side_by_side(wait_beside, [(sys.argv[1],), (sys.argv[1],)], 2, lambda number, result: None)
+"""
+
+
+def wait_beside(folder):
+    (Path(folder) / str(os.getpid())).touch()
+    time.sleep(600)
+
+
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGTERM])
+def test_workers_end_with_their_parent_whatever_ends_it(ending, tmp_path):
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, str(tmp_path)], stderr=subprocess.DEVNULL)
+    try:
+        waited_for(lambda: len(list(tmp_path.iterdir())) == 2)
+    finally:
+        parent.send_signal(ending)
+        parent.wait(60)
+    workers = [int(path.name) for path in tmp_path.iterdir()]
+    waited_for(lambda: not any(is_running(worker) for worker in workers))
+
+
+def is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    stat = Path(f"/proc/{process}/stat")
+    # Nobody may be there to bury an orphan.
+    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def waited_for(state, seconds=120):
+    end = time.monotonic() + seconds
+    while not state():
+        assert time.monotonic() < end, "that state has not come"
+        time.sleep(0.05)

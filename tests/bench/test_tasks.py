@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 
-from baselines.bench import tasks
+from baselines.bench import claims, tasks
+from baselines.bench.claims import Claims
 from baselines.bench.tasks import Task, code_stamp, run_tasks
+from baselines.files import this_process
+from tests.bench.test_side_by_side import waited_for
 
 
 def square(log, number):
@@ -53,9 +59,11 @@ def test_results_are_written_piece_by_piece_and_come_back_as_written(log, tmp_pa
     results, failures = run_tasks(made(log), tmp_path / "out", 1, "work")
     assert failures == {}
     assert results == {f"deep/{k}": {"square": k * k, "nothing": None} for k in range(5)}
-    content = json.loads((tmp_path / "out" / "deep" / "3.json").read_text())
+    task = made(log)[3]
+    content = json.loads((tmp_path / "out" / task.file()).read_text())
     assert content["result"] == {"square": 9, "nothing": None}
-    assert content["code"] == code_stamp()
+    assert content["code"] == task.code() == code_stamp()
+    assert content["settings"] == task.settings
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped_and_ends_like_an_uninterrupted_one(log, tmp_path, capsys):
@@ -83,15 +91,26 @@ def test_pieces_of_other_settings_or_other_code_are_computed_anew(log, tmp_path,
     assert ran(log)[5:] == [7]
     assert results["deep/2"]["square"] == 49
     assert "work: 1 are there with other settings, rig or code, and are computed anew" in capsys.readouterr().out
-    monkeypatch.setattr(tasks, "code_stamp", lambda: {"version": "other"})
+    monkeypatch.setattr(tasks, "code_stamp", lambda package: {"version": "other"})
     run_tasks(made(log, numbers=[0, 1]), tmp_path / "out", 1, "work")
     assert ran(log)[6:] == [0, 1]
 
 
-@pytest.mark.parametrize("damage", ["", "{", "[]", '{"code": 1}'])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: "",
+        lambda text: "{",
+        lambda text: "[]",
+        lambda text: '{"code": 1}',
+        lambda text: "[" * 100_000,
+        lambda text: text.replace('"square": 1', '"square": 3'),
+    ],
+)
 def test_a_damaged_piece_is_computed_anew(log, tmp_path, damage):
     run_tasks(made(log, numbers=[1]), tmp_path / "out", 1, "work")
-    (tmp_path / "out" / "deep" / "1.json").write_text(damage)
+    path = tmp_path / "out" / made(log)[1].file()
+    path.write_text(damage(path.read_text()))
     results, _ = run_tasks(made(log, numbers=[1]), tmp_path / "out", 1, "work")
     assert ran(log) == [1, 1]
     assert results["deep/1"]["square"] == 1
@@ -109,6 +128,68 @@ def test_two_processes_give_what_one_gives(log, tmp_path):
     alone = run_tasks(made(log, fail), tmp_path / "one", 1, "work")
     assert run_tasks(made(tmp_path / "second", fail), tmp_path / "two", 2, "work") == alone
     assert sorted(ran(tmp_path / "second")) == [0, 1, 2, 4]
+
+
+def others_claim(log, folder, text, number=1):
+    path = folder / made(log)[number].file()
+    path.parent.mkdir(parents=True)
+    path.with_suffix(".claim").write_text(text)
+
+
+def test_the_claim_of_a_process_that_died_is_void(log, tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    others_claim(log, tmp_path / "out", f"{this_process()[0]} {dead.pid}")
+    assert run_tasks(made(log), tmp_path / "out", 1, "work")[0]["deep/1"]["square"] == 1
+    assert not list(tmp_path.rglob("*.claim"))
+
+
+def test_the_claim_of_another_host_is_void_once_nobody_touches_it(log, tmp_path, monkeypatch):
+    monkeypatch.setattr(claims, "PATIENCE", 1.5)
+    others_claim(log, tmp_path / "out", "elsewhere 1")
+    run_tasks(made(log), tmp_path / "out", 1, "work")
+    assert ran(log) == [0, 2, 3, 4, 1], "what others have claimed comes last"
+    assert not list(tmp_path.rglob("*.claim"))
+
+
+def test_a_claim_is_touched_and_respected_until_it_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr(claims, "HEARTBEAT", 0.02)
+    monkeypatch.setattr(claims, "PATIENCE", 0.0)
+    path = tmp_path / "piece.json"
+    with Claims() as mine, Claims() as others:
+        assert mine.take(path)
+        before = path.with_suffix(".claim").stat().st_mtime_ns
+        waited_for(lambda: path.with_suffix(".claim").stat().st_mtime_ns != before)
+        monkeypatch.setattr(claims, "PATIENCE", 60.0)
+        assert not others.take(path)
+        mine.give_up(path)
+        assert others.take(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+PROCESS = """
+import sys
+from pathlib import Path
+from baselines.bench.tasks import run_tasks
+from tests.bench.test_tasks import made, slowly
+if __name__ == "__main__":
+    log, out = map(Path, sys.argv[1:])
+    results, failures = run_tasks(made(log, slowly, range(12)), out, 1, "work")
+    assert not failures and [results[f"deep/{k}"]["square"] for k in range(12)] == [k * k for k in range(12)]
+"""
+
+
+def slowly(log, number):
+    time.sleep(0.2)
+    return square(log, number)
+
+
+def test_processes_on_one_folder_divide_the_work_and_all_have_the_results(log, tmp_path):
+    line = [sys.executable, "-c", PROCESS, str(log), str(tmp_path / "out")]
+    processes = [subprocess.Popen(line, stderr=subprocess.DEVNULL) for _ in range(3)]
+    assert [process.wait(120) for process in processes] == [0, 0, 0]
+    assert sorted(ran(log)) == list(range(12)), "each piece once"
+    assert not list(tmp_path.rglob("*.claim"))
 
 
 def test_a_process_that_dies_is_reported(log, tmp_path):

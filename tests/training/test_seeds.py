@@ -12,11 +12,11 @@ from scipy import stats
 from agents.commands import evaluate as command
 from agents.policy.controller import observation_size
 from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy, merged, policy_folders, pooled, seed_table, shipped_names
+from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
 from agents.reports import inspection
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
 from agents.reports.learning_curves import over_seeds
-from baselines.bench.evaluation import Evaluation
+from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 

@@ -1,0 +1,106 @@
+"""Evaluations in pieces: some episodes of one controller each, which several processes and interrupted runs put together."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.evaluation import Evaluation, evaluate, merged
+from baselines.bench.tasks import Result, Task
+from baselines.registry import SLOW, make_controller, split_options
+from birthsim_env.physics.parameters import Parameters
+
+EPISODES, SLOW_EPISODES = 64, 4
+"""Episodes of a piece, and of one whose controller is slow: a minute's work at most on this project's machines."""
+
+
+def file_hash(part: str | None) -> str:
+    """Hash of the file that ``path`` or ``path:Name`` names; "" where that is no file."""
+    for path in (Path(part or ""), Path((part or "").rpartition(":")[0])):
+        if path.is_file():
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+    return ""
+
+
+def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
+    """What a result of a controller depends on: its name, a hash of its file if it has one, and the rig as a dictionary.
+
+    Raises ``ValueError`` for a name that is no controller.
+    """
+    make_controller(name, rig)
+    return {"controller": name, "source": file_hash(split_options(name)[0]), "rig": rig.to_dict()}
+
+
+def file_stem(name: str) -> str:
+    """A controller's name as that of a file; those that are none get a hash, so that no two have the same."""
+    stem = "".join(letter if letter.isalnum() or letter in "_.-" else "-" for letter in name)
+    return stem if stem == name else f"{stem.strip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def evaluation_tasks(
+    label: str, settings: dict[str, Any], environment: str, world: dict[str, Any], episodes: int, seed: int,
+    work: Callable[..., Result] | None = None,
+) -> list[Task]:  # fmt: skip
+    """The pieces of an evaluation of the controller with these ``controller_settings``, seeds ``seed``, ``seed`` + 1, ...
+
+    ``world`` holds the environment's arguments as JSON takes them, the rig only where it is not as believed;
+    ``work`` is ``evaluate_piece`` or what calls it.
+    """
+    every = SLOW_EPISODES if split_options(settings["controller"])[0] in SLOW else EPISODES
+    hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
+    return [
+        Task(
+            f"pieces/{file_stem(label)}/{first}", label, work or evaluate_piece,
+            {
+                **settings, "environment": environment, "world": world, "files": hashes, "seed": first,
+                "episodes": min(every, seed + episodes - first),
+            },
+        )
+        for first in range(seed, seed + episodes, every)
+    ]  # fmt: skip
+
+
+def evaluate_piece(
+    controller: str, source: str, rig: dict[str, Any], environment: str, world: dict[str, Any], files: list[str], seed: int,
+    episodes: int, **options: Any,
+) -> Result:  # fmt: skip
+    """One piece; ``options`` go to the controller's constructor, ``source`` and ``files`` only tell pieces apart.
+
+    ``rig`` is what the controller believes, and where ``world`` has no ``parameters`` it is so.
+    """
+    law = make_controller(controller, Parameters.from_dict(rig), **options)
+    world = {**world, "parameters": Parameters.from_dict(world.get("parameters", rig))}
+    found = evaluate(environment, law, controller, episodes, seed, progress=False, **world)
+    if len(found.seeds) < episodes:
+        raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a piece is complete or it is none
+    trace = np.ascontiguousarray(np.concatenate(found.traces, axis=1), dtype="<f4")
+    return {
+        "seeds": found.seeds, "metrics": found.metrics, "lost": found.lost, "success": found.success, "cost": found.cost,
+        "required_strength_ratio": found.required_strength_ratio,
+        "returns": {str(discount): values for discount, values in found.returns.items()},
+        "trace": {"shape": trace.shape, "float32": base64.b64encode(trace.tobytes()).decode()},
+    }  # fmt: skip
+
+
+def gathered(name: str, results: Sequence[Result]) -> Evaluation:
+    """The evaluation that pieces make up."""
+    return merged([_evaluation(result) for result in results], name)
+
+
+def _evaluation(result: Result) -> Evaluation:
+    flat = np.frombuffer(base64.b64decode(result["trace"]["float32"]), dtype="<f4")
+    return Evaluation(
+        "", result["seeds"], {name: _numbers(values) for name, values in result["metrics"].items()}, result["lost"],
+        result["required_strength_ratio"], {float(key): _numbers(values) for key, values in result["returns"].items()},
+        result["success"], result["cost"], [flat.reshape(result["trace"]["shape"]).astype(np.float64)],
+    )  # fmt: skip
+
+
+def _numbers(values: list[float | None]) -> list[float]:
+    """JSON has no other word for a number that is not finite than null."""
+    return [np.nan if value is None else value for value in values]

@@ -1,0 +1,59 @@
+"""Ray's workers, on this machine or on many, behind the face of ``side_by_side``'s pools."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+from baselines.side_by_side import LISTENING, ONE_THREAD
+
+
+class RayPool:
+    """As many pieces at once as the cluster ``ray[:ADDRESS]`` has processors; without an address it is this machine's own.
+
+    Every host needs the same version of this package, and what a piece names by path, such as a controller's file.
+    """
+
+    def __init__(self, cluster: str) -> None:
+        try:
+            import ray
+        except ImportError as error:
+            raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
+        self._ray, address = ray, cluster.partition(":")[2]
+        try:
+            ray.init(
+                address=address or "local", log_to_driver=False, include_dashboard=False if not address else None,
+                runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
+            )  # fmt: skip
+        except ConnectionError as error:
+            raise ValueError(f"--cluster {cluster!r}: no cluster answers there; allowed: ray, or the address of one") from error
+        self.width = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        self._begun: set[Any] = set()
+
+    def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
+        begun = self._ray.remote(num_cpus=1)(_call).remote(work, piece)
+        self._begun.add(begun)
+        return begun
+
+    def done(self, begun: list[Any]) -> list[Any]:
+        return list(self._ray.wait(begun, num_returns=1, timeout=LISTENING)[0])
+
+    def result(self, begun: Any) -> Any:
+        self._begun.discard(begun)
+        try:
+            return self._ray.get(begun)
+        except self._ray.exceptions.RayTaskError as error:
+            raise error.cause from None
+        except self._ray.exceptions.RayError as error:
+            raise OSError(f"a worker of the cluster has died ({type(error).__name__}); what is complete is kept") from error
+
+    def close(self) -> None:
+        for begun in self._begun:
+            with contextlib.suppress(self._ray.exceptions.RayError):
+                self._ray.cancel(begun, force=True)
+        self._ray.shutdown()
+
+
+def _call(work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
+    return work(*piece)
