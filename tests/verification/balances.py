@@ -65,13 +65,13 @@ def adiabat() -> dict[str, float]:
     return {"drift": float(drift), "squeezed": float((np.max(volumes, axis=0) / np.min(volumes, axis=0) - 1).max())}
 
 
-def mechanical_energy() -> dict[str, float]:
+def mechanical_energy(step: float) -> dict[str, float]:
     """Gap of m v^2/2 + m g y against the work of pressures and hand, less friction, over 2 s, relative to the work done.
 
     The work is summed by trapezoids of one step, which are of second order: the gap is theirs.
     """
     rig, lanes, rng = Parameters(), LANES, np.random.default_rng(1)
-    plant, step = Plant(rig, lanes), INTEGRATION_STEP
+    plant = Plant(rig, lanes)
     mass, weight = rig.mechanics.mass, rig.mechanics.mass * rig.mechanics.gravity
 
     def energy() -> Array:
@@ -93,13 +93,13 @@ def mechanical_energy() -> dict[str, float]:
 
     start, work, moved = energy(), np.zeros(lanes), np.zeros(lanes)
     for k in range(round(SECONDS / step)):
-        if k % 400 == 0:
+        if k % round(0.1 / step) == 0:
             push = rng.uniform(-60, 60, (2, lanes))
         before = power(push)
         plant.advance(np.zeros((4, lanes)), push, step)
         mean = 0.5 * (before + power(push)) * step
         work, moved = work + mean, moved + np.abs(mean)
-    return {"gap": float((np.abs(energy() - start - work) / moved).max()), "work_j": float(moved.max())}
+    return {"step_s": step, "gap": float((np.abs(energy() - start - work) / moved).max()), "work_j": float(moved.max())}
 
 
 def measure() -> dict[str, Any]:
@@ -108,5 +108,5 @@ def measure() -> dict[str, Any]:
         "clear": [chambers(factor * INTEGRATION_STEP, collide=False) for factor in (2, 1, 0.5)],
         "collisions": [chambers(factor * INTEGRATION_STEP, collide=True) for factor in (1, 0.5, 0.25)],
         "adiabat": adiabat(),
-        "mechanical": mechanical_energy(),
+        "mechanical": [mechanical_energy(factor * INTEGRATION_STEP) for factor in (1, 0.5, 0.25)],
     }

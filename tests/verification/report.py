@@ -15,8 +15,9 @@ HERE = Path(__file__).parent
 INTRODUCTION = """# Verification
 
 This page says how the physics and the laws were checked, and what the checks found. `make verify` measures accuracy and
-balances and writes the page anew; `make verify-slow` ({minutes} minutes of one core) also measures mutation scores and
-coverage. The page is generated: edit `tests/verification/`, not this file.
+balances and writes the page anew; `make verify-slow` also measures mutation scores and coverage (the mutants and the
+coverage below took {minutes} minutes, and the choice of the tests comes on top). The page is generated: edit
+`tests/verification/`, not this file.
 """
 
 EQUATIONS = """## Equations
@@ -151,11 +152,12 @@ def balances() -> str:
         for one in found[name]
     ]
     adiabat, mechanical = found["adiabat"], found["mechanical"]
+    squeezed = f"{100 * adiabat['squeezed']:.0f} %"
+    gaps = ", ".join(f"{one['gap']:.1e} with steps of {1e3 * one['step_s']:g} ms" for one in mechanical)
     more = (
-        f"Insulated chambers, squeezed by up to {100 * adiabat['squeezed']:.0f} %, keep P V^gamma to {adiabat['drift']:.1e}. "
-        "Kinetic and potential energy change by the work of pressures and hand less that of friction; over 2 s and "
-        f"{mechanical['work_j']:.0f} J the gap is {mechanical['gap']:.1e} of the work, which is the error of the trapezoids "
-        "that sum it up."
+        f"Insulated chambers, squeezed by up to {squeezed}, keep P V^gamma to {adiabat['drift']:.1e}.\n\n"
+        "Kinetic and potential energy change by the work of pressures and hand less that of friction. Over 2 s and "
+        f"{mechanical[0]['work_j']:.0f} J the gap, relative to the work, is {gaps}. Trapezoids of one step sum up the work."
     )
     heads = ["motion", "lanes", "step (ms)", "gap of mass", "gap of energy"]
     return f"{BALANCES}\n{basis(found)}\n{table(heads, rows)}\n{more}\n"
