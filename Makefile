@@ -1,6 +1,7 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
+# make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
@@ -33,7 +34,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow test-weekly portable oldest lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow test-weekly portable oldest verify verify-slow lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -80,6 +81,20 @@ portable: $(READY)
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
+
+verify: $(READY)
+	$(BIN)/birthsim-verify --out $(OUT)/verify
+	$(BIN)/python -m tests.verification accuracy $(OUT)/verify
+	$(BIN)/python -m tests.verification balances
+	$(BIN)/python -m tests.verification report
+
+# Survivors are judged by hand, in tests/verification/survivors.toml; a test names those that are not.
+verify-slow: $(READY)
+	mkdir -p $(OUT)/verify
+	$(BIN)/python -m tests.mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
+	$(BIN)/python -m tests.verification mutation $(OUT)/verify/mutation.json
+	$(BIN)/python -m tests.verification coverage
+	$(MAKE) verify
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci
