@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
@@ -96,8 +95,12 @@ def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
         low, high = known[name]
         least, most = low / BEYOND, high * BEYOND
         if not is_within(value, least=least, most=most):
-            words = f"{'zero or ' if low == 0 else ''}a positive number"
-            raise ValueError(f"{name} = {shown(value)}; allowed: {words}{limits(least=least, most=most)}")
+            words = (
+                f"zero or a positive number{limits(most=most)}"
+                if low == 0
+                else f"a positive number{limits(least=least, most=most)}"
+            )
+            raise ValueError(f"{name} = {shown(value)}; allowed: {words}")
 
 
 def require_stiffness(reference: Reference, least: float) -> None:

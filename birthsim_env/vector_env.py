@@ -47,7 +47,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         **arguments: Any,
     ) -> None:
         checked_count("num_envs", num_envs, 1, MOST_LANES)
-        if max_episode_steps == -1:
+        if isinstance(max_episode_steps, int) and max_episode_steps == -1:
             max_episode_steps = None
         if max_episode_steps is not None and not (isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1):
             given = shown(max_episode_steps)

@@ -70,14 +70,14 @@ class TrainingSettings:
         for name, (few, many) in COUNTS.items():
             checked_count(name, getattr(self, name), few, many)
         for name, unit, low, high in (
-            *((name, "1", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")), ("until", "%", 0.0, 100.0),
+            *((name, "-", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")), ("until", "%", 0.0, 100.0),
         ):  # fmt: skip
             checked_number(name, getattr(self, name), unit, above=low, most=high)
-        checked_number("log_std", self.log_std, "1", least=-20.0, most=2.0)
-        if not isinstance(self.hidden, tuple) or not 1 <= len(self.hidden) <= LAYERS:
-            raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers")
-        for width in self.hidden:
-            checked_count("hidden", width, 1, WIDEST)
+        checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
+        widths = self.hidden if isinstance(self.hidden, tuple) else ()
+        whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
+        if not (whole and 1 <= len(widths) <= LAYERS):
+            raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
         if self.algorithm == "ppo" and self.lanes * self.rollout > COLLECTED:
             raise ValueError(
                 f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "

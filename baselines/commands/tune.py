@@ -51,7 +51,7 @@ WORST = 20.0
 outweigh all others."""
 
 LANES, TRIALS = 4096, 100_000
-"""Most rigs and most trials: a trial of so many rigs takes some minutes and a GB, and the sampler reads all trials each time."""
+"""Most rigs and most trials: so many rigs take minutes and a GB a trial, and the sampler reads all trials each time."""
 
 RANDOM = 20
 """Trials before the sampler models their costs: the start and those drawn at random."""
@@ -142,6 +142,12 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     try:
         storage = JournalStorage(JournalFileBackend(str(path)))
         study = optuna.create_study(storage=storage, study_name="birthsim-tune", load_if_exists=True)
+        known = study.user_attrs or setting
+        if all(known.get(key) == value for key, value in setting.items()):
+            for key, value in setting.items():
+                study.set_user_attr(key, value)
+            listed(study)
+            return study
     except (MemoryError, OSError):
         raise
     except Exception as error:
@@ -149,12 +155,8 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
         raise ValueError(
             f"{path} is no list of trials ({problem(error)}); allowed: what birthsim-tune wrote, or another --out"
         ) from error
-    known = study.user_attrs or setting
-    for key, value in setting.items():
-        if known.get(key) != value:
-            raise ValueError(f"{path} has {key} = {shown(known.get(key))}; allowed: {shown(value)}, or another --out")
-        study.set_user_attr(key, value)
-    return study
+    key = next(key for key, value in setting.items() if known.get(key) != value)
+    raise ValueError(f"{path} has {key} = {shown(known.get(key))}; allowed: {shown(setting[key])}, or another --out")
 
 
 def complete(study: Study) -> list[FrozenTrial]:
@@ -164,16 +166,13 @@ def complete(study: Study) -> list[FrozenTrial]:
     return study.get_trials(states=(TrialState.COMPLETE,))
 
 
-def listed(study: Study, folder: Path) -> list[dict[str, Any]]:
+def listed(study: Study) -> list[dict[str, Any]]:
     """The complete trials as JSON: gains, cost and its parts; ``ValueError`` for one that birthsim-tune did not write."""
     trials = []
     for trial in complete(study):
         parts = trial.user_attrs.get("parts")
         if not (isinstance(parts, dict) and all(map(is_finite, parts.values())) and is_finite(trial.value)):
-            raise ValueError(
-                f"{folder / 'trials.journal'}: trial {trial.number} has no cost in parts; allowed: what birthsim-tune wrote, "
-                "or another --out"
-            )
+            raise ValueError(f"trial {trial.number} has no cost in parts")
         trials.append({"gains": trial.params, "cost": trial.value, "parts": parts})
     return trials
 
@@ -254,7 +253,7 @@ def _tune(arguments: argparse.Namespace) -> None:
             print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
         finally:
             bar.close()
-        trials = listed(study, folder)[: arguments.trials]
+        trials = listed(study)[: arguments.trials]
         first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
         place = {"trial": trials.index(best), "trials": len(trials)}
         with whole_results(folder) as results:

@@ -102,10 +102,7 @@ def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> Non
             try:
                 inverse_geometry(motion[:2], tight)
             except ValueError as error:
-                raise ValueError(
-                    f"reference: some of those drawn leave the workspace, at {instant:.3g} s: {error}, or a reference or ranges "
-                    "that fit this rig"
-                ) from None
+                raise ValueError(f"reference at {instant:.3g} s, of one that can be drawn: {error}") from None
 
 
 def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:

@@ -51,8 +51,9 @@ def main() -> None:
     found: dict[str, Figures] = {}
     for name in arguments.kind:
         with tqdm(total=arguments.cases, desc=name, unit=" cases", file=sys.stderr, leave=False) as bar:
-            for found[name] in fuzz(name, KINDS[name], arguments.cases, arguments.seed):
-                bar.update(found[name].tried - bar.n)
+            for figures in fuzz(name, KINDS[name], arguments.cases, arguments.seed):
+                found[name] = figures
+                bar.update(figures.tried - bar.n)
     print(f"{'kind':18}{'cases':>8}{'valid':>8}{'refused':>9}{'failures':>10}")
     for name, figures in found.items():
         print(f"{name:18}{figures.tried:8}{figures.valid:8}{figures.refused:9}{len(figures.failures):10}")

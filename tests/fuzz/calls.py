@@ -49,7 +49,7 @@ def _said(value: Any) -> str:
 def _drawn(rng: Rng, table: dict[str, tuple[Any, ...]], chance: float) -> dict[str, Any]:
     """Some arguments of a table, of which about one is odd."""
     chosen = [name for name in table if rng.random() < chance]
-    odd = chosen[rng.integers(len(chosen))] if chosen else ""
+    odd = chosen[rng.integers(len(chosen))] if chosen and rng.random() < 0.7 else ""
     return {
         name: strange(rng, table[name][0] if isinstance(table[name][0], float) else None)
         if name == odd
@@ -65,8 +65,8 @@ def _ready(_: Path) -> None:
     assert agents
     assert baselines
     for mode, valves, sensors, hand in (
-        ("valve", "two_valves", "ideal", "guided"), ("flow", "one_valve", "lab", "noise"), ("flow", "two_valves", "lab", "sine"),
-        ("valve", "one_valve", "ideal", "steps"),
+        ("valve", "two_valves", "ideal", "guided"), ("flow", "one_valve", "lab", "noise"),
+        ("flow", "two_valves", "lab", "sine"), ("valve", "one_valve", "ideal", "steps"),
     ):  # fmt: skip
         env: Any = gymnasium.make_vec(CIRCLE, num_envs=2, action_mode=mode, valves=valves, sensors=sensors, user_force=hand)
         env.reset(seed=0, options={"staggered": True})
@@ -77,7 +77,7 @@ def _environment(_: None, rng: Rng, folder: Path, case: Case) -> None:
     vector = bool(rng.integers(2))
     arguments = _drawn(rng, {**GOOD, **(VECTOR if vector else {})}, 0.2)
     given = _drawn(rng, RESET if vector else {name: RESET[name] for name in ("seed", "position")}, 0.3)
-    case.names = (*arguments, *given, "reference", "Mechanics", "action")
+    case.names = (*arguments, *given, "reference", "Mechanics", "action", "parameter")
     case.shown = f"{_said(arguments)} {_said(given)}"
     # Gymnasium's own faces check render modes and wrap; the classes are asked directly.
     from birthsim_env.env import BirthSIMEnv
@@ -206,7 +206,7 @@ def _constructor(makers: dict[str, tuple[Callable[..., Any], bool]], rng: Rng, f
     case.shown = f"{name} {_said(arguments)}"
     if rng.random() < 0.05:
         arguments["unknown"] = 1
-        case.names = ("unknown",)
+        case.names += ("unknown",)
     made = make(Parameters(), **arguments) if takes_rig else make(**arguments)
     _use(made, rng)
 

@@ -87,9 +87,10 @@ def _options(module: Any) -> list[str]:
         found.extend(name for name in names if name.startswith("--"))
         return add(self, *names, **rest)
 
-    with patch.object(argparse._ActionsContainer, "add_argument", note), patch.object(sys, "argv", ["x", "--help"]):
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-            module.main()
+    silent = contextlib.redirect_stdout(io.StringIO())
+    noted, asked = patch.object(argparse._ActionsContainer, "add_argument", note), patch.object(sys, "argv", ["x", "--help"])
+    with noted, asked, silent, contextlib.suppress(SystemExit):
+        module.main()
     return [name for name in dict.fromkeys(found) if name != "--help"]
 
 
@@ -122,7 +123,8 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
     except SystemExit as end:
         lines = [text for text in said.getvalue().split("\n") if "error:" in text]
         if end.code == 2 and len(lines) == 1:
-            raise ValueError(f"{lines[0]} (at the command line)") from None
+            # argparse repeats a word that is no choice at whatever length it was given.
+            raise ValueError(f"{lines[0][:300]} (at the command line)") from None
         raise
 
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import io
 import json
+import tomllib
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
-import tomllib
 
 from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, plain, toml_bytes
+from tests.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, toml_bytes
 
 STEPS = 12
 
 
-def _written(case: Case, path: Path, content: bytes) -> Path:
+def written(case: Case, path: Path, content: bytes) -> Path:
     path.write_bytes(content)
     case.names, case.shown = (path.name,), repr(content[:600])
     return path
@@ -53,7 +53,7 @@ def _rig_files(_: Path) -> list[dict[str, Any]]:
 def _rig(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Case) -> None:
     from birthsim_env.physics.parameters import Parameters
 
-    path = _written(case, folder / "our_rig.toml", toml_bytes(rng, files[rng.integers(len(files))]))
+    path = written(case, folder / "our_rig.toml", toml_bytes(rng, files[rng.integers(len(files))]))
     rig = Parameters.from_toml(path)
     case.names = ()
     period = rig.electronics.control_period
@@ -70,7 +70,7 @@ def _configurations(_: Path) -> list[dict[str, Any]]:
 def _configuration(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Case) -> None:
     from agents.training.configuration import load_configuration
 
-    load_configuration(_written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
+    load_configuration(written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
 
 
 def _policies(_: Path) -> Path:
@@ -118,7 +118,7 @@ def _policy(valid: Path, rng: Rng, folder: Path, case: Case, unharmed: bool = Fa
         changed = json_bytes(rng, json.loads(content))
     else:
         changed = _resealed(rng, content) if rng.random() < 0.6 else damaged(rng, content)
-    _written(case, chosen, changed)
+    written(case, chosen, changed)
     if configuration.is_file() and chosen == weights and rng.random() < 0.7:
         said = json.loads(configuration.read_text(encoding="utf-8"))
         configuration.write_text(json.dumps({**said, "sha256": hashlib.sha256(changed).hexdigest()}), encoding="utf-8")
@@ -182,7 +182,7 @@ def _recording(valid: tuple[Any, Any, bytes], rng: Rng, folder: Path, case: Case
         else:
             np.savez_compressed(file, rows=_rows(rng, rows), header=np.array(text))
         content = file.getvalue()
-    player = Player(load_recording(_written(case, folder / "ours.npz", content)))
+    player = Player(load_recording(written(case, folder / "ours.npz", content)))
     case.names = ()
     for _ in range(3):
         json.dumps(player.frame())
@@ -190,7 +190,7 @@ def _recording(valid: tuple[Any, Any, bytes], rng: Rng, folder: Path, case: Case
         player.event("settings"), player.event("path")
 
 
-def _loaded(_: Path) -> None:
+def loaded(_: Path) -> None:
     """What the readers of small files need, before memory is limited."""
     import baselines.bench.tasks
     import baselines.commands.tune
@@ -203,55 +203,11 @@ def _loaded(_: Path) -> None:
     baselines.bench.tasks.code_stamp()
 
 
-def _csv(_: Any, rng: Rng, folder: Path, case: Case) -> None:
-    from birthsim_env.parts.own_parts import hand_of, trajectory_of
-
-    time = np.arange(int(rng.integers(1, 40))) * 0.1
-    lines = ["time, x, y", *(f"{t},{0.5 + 0.01 * t:.4f},0.01" for t in time)]
-    for _ in range(int(rng.integers(4))):
-        line = int(rng.integers(len(lines)))
-        cells = lines[line].split(",")
-        value = plain(rng)
-        cells[rng.integers(len(cells))] = str(value) if not isinstance(value, int) or value < 10**400 else "9" * 5000
-        lines[line] = ",".join(cells[: int(rng.integers(1, 5))])
-    text = "\n".join(lines).encode("utf-8", "surrogatepass")
-    path = _written(case, folder / "ours.csv", damaged(rng, text) if rng.random() < 0.5 else text)
-    if rng.random() < 0.5:
-        trajectory = trajectory_of(path, 1.0)
-        assert trajectory.sample(np.zeros(2)).shape == (8, 2)
-    else:
-        hand = hand_of(path, False)
-        hand.prepare(2)
-        hand.begin(0, np.random.default_rng(0))
-        assert np.isfinite(hand.force(np.zeros((1, 2)), np.zeros((2, 2)), np.zeros((2, 2)))).all()
-
-
-_SOURCES = (
-    "import numpy as np\nclass Own:\n    def __init__(self, rig): pass\n    def reset(self, lanes=None): pass\n"
-    "    def command(self, measurement, reference): return np.zeros(4)\n",
-    "import no_such_module_anywhere\n", "raise RuntimeError('at import')\n", "raise SystemExit(3)\n", "import sys\nsys.exit()\n",
-    "def broken(:\n", "x = " + "(" * 500 + ")" * 500, "x = 1 / 0\n", "from . import Own\n", "class Own: pass\n", "Own = 3\n", "Own = None\n",
-    "import Own from nothing\n", "def f(): f()\nf()\n", "raise KeyError\n", "raise ValueError('a\\nb')\n", "# coding: latin-99\nOwn = 1\n",
-    "class Own(Exception): pass\nraise Own('ö' * 5000)\n", "raise GeneratorExit\n", "class Own:\n    def __init__(self, rig): raise SystemExit(1)\n",
-    "class Own:\n    def __init__(self, rig): self.command, self.reset = 1, 2\n", "def Own(*a): return None\n", "raise MemoryError\n",
-    "x = " + "9" * 5000 + "\n", "class Own:\n    def __init__(self, rig): raise ValueError('a\\nb' * 2000)\n",
-)  # fmt: skip
-
-
-def _controller_file(_: Any, rng: Rng, folder: Path, case: Case) -> None:
-    from baselines.registry import make_controller
-    from birthsim_env.physics.parameters import Parameters
-
-    text = _SOURCES[rng.integers(len(_SOURCES))].encode()
-    path = _written(case, folder / "ours.py", damaged(rng, text) if rng.random() < 0.5 else text)
-    make_controller(f"{path}:Own", Parameters())
-
-
 def _task(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     from baselines.bench.tasks import Task, code_stamp, run_tasks
 
     piece = {"code": code_stamp(), "settings": {"seed": 1}, "result": {"mean": 1.0, "values": [1.0, 2.0]}}
-    _written(case, folder / "piece.json", json_bytes(rng, piece))
+    written(case, folder / "piece.json", json_bytes(rng, piece))
     results, failures = run_tasks([Task("piece", "pieces", _worked, {"seed": 1})], folder, 1, "pieces")
     assert not failures
     assert set(results) == {"piece"}
@@ -265,9 +221,8 @@ def _gains(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     from baselines.commands.tune import start_of
 
     content = {"gains": {"bandwidth": 60.0, "friction_fraction": 0.5}, "cost": 1.0, "parts": {}}
-    start = start_of(
-        _written(case, folder / "gains.json", json_bytes(rng, content)), {"bandwidth": (10.0, 90.0), "friction_fraction": (0.0, 1.0)}
-    )  # fmt: skip
+    bounds = {"bandwidth": (10.0, 90.0), "friction_fraction": (0.0, 1.0)}
+    start = start_of(written(case, folder / "gains.json", json_bytes(rng, content)), bounds)
     assert all(np.isfinite(value) for value in start.values())
 
 
@@ -287,6 +242,7 @@ def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
     from baselines.commands.tune import listed, open_study
 
     lines = valid.splitlines(keepends=True)
+    whole = set(lines)
     for _ in range(int(rng.integers(1, 4))):
         at = int(rng.integers(len(lines)))
         match int(rng.integers(5)):
@@ -297,12 +253,12 @@ def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
             case 2:
                 lines[at] = damaged(rng, lines[at])
             case _:
-                tree = altered(rng, json.loads(lines[at])) if lines[at].startswith(b"{") and lines[at] in valid else NUMBERS[0]
+                tree = altered(rng, json.loads(lines[at])) if lines[at] in whole else NUMBERS[0]
                 lines[at] = json.dumps(tree, default=str).encode() + b"\n"
         lines = lines or [b"\n"]
     (folder / "study").mkdir()
-    _written(case, folder / "study" / "trials.journal", b"".join(lines))
-    listed(open_study(folder / "study", {"seed": 1}), folder)
+    written(case, folder / "study" / "trials.journal", b"".join(lines))
+    listed(open_study(folder / "study", {"seed": 1}))
 
 
 FILES: dict[str, Kind] = {
@@ -310,9 +266,7 @@ FILES: dict[str, Kind] = {
     "configuration": Kind(_configurations, _configuration),
     "policy": Kind(_policies, _policy),
     "recording": Kind(_recordings, _recording),
-    "csv": Kind(_loaded, _csv),
-    "controller-file": Kind(_loaded, _controller_file, runs_code=True),
-    "task": Kind(_loaded, _task),
-    "gains": Kind(_loaded, _gains),
+    "task": Kind(loaded, _task),
+    "gains": Kind(loaded, _gains),
     "journal": Kind(_journals, _journal),
 }

@@ -50,8 +50,11 @@ ROOTS = (str(Path(__file__).resolve().parent.parent.parent), sys.prefix, sys.bas
 
 @dataclass(frozen=True)
 class Kind:
-    """What is fuzzed. ``prepare(folder)`` loads modules and valid examples once; ``attempt(prepared, rng, folder)`` draws a case,
-    tries it and returns what an error has to name, by ``Case``; ``runs_code`` where a case is code of a user's own."""
+    """What is fuzzed.
+
+    ``prepare(folder)`` loads modules and valid examples once. ``attempt(prepared, rng, folder, case)`` draws a case, says in
+    ``case`` what it is, and tries it. ``runs_code`` is true where a case is code of a user's own.
+    """
 
     prepare: Callable[[Path], Any]
     attempt: Callable[[Any, np.random.Generator, Path, Case], None]
@@ -204,7 +207,11 @@ def unclear(error: BaseException, names: tuple[str, ...]) -> str:
         return "not a short line"
     if names and not any(name in text for name in names):
         return "names neither argument nor file"
-    return "" if re.search(r"allowed|cannot be read|is no TOML|\(at |line \d", text) else "does not say what is allowed"
+    return (
+        ""
+        if re.search(r"allowed|cannot be read|is no TOML|\(at |line \d|unexpected keyword argument", text)
+        else "does not say what is allowed"
+    )
 
 
 def _place(error: BaseException) -> str:
@@ -215,6 +222,11 @@ def _place(error: BaseException) -> str:
     return f"{Path(frame.filename).name}:{frame.lineno} {frame.name}"
 
 
+def _is_ours(path: Any, folder: str) -> bool:
+    """Whether a path is in the folder of the case, or in the cache of compiled kernels."""
+    return str(path).startswith((folder, os.devnull)) or "birthsim" in str(path)
+
+
 def _deed(event: str, arguments: tuple[Any, ...], folder: str, runs_code: bool) -> str:
     """What an audit event is that reading must not cause, or nothing."""
     if event == "open":
@@ -222,9 +234,10 @@ def _deed(event: str, arguments: tuple[Any, ...], folder: str, runs_code: bool) 
         writes = (isinstance(mode, str) and any(letter in mode for letter in "wax+")) or (
             mode is None and isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR)
         )
-        allowed = isinstance(path, int) or str(path).startswith((folder, os.devnull)) or "birthsim" in str(path)
-        return "" if not writes or allowed else f"writing to {path!r}"
+        return "" if not writes or isinstance(path, int) or _is_ours(path, folder) else f"writing to {path!r}"
     if event == "exec" and not runs_code:
         source = getattr(arguments[0], "co_filename", "?")
         return "" if source.startswith(ROOTS) or "lib/python" in source else f"running {source!r}"
-    return event if event in DEEDS and not runs_code else ""
+    if event not in DEEDS or runs_code:
+        return ""
+    return "" if event.startswith("os.") and arguments and _is_ours(arguments[0], folder) else event

@@ -7,5 +7,6 @@ from tests.fuzz.checkpoints import CHECKPOINTS
 from tests.fuzz.commands import COMMANDS
 from tests.fuzz.files import FILES
 from tests.fuzz.harness import Kind
+from tests.fuzz.own_parts import OWN_PARTS
 
-KINDS: dict[str, Kind] = {**FILES, **CHECKPOINTS, **CALLS, **COMMANDS}
+KINDS: dict[str, Kind] = {**FILES, **OWN_PARTS, **CHECKPOINTS, **CALLS, **COMMANDS}

@@ -63,7 +63,9 @@ def table(laps: Laps) -> str:
             groups[lap[key]].append(lap)
         for name, own in sorted(groups.items()):
             sums = [sum(lap[column] for lap in own) for column in ("steps", "terminated", "truncated")]
-            lines.append(f"| {name} | {' | '.join(f'{number:,}' for number in sums)} | {sum(len(lap['faults']) for lap in own)} |")
+            lines.append(
+                f"| {name} | {' | '.join(f'{number:,}' for number in sums)} | {sum(len(lap['faults']) for lap in own)} |"
+            )
     return "\n".join(lines)
 
 
@@ -77,12 +79,12 @@ def report(laps: Laps, setting: dict[str, Any]) -> str:
             "# Soak",
             "",
             f"`make soak`: {steps:,} policy steps in {len(laps)} laps of {LANES} lanes, {seconds / 3600:.1f} h on one thread "
-            f"({steps / seconds:,.0f} steps/s), {platform.machine()}. Each lap is a world of its own: a corner of the ranges of "
-            "domain randomisation or rigs drawn from them, one of three friction laws, either kind of sensors, one of the hands; "
-            "random openings or flows, residuals with random actions on every law, or a rival.",
+            f"({steps / seconds:,.0f} steps/s), {platform.machine()}. Each lap is a world of its own: a corner of the ranges "
+            "of domain randomisation or rigs drawn from them, one of three friction laws, either kind of sensors, one of the "
+            "hands; random openings or flows, residuals with random actions on every law, or a rival.",
             "",
-            "Checked at every step: observations finite and inside their space, rewards finite and from 0 to 1, states and `info` "
-            "finite.",
+            "Checked at every step: observations finite and inside their space, rewards finite and from 0 to 1, states and "
+            "`info` finite.",
             "",
             table(laps),
             "",
