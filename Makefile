@@ -1,5 +1,6 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
+# make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
 # make test-weekly runs the examples on libraries that are not ours
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
@@ -24,7 +25,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving fuzz soak golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -118,6 +119,14 @@ scratch: $(READY)
 moving: $(READY)
 	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
 	cp $(OUT)/moving/comparison.md docs/moving.md
+
+fuzz: $(READY)
+	mkdir -p $(OUT)
+	$(BIN)/python -m tests.fuzz --cases 5000 --out $(OUT)/fuzz.json
+
+# Interrupted, the same command carries on.
+soak: $(READY)
+	$(BIN)/python -m tests.soak --out $(OUT)/soak
 
 golden: $(READY)
 	$(BIN)/python -m tests.oracles.golden.make

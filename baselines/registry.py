@@ -19,7 +19,7 @@ from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, Sliding
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.values import problem, shown
+from birthsim_env.physics.values import problem, shown
 
 Factory = Callable[..., Controller]
 

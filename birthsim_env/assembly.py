@@ -23,8 +23,8 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.values import is_within, shown
 from birthsim_env.simulation import Simulation
-from birthsim_env.values import is_within, shown
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")

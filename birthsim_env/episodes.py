@@ -13,7 +13,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.seeding import lane_seeds
 from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
-from birthsim_env.values import shown
+from birthsim_env.physics.values import shown
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer

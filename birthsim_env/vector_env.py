@@ -15,8 +15,8 @@ from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import MOST_LANES
+from birthsim_env.physics.values import checked_count, shown
 from birthsim_env.reward import REWARD_TERMS
-from birthsim_env.values import checked_count, shown
 
 Observations = NDArray[np.float32]
 

@@ -13,7 +13,7 @@ from baselines.estimation.observers import PistonObserver, measured_joints
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.values import is_within, limits, shown
+from birthsim_env.physics.values import is_within, limits, shown
 
 
 class CartesianBackstepping:

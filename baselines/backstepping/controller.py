@@ -35,7 +35,7 @@ from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.lanes import PARAMETERS, Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.values import is_within, limits, shown
+from birthsim_env.physics.values import is_within, limits, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import gymnasium
 
-from birthsim_env.values import shown
+from birthsim_env.physics.values import shown
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""

@@ -36,8 +36,8 @@ from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.reading import read_json
-from birthsim_env.values import is_finite, is_within, problem, shown
+from birthsim_env.physics.reading import read_json
+from birthsim_env.physics.values import is_finite, is_within, problem, shown
 
 if TYPE_CHECKING:
     from optuna import Study

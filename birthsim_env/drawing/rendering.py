@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.values import shown
+from birthsim_env.physics.values import shown
 
 if TYPE_CHECKING:
     import pygame

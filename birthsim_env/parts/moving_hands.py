@@ -18,7 +18,7 @@ from birthsim_env.parts.user_forces import STRONGEST, AlternatingSteps, UserForc
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
-from birthsim_env.values import checked_range, shown
+from birthsim_env.physics.values import checked_range, shown
 
 FADE = 0.5
 """s over which a sine and noise begin, at minimum jerk."""

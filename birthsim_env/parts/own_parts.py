@@ -21,8 +21,8 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.user_forces import ForceProfile, UserForce
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
-from birthsim_env.reading import read
-from birthsim_env.values import problem, shown
+from birthsim_env.physics.reading import read
+from birthsim_env.physics.values import problem, shown
 
 LARGEST_CSV = 64 * 2**20
 """Bytes of a file of numbers; an hour at 1 kHz takes them."""

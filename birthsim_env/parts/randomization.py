@@ -13,7 +13,7 @@ import numpy as np
 from birthsim_env.parts.streams import Streams
 from birthsim_env.physics.lanes import Array, parameter_columns
 from birthsim_env.physics.parameters import Parameters, field_of, least_dead_volume
-from birthsim_env.values import is_finite, shown
+from birthsim_env.physics.values import is_finite, shown
 
 Ranges = Mapping[str, tuple[float, float]]
 

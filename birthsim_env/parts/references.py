@@ -18,7 +18,7 @@ from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
-from birthsim_env.values import checked_number, checked_range, shown
+from birthsim_env.physics.values import checked_number, checked_range, shown
 
 FARTHEST = 10.0
 """m: coordinates and lengths up to here; rigs are smaller."""

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from birthsim_env.values import checked_range, shown
+from birthsim_env.physics.values import checked_range, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -16,7 +16,7 @@ from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
 from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
-from birthsim_env.values import checked_number, checked_range, shown
+from birthsim_env.physics.values import checked_number, checked_range, shown
 
 SOFTEST, STIFFEST = 1e-3, 1e7
 """N/m: setpoints that can be asked for; steel rods of this size are as stiff."""

@@ -19,7 +19,7 @@ from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import checked
-from birthsim_env.values import checked_count, checked_number, checked_range, shown
+from birthsim_env.physics.values import checked_count, checked_number, checked_range, shown
 
 STRONGEST = 1000.0
 """N: five times what clinicians pull; more breaks end stops within a policy step."""

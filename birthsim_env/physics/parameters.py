@@ -11,8 +11,8 @@ from typing import Any
 import tomli_w
 
 from birthsim_env.physics.quantities import Part, quantity
-from birthsim_env.reading import read_toml
-from birthsim_env.values import is_finite, shown
+from birthsim_env.physics.reading import read_toml
+from birthsim_env.physics.values import is_finite, shown
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
@@ -64,7 +64,7 @@ class Cylinder(Part):
 class Mechanics(Part):
     """The point mass at the end effector and the end stops of the cylinders."""
 
-    mass: float = quantity(3.0, "kg", "assumed", above=0, most=1e4, randomized=(2, 5))
+    mass: float = quantity(3.0, "kg", "assumed", above=0, most=1e20, randomized=(2, 5))
     gravity: float = quantity(9.81, "m/s2", "standard", least=0, most=100)
     stop_stiffness: float = quantity(5e6, "N/m", "assumed, rigid end caps", above=0, most=1e7)
     stop_damping: float = quantity(1.0, "s/m", "assumed; force k p (1 + c dp/dt), Hunt and Crossley 1975", least=0, most=2)
@@ -99,7 +99,7 @@ class Friction(Part):
 class Chambers(Part):
     """What all four chambers share: dead volume and heat exchange (the paper's section V)."""
 
-    dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", above=0, most=1, randomized=(5e-6, 25e-6))
+    dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", above=0, most=1000, randomized=(5e-6, 25e-6))
     wall_heat_transfer: float = quantity(
         50.0, "W/(m2 K)", "assumed; h, cools in 0.2-1 s", least=0, most=1e4, randomized=(20, 100)
     )

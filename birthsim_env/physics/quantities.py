@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
-from birthsim_env.values import is_within, limits, shown
+from birthsim_env.physics.values import is_within, limits, shown
 
 
 def quantity(

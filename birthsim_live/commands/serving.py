@@ -8,7 +8,7 @@ import socket
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from birthsim_env.values import shown
+from birthsim_env.physics.values import shown
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
 
 if TYPE_CHECKING:

@@ -95,7 +95,7 @@ def _resealed(rng: Rng, content: bytes) -> bytes:
         header = json.dumps(tree).encode()
     else:
         header = json_bytes(rng, tree)
-    length = len(header) if rng.random() < 0.8 else int(rng.choice([0, 1, 2**63, 2**64 - 1, len(header) + 1]))
+    length = len(header) if rng.random() < 0.8 else (0, 1, 2**63, 2**64 - 1, len(header) + 1)[rng.integers(5)]
     return length.to_bytes(8, "little") + header + content[8 + size :]
 
 
