@@ -203,14 +203,26 @@ def loaded(_: Path) -> None:
     baselines.bench.tasks.code_stamp()
 
 
-def _task(_: Any, rng: Rng, folder: Path, case: Case) -> None:
-    from baselines.bench.tasks import Task, code_stamp, run_tasks
+def _tasks(folder: Path) -> dict[str, Any]:
+    """A complete piece as it is written."""
+    loaded(folder)
+    _run(folder)
+    (path,) = folder.glob("piece-*.json")
+    piece: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return {"file": path.name, "piece": piece}
 
-    piece = {"code": code_stamp(), "settings": {"seed": 1}, "result": {"mean": 1.0, "values": [1.0, 2.0]}}
-    written(case, folder / "piece.json", json_bytes(rng, piece))
+
+def _run(folder: Path) -> None:
+    from baselines.bench.tasks import Task, run_tasks
+
     results, failures = run_tasks([Task("piece", "pieces", _worked, {"seed": 1})], folder, 1, "pieces")
     assert not failures
-    assert set(results) == {"piece"}
+    assert results == {"piece": {"mean": 1.0, "values": [1.0]}}
+
+
+def _task(valid: dict[str, Any], rng: Rng, folder: Path, case: Case) -> None:
+    written(case, folder / valid["file"], json_bytes(rng, valid["piece"]))
+    _run(folder)
 
 
 def _worked(seed: int) -> dict[str, Any]:
@@ -229,6 +241,7 @@ def _gains(_: Any, rng: Rng, folder: Path, case: Case) -> None:
 def _journals(folder: Path) -> bytes:
     from baselines.commands.tune import open_study
 
+    (folder / "study").mkdir()
     study = open_study(folder / "study", {"seed": 1})
     for value in (2.0, 1.0):
         trial = study.ask()
@@ -266,7 +279,7 @@ FILES: dict[str, Kind] = {
     "configuration": Kind(_configurations, _configuration),
     "policy": Kind(_policies, _policy),
     "recording": Kind(_recordings, _recording),
-    "task": Kind(loaded, _task),
+    "task": Kind(_tasks, _task),
     "gains": Kind(loaded, _gains),
     "journal": Kind(_journals, _journal),
 }
