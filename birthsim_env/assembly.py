@@ -127,10 +127,10 @@ def assemble(
         if not length <= most:
             raise ValueError(f"actuation.{name} has a length of {length}; allowed: at most {most}")
     if isinstance(randomize, Mapping):
-        ranges, varied = checked_ranges(randomize, rig), False
+        ranges, varied = checked_ranges(randomize, rig, sensors), False
     else:
         one_of("randomize", randomize, (False, True, "plant", "scenario"))
-        ranges = checked_ranges(documented_ranges(rig), rig) if randomize in (True, "plant") else {}
+        ranges = checked_ranges(documented_ranges(rig, sensors), rig, sensors) if randomize in (True, "plant") else {}
         varied = randomize in (True, "scenario")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors import SENSORS
 
 FILE = Path(__file__).with_name("scores.json")
 
@@ -24,6 +23,9 @@ SHUT, BEST = "shut valves", "best classical law"
 """Scores of 0 and of 100."""
 
 ROLES = (SHUT, "random valves", "paper's law", BEST, "best learned policy")
+
+SENSORS = ("ideal", "lab")
+"""Sensor models that there are scores for."""
 
 RIGS = {False: "nominal", True: "drawn"}
 """The environments' argument ``randomize`` -> the name of its scores."""
@@ -47,7 +49,7 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     if found is None or found.group(1) not in names:
         allowed = ", ".join(f"BirthSIM/{name}-v1" for name in names)
         raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and their siblings with a law inside")
-    one_of("sensors", sensors, tuple(SENSORS))
+    one_of("sensors", sensors, SENSORS)
     one_of("randomize", randomize, tuple(RIGS))
     return _scores()[found.group(1)][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
 

@@ -37,7 +37,7 @@ from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.randomization import Ranges, draw_columns
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.sensors import SENSORS, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.parts.user_forces import UserForce, forces_of
 from birthsim_env.parts.worlds import begin, worlds
@@ -81,6 +81,9 @@ class Simulation:
         self.nominal = parameter_column(parameters)
         self.trajectory, self.user_force, self.stiffness = trajectory, user_force, stiffness
         self.sensors = SENSORS[sensors](parameters.electronics, num_envs)
+        of_sensors = {name: ranges[name] for name in ranges if name in drawn_by(sensors)}
+        if of_sensors:
+            self.sensors.vary(of_sensors)  # type: ignore[attr-defined]
         self.actuation = actuation
         for part in (trajectory, user_force, stiffness):
             part.prepare(num_envs)
@@ -93,10 +96,12 @@ class Simulation:
         self._motion, self._force, self._jumps = np.zeros((4, num_envs)), np.zeros((2, num_envs)), np.zeros((5, num_envs))
         self.impacts: Array = np.zeros((2, num_envs))
         self._openings: Array = np.zeros((4, num_envs))
+        self._wanted: Array = np.zeros((4, num_envs))
         self._seen: Array = np.zeros((ASKED, num_envs))
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
-        self._ranges, self._begun = ranges, False
+        self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
+        self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
         self._made: tuple[Any, ...] = ()
         self._loop: MixedLoop | None = None
@@ -223,7 +228,9 @@ class Simulation:
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)
-        return [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
+        board = getattr(self.sensors, "board_stage", None)
+        acts = [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
+        return [*acts, board()] if board else acts
 
     def _assemble(self) -> None:
         """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
@@ -262,9 +269,11 @@ class Simulation:
 
     def _ask(self, period: int) -> None:
         if period == 0 or self.actuation.every_period:
-            self._openings[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
+            self._wanted[:] = self.actuation.openings(self.plant, self.measurement, self.reference)
             if self.actuation.memory_names:
                 self._shown[:] = self.actuation.memory()
+        # Anew in every period: the board of the sensors may have put out something else.
+        self._openings[:] = self._wanted
 
     def _follow(self, _: int) -> None:
         self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)

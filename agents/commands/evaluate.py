@@ -30,6 +30,7 @@ from baselines.commands.shared import (
 from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import controller_names
 from birthsim_env.parts.randomization import described
+from birthsim_env.parts.sensors import SENSORS
 
 
 def main() -> None:
@@ -63,7 +64,7 @@ def main() -> None:
         "--episodes", type=whole_up_to(EPISODES), default=32, help="per controller, with --all per cell (default: %(default)s)"
     )
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
-    parser.add_argument("--sensors", choices=("ideal", "lab"), help="default: ideal, with --all both")
+    parser.add_argument("--sensors", choices=tuple(SENSORS), help="default: ideal, with --all ideal and lab")
     parser.add_argument(
         "--randomize",
         choices=tuple(RANDOMIZE),
@@ -129,7 +130,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
             "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": rig.to_dict(), "policy": str(place),
         }  # fmt: skip
         pieces[name] = evaluation_tasks(name, own, arguments.env, world, *span, work=evaluate_learned)
-    folder, drawn = make_folder(arguments.out), described(rig, world["randomize"])
+    folder, drawn = make_folder(arguments.out), described(rig, world["randomize"], world["sensors"])
     print(drawn)
     jobs = arguments.jobs or JOBS
     done, failures = run_tasks(

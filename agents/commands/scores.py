@@ -19,9 +19,8 @@ from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
 from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, whole_up_to
 from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import UNCONTROLLED, make_controller
-from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.scores import BEST, RIGS, ROLES, SHUT
+from birthsim_env.scores import BEST, RIGS, ROLES, SENSORS, SHUT
 
 Rows = dict[str, dict[str, Any]]
 """Controller -> its figures in one environment under one condition."""

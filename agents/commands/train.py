@@ -17,6 +17,7 @@ from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, 
 from baselines.files import make_folder, own_folder, write_json
 from baselines.side_by_side import side_by_side
 from birthsim_env.parts.randomization import described
+from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
 
@@ -42,7 +43,7 @@ def main() -> None:
     parser.add_argument("--seed", type=seed_number, help="first seed (default: the configuration's, 0)")
     parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
     parser.add_argument("--jobs", type=whole, default=1, help="seeds trained side by side (default: 1)")
-    parser.add_argument("--sensors", choices=("ideal", "lab"), help="sensor model")
+    parser.add_argument("--sensors", choices=tuple(SENSORS), help="sensor model")
     parser.add_argument("--randomize", choices=tuple(RANDOMIZE), help="what training varies")
     parser.add_argument("--authority", type=float, help="bound of the residual force, N")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
@@ -66,7 +67,7 @@ def _train(arguments: argparse.Namespace) -> None:
         (replace(training, seed=seed), residual, arguments.out / f"seed_{seed}", rig, k % arguments.jobs)
         for k, seed in enumerate(seeds)
     ]
-    print(described(rig, training.randomize))
+    print(described(rig, training.randomize, training.sensors))
     results: dict[int, dict[str, Any]] = {}
     try:
         side_by_side(_one, work, arguments.jobs, results.__setitem__)

@@ -19,6 +19,7 @@ from baselines.files import make_folder, whole_file
 from baselines.registry import controller_names, make_controller
 from birthsim_env.drawing.rendering import PairRenderer, Scene
 from birthsim_env.parts.randomization import described
+from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
@@ -60,7 +61,7 @@ def main() -> None:
         "comes with the package for the environment (default: the paper's law and the best one)",
     )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the world (default: %(default)s)")
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"), help="default: %(default)s")
+    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
     parser.add_argument(
         "--randomize", default="all", choices=tuple(RANDOMIZE), help="what the seed draws (default: %(default)s)"
     )
@@ -152,7 +153,7 @@ def _animate(arguments: argparse.Namespace) -> None:
     controllers = [
         make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {})) for name in names
     ]
-    print(described(rig, RANDOMIZE[arguments.randomize]))
+    print(described(rig, RANDOMIZE[arguments.randomize], arguments.sensors))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
         takes = [take(env, controller, arguments.seed, span, arguments.rate, bar.update) for controller in controllers]

@@ -16,6 +16,7 @@ from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import run
 from baselines.files import make_folder, whole_file, whole_results, write_json
 from baselines.registry import controller_names, make_controller
+from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.success import SETTLED
 
@@ -39,7 +40,7 @@ def main() -> None:
         help=f"one of {', '.join(controller_names())}, or path/to/file.py:Class (default: the paper's)",
     )
     add_set(parser)
-    parser.add_argument("--sensors", default="ideal", choices=("ideal", "lab"), help="default: %(default)s")
+    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png and .svg, figure4.json, rig.png")
     run(parser, _figure4)

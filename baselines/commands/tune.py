@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     from optuna import Study
     from optuna.trial import FrozenTrial
 
+TUNED_FOR = ("ideal", "lab")
+"""Sensors that the laws' published gains were tuned for."""
+
 WORLDS = 3_000_000
 """Seed of the first lane; those of evaluations, trainings and validations are lower."""
 
@@ -213,7 +216,7 @@ def main() -> None:
         "--trials", type=whole_up_to(TRIALS), default=60, help="sets of gains to try, at most 100000 (default: %(default)s)"
     )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the search (default: %(default)s)")
-    parser.add_argument("--sensors", default="both", choices=("ideal", "lab", "both"), help="default: both")
+    parser.add_argument("--sensors", default="both", choices=(*SENSORS, "both"), help="default: both, ideal and lab")
     parser.add_argument("--start", type=Path, help="a gains.json, for trial 0 (default: the middle of every range)")
     parser.add_argument(
         "--lanes", type=whole_up_to(LANES), default=32, help=f"rigs of each scenario, at most {LANES} (default: %(default)s)"
@@ -227,7 +230,7 @@ def main() -> None:
 
 def _tune(arguments: argparse.Namespace) -> None:
     rig = load_parameters(arguments.parameters)
-    sensors = tuple(SENSORS) if arguments.sensors == "both" else (arguments.sensors,)
+    sensors = TUNED_FOR if arguments.sensors == "both" else (arguments.sensors,)
     controller, own = with_options([arguments.controller], arguments.set)[0], environment_parts(arguments)
     bounds = {name: pair for name, pair in bounds_of(controller, rig).items() if name not in split_options(controller)[1]}
     start = start_of(arguments.start, bounds)

@@ -18,6 +18,8 @@ CONDITIONS = {
     ("ideal", "randomised"): {"marker": "o", "color": DARK, "mfc": "white"},
     ("lab", "nominal"): {"marker": "^", "color": MIDDLE, "mfc": MIDDLE},
     ("lab", "randomised"): {"marker": "^", "color": MIDDLE, "mfc": "white"},
+    ("honest", "nominal"): {"marker": "s", "color": MIDDLE, "mfc": MIDDLE},
+    ("honest", "randomised"): {"marker": "s", "color": MIDDLE, "mfc": "white"},
 }
 """Sensors and plant -> how they look."""
 

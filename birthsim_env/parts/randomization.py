@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.parts.sensors import SENSORS, drawn_by
 from birthsim_env.parts.streams import Streams
 from birthsim_env.physics.lanes import Array, parameter_columns
 from birthsim_env.physics.parameters import Parameters, field_of, least_dead_volume
@@ -18,9 +19,11 @@ from birthsim_env.physics.values import is_finite, shown
 Ranges = Mapping[str, tuple[float, float]]
 
 SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
-"""Sections and fields in which lanes cannot differ: workspace, clock, sensors and the limit of an episode are those of the
-nominal rig."""
+"""Sections and fields in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal rig,
+and sensors too where their model does not draw them (``sensors.drawn_by``)."""
 
+
+_DRAWN_BY_SOME = tuple(name for sensors in SENSORS for name in drawn_by(sensors))
 
 WORST_AT_LEAST = ("mechanics.mass", "friction.sign_speed", "chambers.dead_volume", "air.supply_pressure")
 """Fields whose least values are the hardest on a rig; of all others, the largest are."""
@@ -32,8 +35,8 @@ KNOWN = 0.2
 """Share of a figure by which it may be off where a rig's owner has described it; assumed."""
 
 
-def documented_ranges(nominal: Parameters) -> dict[str, tuple[float, float]]:
-    """Dotted field name -> (low, high), SI units: what domain randomisation of a rig draws from.
+def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+    """Dotted field name -> (low, high), SI units: what domain randomisation of a rig with a sensor model draws from.
 
     A figure of the default rig is assumed, and has the range that its field documents (design section 4); one that the owner
     has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count.
@@ -52,13 +55,15 @@ def documented_ranges(nominal: Parameters) -> dict[str, tuple[float, float]]:
                 ranges[f"{section.name}.{field.name}"] = (low, high)
     volume = "chambers.dead_volume"
     ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
-    return {**ranges, **{name: (low, high) for name, low, high in nominal.ranges}}
+    ranges.update({name: (low, high) for name, low, high in nominal.ranges})
+    left_out = set(_DRAWN_BY_SOME) - set(drawn_by(sensors))
+    return {name: pair for name, pair in ranges.items() if name not in left_out}
 
 
-def described(nominal: Parameters, randomize: Any) -> str:
+def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> str:
     """What the environments' argument ``randomize`` draws of the rig, in words: ``rigs drawn: mass 2 to 5 kg, ...``."""
     if not isinstance(randomize, Mapping):
-        randomize = documented_ranges(nominal) if randomize in (True, "plant") else {}
+        randomize = documented_ranges(nominal, sensors) if randomize in (True, "plant") else {}
     named = []
     for name, (low, high) in randomize.items():
         section, _, own = name.partition(".")
@@ -67,8 +72,9 @@ def described(nominal: Parameters, randomize: Any) -> str:
     return f"rigs drawn: {', '.join(named)}" if named else "the rig as described"
 
 
-def checked_ranges(ranges: Ranges, nominal: Parameters) -> dict[str, tuple[float, float]]:
-    """``ranges`` if each names a numeric field that lanes may differ in, with a finite (low, high) possible for ``nominal``.
+def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+    """``ranges`` if each names a numeric field that lanes may differ in, with a finite (low, high) possible for ``nominal``
+    under a sensor model.
 
     Else ``ValueError`` naming the entry.
     """
@@ -78,8 +84,11 @@ def checked_ranges(ranges: Ranges, nominal: Parameters) -> dict[str, tuple[float
             raise ValueError(f"randomize[{shown(name)}]; allowed: dotted names of parameters such as 'mechanics.mass'")
         if field_of(name).metadata["choices"]:
             raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
-        if name.partition(".")[0] in SHARED or name in SHARED:
-            raise ValueError(f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes")
+        if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
+            more = f"; with other sensors {name}" if name in _DRAWN_BY_SOME else ""
+            raise ValueError(
+                f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
+            )
         pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and np.shape(bounds) == (2,) else (math.nan,) * 2
         if not (is_finite(pair[0]) and is_finite(pair[1]) and pair[0] <= pair[1]):
             raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: (low, high), finite and ordered")

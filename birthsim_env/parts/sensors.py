@@ -1,4 +1,5 @@
-"""Sensor models: ``ideal`` sees everything at every control period, ``lab`` is a magnetic tracker and pressure cells.
+"""Sensor models: ``ideal`` sees everything at every control period, ``lab`` is a magnetic tracker and pressure cells with
+noise and latency, ``honest`` has the errors of a force sensor, a tracker, pressure cells and a control board besides.
 
 A sensor model's ``measure`` is called at every control instant at which somebody looks: at each one where ``sampled`` is
 True, at policy instants otherwise.
@@ -6,7 +7,6 @@ True, at policy instants otherwise.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -28,14 +28,13 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
+from birthsim_env.parts import tracker
+from birthsim_env.parts.honest_sensors import HonestSensors
+from birthsim_env.parts.noise import normal
 from birthsim_env.parts.seeding import vectorised
-from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.lanes import PRESSURES, Array
-from birthsim_env.physics.parameters import Electronics
-
-RATE_TIME = 0.02
-"""s; assumed: time constant of the low-pass on the position differences that ``lab`` shows as velocity."""
 
 
 @kernel
@@ -73,58 +72,24 @@ class IdealSensors:
         return Stage(ideal_stage)
 
 
-@helper
-def _uniform(key: np.uint64, counter: np.uint64) -> float:
-    """A number in (0, 1) from a key and a counter: SplitMix64 (Steele et al. 2014) without a state to carry along."""
-    x = key + counter * np.uint64(0x9E3779B97F4A7C15)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    x = x ^ (x >> np.uint64(31))
-    return ((x >> np.uint64(11)) + 0.5) / 9007199254740992.0
-
-
-@helper
-def _normal(key: np.uint64, tick: int, channel: int) -> float:
-    """A standard normal number for one channel at one tick (Box and Muller)."""
-    counter = np.uint64(tick * 32 + 2 * channel)
-    radius = math.sqrt(-2.0 * exact.log(_uniform(key, counter)))
-    return radius * exact.cosine(2.0 * math.pi * _uniform(key, counter + np.uint64(1)))
-
-
 @kernel
 def _lab(
     ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
     rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
     seen: Array,
 ) -> None:  # fmt: skip
-    """One control instant. ``queue`` (Q, 3, N): x, y and time of the last samples taken; ``shown`` (3, N): the newest that
-    has arrived; ``velocity`` (2, N): low-passed differences; ``seen`` (4, N): noisy pressures."""
-    depth = queue.shape[0]
+    """One control instant; ``queue``, ``shown`` and ``velocity`` as in ``parts.tracker``, ``seen`` (4, N): noisy pressures."""
     for i in range(time.shape[0]):
         tick, key = int(ticks[i]), keys[i]
-        index = math.floor(time[i] * rate + 1e-9)
-        if tick == 0 or index > math.floor((time[i] - period) * rate + 1e-9):
-            slot = int(index) % depth
-            queue[slot, 0, i] = motion[0, i] + position_noise * _normal(key, tick, 4)
-            queue[slot, 1, i] = motion[1, i] + position_noise * _normal(key, tick, 5)
-            queue[slot, 2, i] = time[i]
+        if tracker.sample_due(tick, time[i], period, rate):
+            x = motion[0, i] + position_noise * normal(key, tick, 4)
+            y = motion[1, i] + position_noise * normal(key, tick, 5)
+            tracker.take(queue, i, time[i], rate, x, y)
             if tick == 0:
-                # The tracker has run before the episode: its first sample is there at once.
-                for k in range(depth):
-                    queue[k, 2, i] = 0.0
-                    queue[k, 0, i], queue[k, 1, i] = queue[slot, 0, i], queue[slot, 1, i]
-                shown[0, i], shown[1, i], shown[2, i] = queue[slot, 0, i], queue[slot, 1, i], 0.0
-                velocity[0, i], velocity[1, i] = motion[2, i], motion[3, i]
-        for k in range(depth):
-            if queue[k, 2, i] > shown[2, i] and queue[k, 2, i] + latency <= time[i] + 1e-9:
-                step = queue[k, 2, i] - shown[2, i]
-                fraction = step / (RATE_TIME + step)
-                for axis in range(2):
-                    velocity[axis, i] += fraction * ((queue[k, axis, i] - shown[axis, i]) / step - velocity[axis, i])
-                    shown[axis, i] = queue[k, axis, i]
-                shown[2, i] = queue[k, 2, i]
+                tracker.start(queue, shown, velocity, i, x, y, motion[2, i], motion[3, i])
+        tracker.arrive(queue, shown, velocity, i, time[i], latency)
         for chamber in range(4):
-            seen[chamber, i] = pressures[chamber, i] + pressure_noise * _normal(key, tick, chamber)
+            seen[chamber, i] = pressures[chamber, i] + pressure_noise * normal(key, tick, chamber)
 
 
 @kernel
@@ -164,9 +129,7 @@ class LabSensors:
         self._numbers = (
             board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
         )  # fmt: skip
-        # Two samples can be under way beyond those that the latency holds back.
-        depth = int(board.position_latency * rate) + 3
-        self._queue: Array = np.zeros((depth, 3, num_envs))
+        self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), 3, num_envs))
         self._shown: Array = np.zeros((3, num_envs))
         self._keys = np.zeros(num_envs, dtype=np.uint64)
         self._velocity: Array = np.zeros((2, num_envs))
@@ -201,4 +164,11 @@ class SensorModel(Protocol):
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement: ...
 
 
-SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors}
+SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors, "honest": HonestSensors}
+"""A model that has ``drawn``, names of parameters, and ``vary(ranges)`` draws these for every episode where rigs are drawn;
+one that has ``board_stage()`` stands between a controller's openings and the valves too."""
+
+
+def drawn_by(sensors: str) -> tuple[str, ...]:
+    """Dotted names of the parameters that the sensor model ``sensors`` can draw for every episode."""
+    return getattr(SENSORS[sensors], "drawn", ())

@@ -10,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.quantities import Part, quantity
 from birthsim_env.physics.reading import read_toml
 from birthsim_env.physics.values import is_finite, shown
@@ -138,17 +139,6 @@ class Air(Part):
 
 
 @dataclass(frozen=True)
-class Electronics(Part):
-    """Control board and the sensors of a laboratory (sensor model ``lab``)."""
-
-    control_period: float = quantity(0.001, "s", "assumed", least=0.00025, most=0.01)
-    position_rate: float = quantity(240.0, "Hz", "trakSTAR, assumed", least=0.1, most=4000)
-    position_noise: float = quantity(1e-4, "m", "assumed; standard deviation per axis", least=0, most=1)
-    position_latency: float = quantity(0.004, "s", "assumed", least=0, most=0.05)
-    pressure_noise: float = quantity(500.0, "Pa", "assumed; standard deviation per chamber", least=0, most=1e6)
-
-
-@dataclass(frozen=True)
 class Parameters:
     """A whole rig. ``Parameters()`` is the paper's BirthSIM with the assumptions of the design made explicit.
 
@@ -231,8 +221,14 @@ class Parameters:
         return dataclasses.replace(self, **parts)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges."""
-        sections = {field.name: dataclasses.asdict(getattr(self, field.name)) for field in _parts(type(self))}
+        """All values as ``{section: {field: value}}``, and ``{"randomize": {name: [low, high]}}`` where there are ranges.
+
+        Options (``quantities.quantity``) are named where they differ from their defaults.
+        """
+        return self._sections(options=False)
+
+    def _sections(self, options: bool) -> dict[str, dict[str, Any]]:
+        sections = {field.name: getattr(self, field.name).to_dict(options) for field in _parts(type(self))}
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
@@ -250,7 +246,7 @@ class Parameters:
 
     def to_toml(self, path: str | Path) -> None:
         """Write every value to a TOML file, one table per part."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+        Path(path).write_text(tomli_w.dumps(self._sections(options=True)), encoding="utf-8")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Parameters:

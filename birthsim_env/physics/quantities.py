@@ -19,8 +19,13 @@ def quantity(
     most: float = math.inf,
     randomized: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
+    option: bool = False,
 ) -> Any:
-    """A dataclass field that knows its unit, its basis, its limits and the range that domain randomisation draws from."""
+    """A dataclass field that knows its unit, its basis, its limits and the range that domain randomisation draws from.
+
+    ``Parameters.to_dict`` names an ``option`` only where it differs from its default: results that are stored by what it
+    returns keep their place when options are added.
+    """
     metadata = {
         "unit": unit,
         "basis": basis,
@@ -29,6 +34,7 @@ def quantity(
         "most": most,
         "randomized": randomized,
         "choices": choices,
+        "option": option,
     }
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -67,6 +73,12 @@ class Part:
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             _check_field(type(self).__name__, field, getattr(self, field.name))
         self._check_together()
+
+    def to_dict(self, options: bool) -> dict[str, Any]:
+        """All values by name; without ``options`` an option only where it differs from its default."""
+        fields = dataclasses.fields(self)  # type: ignore[arg-type]
+        values = {field.name: getattr(self, field.name) for field in fields}
+        return {f.name: values[f.name] for f in fields if options or not f.metadata["option"] or values[f.name] != f.default}
 
     def _check_together(self) -> None:
         """Refuse values that are possible one by one but not together."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.electronics import Electronics
 from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Electronics
 
 
 class ExchangeableSensors:

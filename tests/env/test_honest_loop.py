@@ -1,0 +1,196 @@
+"""``honest`` sensors in the closed loop: lanes, threads, stops for Python, the valves' converter, and what is drawn."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents  # noqa: F401  registers the residual environments
+from baselines import make_controller
+from birthsim_env import Parameters
+from birthsim_env.parts.actuation import ValveActuation
+from birthsim_env.parts.honest_sensors import HonestSensors
+from birthsim_env.parts.randomization import described, documented_ranges
+from birthsim_env.parts.sensor_errors import FIGURES
+from birthsim_env.parts.sensors import SENSORS
+
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+OFF = {
+    f"electronics.{name}": 0.0
+    for name in FIGURES
+    if name not in ("position_noise", "position_latency", "pressure_noise", "distortion_length")
+}
+
+
+def course(env, steps=15, seed=3, actions=None):
+    """Observations, what is measured, openings and states of a run under random actions; the last axis is that of lanes."""
+    rng, found = np.random.default_rng(0), [env.reset(seed=seed)[0].T]
+    for _ in range(steps):
+        action = rng.uniform(-0.2, 0.2, env.single_action_space.shape).astype(np.float32)
+        found.append(env.step(np.tile(action, (env.num_envs, 1)))[0].T)
+        simulation = env.unwrapped.simulation
+        seen = simulation.measurement
+        found += [seen.position, seen.velocity, seen.position_time, seen.pressures, seen.user_force]
+        found += [simulation.openings, simulation.plant.state.copy()]
+    return found
+
+
+def assert_same(one, other):
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
+def test_with_every_error_off_a_run_is_labs_to_the_last_bit(name):
+    rig = Parameters().replace(OFF)
+    assert_same(*(course(gymnasium.make_vec(name, num_envs=3, sensors=kind, parameters=rig)) for kind in ("honest", "lab")))
+
+
+@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
+def test_a_lane_does_not_depend_on_the_others_nor_on_threads(name):
+    def run(lanes, threads, seed):
+        return course(
+            gymnasium.make_vec(name, num_envs=lanes, num_threads=threads, sensors="honest", randomize=True), seed=seed
+        )
+
+    many = run(70, 1, 3)
+    assert_same(many, run(70, 3, 3))
+    assert_same([values[..., 40:41] for values in many], run(1, 1, 43))
+
+
+class OwnHonest(HonestSensors):
+    """Asked in Python."""
+
+    def measure(self, *seen):
+        return super().measure(*seen)
+
+
+class OwnValves(ValveActuation):
+    """Without stages the loop stops for it."""
+
+    stages = None
+
+
+@pytest.mark.parametrize("own", ["sensors", "actuation"])
+def test_a_stop_for_python_changes_no_bit(own, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", OwnHonest)
+    rig = Parameters().replace({"electronics.missed_periods": 0.2})
+    setting = {"num_envs": 3, "parameters": rig, "randomize": True}
+    changes = {"sensors": "own"} if own == "sensors" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}
+    one, other = (gymnasium.make_vec(CIRCLE, **{**setting, **more}) for more in ({"sensors": "honest"}, changes))
+    assert_same(course(one), course(other))
+
+
+def test_valves_are_commanded_in_steps_and_stay_in_missed_periods():
+    rig = Parameters().replace({"electronics.dac_bits": 6.0, "electronics.missed_periods": 0.3})
+    env = gymnasium.make_vec(CIRCLE, num_envs=20, sensors="honest", parameters=rig, policy_period=0.001)
+    env.reset(seed=0)
+    rng, told, seen = np.random.default_rng(1), [], []
+    for _ in range(200):
+        action = rng.uniform(-1, 1, (20, 4)).astype(np.float32)
+        before = env.unwrapped.simulation.measurement.position_time.copy()
+        env.step(action)
+        told.append(env.unwrapped.simulation.openings)
+        seen.append((before, action.T))
+    told = np.array(told)
+    np.testing.assert_array_equal(told * 32, np.round(told * 32))
+    wanted = np.array([action for _, action in seen])
+    fresh = np.abs(told - wanted).max(axis=1) <= 1 / 64 + 1e-12
+    held = np.concatenate([np.zeros((1, 20), bool), (told[1:] == told[:-1]).all(axis=1)])
+    assert np.all(fresh | held)
+    assert fresh[0].all(), "the first period is never missed"
+    missed = ~fresh
+    assert missed.mean() == pytest.approx(0.3, abs=4.5 * np.sqrt(0.21 / missed.size))
+
+
+def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
+    envs = {kind: gymnasium.make_vec(CIRCLE, num_envs=50, sensors=kind, randomize=True) for kind in ("ideal", "lab", "honest")}
+    for env in envs.values():
+        env.reset(seed=5)
+    rigs = [env.unwrapped.simulation.plant.lane_parameters for env in envs.values()]
+    assert_same(rigs[1:], rigs[:1] * 2)
+    drawn = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)].copy()
+    for row, name in zip(drawn, FIGURES, strict=True):
+        low, high = documented_ranges(Parameters(), "honest")[f"electronics.{name}"]
+        assert low <= row.min() < low + 0.2 * (high - low) < high - 0.2 * (high - low) < row.max() <= high, name
+    envs["honest"].reset(seed=6)
+    again = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)]
+    np.testing.assert_array_equal(again[:, :-1], drawn[:, 1:])
+
+
+def test_a_nominal_rig_has_nominal_sensors_whose_errors_differ_by_episode():
+    env = gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize="scenario")
+    env.reset(seed=5)
+    errors = env.unwrapped.simulation.sensors._errors
+    np.testing.assert_array_equal(errors[: len(FIGURES)], np.broadcast_to(errors[: len(FIGURES), :1], (len(FIGURES), 4)))
+    assert len(np.unique(errors[len(FIGURES)])) == 4
+
+
+def test_sensors_are_drawn_only_where_the_model_can():
+    ranges = {"electronics.force_bias": (0.0, 5.0)}
+    gymnasium.make(CIRCLE, sensors="honest", randomize=ranges).reset(seed=0)
+    with pytest.raises(ValueError, match=r"randomize\['electronics.force_bias'\].*other sensors"):
+        gymnasium.make(CIRCLE, sensors="lab", randomize=ranges)
+    with pytest.raises(ValueError, match=r"randomize\['electronics.control_period'\].*allowed"):
+        gymnasium.make(CIRCLE, sensors="honest", randomize={"electronics.control_period": (0.001, 0.002)})
+    assert "force bias 0 to 2 N" in described(Parameters(), True, "honest")
+    assert "force bias" not in described(Parameters(), True)
+
+
+def test_a_laboratorys_own_figures_and_ranges_come_from_its_file(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text('[electronics]\nforce_noise = 0.0\nforce_bias = 3.0\n[randomize]\n"electronics.adc_bits" = [9, 10]\n')
+    rig = Parameters.from_toml(path)
+    ranges = documented_ranges(rig, "honest")
+    assert ranges["electronics.force_noise"] == (0.0, 0.0), "what is switched off stays off"
+    assert ranges["electronics.force_bias"] == pytest.approx((2.4, 3.6))
+    assert ranges["electronics.adc_bits"] == (9, 10)
+    assert "electronics.adc_bits" not in documented_ranges(rig, "lab")
+    for kind in ("honest", "lab"):
+        gymnasium.make(CIRCLE, sensors=kind, parameters=path, randomize=True).reset(seed=0)
+    rig.to_toml(path)
+    assert Parameters.from_toml(path) == rig == Parameters.from_dict(rig.to_dict())
+    assert "pressure_range" in path.read_text(), "a file names every figure"
+    assert rig.to_dict()["electronics"].keys() >= {"force_noise", "force_bias", "position_noise"}
+    assert "pressure_range" not in rig.to_dict()["electronics"]
+
+
+def test_a_registration_at_the_transmitter_is_refused():
+    with pytest.raises(ValueError, match=r"transmitter_y = 0\.0 is impossible; allowed"):
+        Parameters().replace({"electronics.transmitter_y": 0.0})
+
+
+def test_a_state_goes_on_to_the_bit():
+    envs = [gymnasium.make_vec(CIRCLE, num_envs=3, sensors="honest", randomize=True) for _ in range(2)]
+    envs[0].reset(seed=1)
+    actions = np.full((3, 4), 0.05, np.float32)
+    for _ in range(5):
+        envs[0].step(actions)
+    envs[1].reset(seed=9)
+    envs[1].unwrapped.set_state(envs[0].unwrapped.get_state())
+    for _ in range(5):
+        np.testing.assert_array_equal(envs[0].step(actions)[0], envs[1].step(actions)[0])
+
+
+def test_what_a_law_believes_of_the_sensors_may_differ_from_what_they_are():
+    """The environment has its ``Parameters``, the law its own: sensors with five times the noise that it is told of."""
+    true = Parameters().replace({"electronics.position_noise": 5e-4})
+
+    def run(believed):
+        env = gymnasium.make_vec(
+            "BirthSIM/Probe-v1", num_envs=2, sensors="honest", parameters=true, policy_period=0.001, duration=2.0
+        )
+        env.reset(seed=0)
+        law = make_controller("admittance-backstepping", believed)
+        law.reset()
+        openings = []
+        for _ in range(600):
+            openings.append(law.command(env.unwrapped.measurement, env.unwrapped.reference))
+            env.step(openings[-1].T)
+        return np.array(openings)
+
+    informed, mistaken = run(true), run(Parameters())
+    assert np.isfinite(mistaken).all()
+    assert np.abs(informed - mistaken).max() > 1e-3
