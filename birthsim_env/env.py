@@ -85,7 +85,9 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
 
     ## Arguments
     - `action_mode`, `valves`: see above.
-    - `sensors`: `"ideal"`, or `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures.
+    - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures;
+      `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
+      (`birthsim_env.physics.electronics`).
     - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
       (`birthsim_env.parts.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
       `{"mechanics.mass": (2, 5)}` draws just these parameters.

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from birthsim_env.parts.honest_sensors import HonestSensors
 from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensor_errors import FIGURES
 from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.physics.electronics import Electronics
 
 OFF = {
     name: 0.0 for name in FIGURES if name not in ("position_noise", "position_latency", "pressure_noise", "distortion_length")
@@ -243,3 +247,14 @@ def test_ranges_are_drawn_for_every_episode_and_the_latest_arrives():
     # The board knows of no latency here, and stamps samples with the instant at which they arrive.
     assert (0.199 - seen["position_time"][-1]).max() < 0.001 + 1e-9
     assert abs(np.corrcoef(late, old)[0, 1]) < 0.6
+
+
+def test_the_page_has_every_figure_with_its_default_and_its_range():
+    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", page, re.MULTILINE))
+    for field_ in dataclasses.fields(Electronics):
+        if field_.name != "control_period":
+            default, drawn = rows[field_.name].split(" | ")[:2]
+            assert float(default.split()[0]) == field_.default, field_.name
+            low_high = tuple(float(bound) for bound in drawn.split(" to ")) if drawn.strip() else None
+            assert low_high == field_.metadata["randomized"], field_.name
