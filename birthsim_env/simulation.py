@@ -174,7 +174,7 @@ class Simulation:
             begin(self.sensors, block, streams["sensors"])
         self.actuation.begin(lanes)
         self._tick[:, lanes], self._seen[TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
-        self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
+        self.impacts[:, lanes], self._openings[:, lanes], self.plant.inner_commands[:, lanes] = 0.0, 0.0, 0.0
         rows = checked_start(
             self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters, self.nominal
         )  # fmt: skip
@@ -243,18 +243,19 @@ class Simulation:
         senses = self._compiled(self.sensors, "measure", self._measure)
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
-        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, *looks, senses)))
+        moves = plant_stage(self.plant, self.period)
+        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, moves, *looks, senses)))
         if self._loop is not None and made == self._made:
             return
         counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
-        self._loop = MixedLoop(lanes, *places, [*acts, plant_stage(self.period), *looks, counts, senses], self.closing)
+        self._loop = MixedLoop(lanes, *places, [*acts, moves, *looks, counts, senses], self.closing)
         self._look = MixedLoop(lanes, *places, [*looks, begins, senses], self.beginning)
         self._made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
         """The plant by itself, and the actuation by itself: to be timed, on a copy."""
         lanes, places = self.plant.num_envs, self._places()
-        return MixedLoop(lanes, *places, [plant_stage(self.period)]), MixedLoop(lanes, *places, self._acts())
+        return MixedLoop(lanes, *places, [plant_stage(self.plant, self.period)]), MixedLoop(lanes, *places, self._acts())
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Part) -> Part:

@@ -18,19 +18,17 @@ from birthsim_env.loop.rows import (
     WORLD,
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
-from birthsim_env.physics import dynamics
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics import dynamics, spools
+from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.plant import Plant
 
 
-@kernel
-def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: control period, s; integration steps in it."""
-    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
-    dx, total = scratch(STATES), scratch(STATES)
-    trial, x, u = scratch(STATES), w[STATE : STATE + STATES], s[OPENING : OPENING + 4]
-    p, hit = w[:PARAMETERS], w[IMPACT : IMPACT + 2]
+@helper
+def _move(w: Array, s: Array, u: Array, about: Array, dx: Array, total: Array, trial: Array, n: int) -> None:
+    """One control period under openings ``u`` (4, n); ``about``: its length, s, and integration steps in it."""
+    x, p, hit = w[STATE : STATE + STATES], w[:PARAMETERS], w[IMPACT : IMPACT + 2]
     steps = int(about[1])
     dynamics.integrate(x, u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, hit, dx, total, trial, n)
     dynamics.settle(x, n)
@@ -38,12 +36,32 @@ def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane
         w[TICK, i] += 1.0
         s[TIME, i] = w[TICK, i] * about[0]
     end_effector_motion(x[:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
+
+
+@kernel
+def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: control period, s; integration steps in it."""
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
+    dx, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
+    _move(w, s, s[OPENING : OPENING + 4], about, dx, total, trial, n)
     return 0
 
 
-def plant_stage(period: float) -> Stage:
+@kernel
+def _worn_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """As ``_plant``, with valves that do not open as they are told; memory: their inner commands."""
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
+    dx, total, trial, u = scratch(STATES), scratch(STATES), scratch(STATES), scratch(4)
+    spools.admit(s[OPENING : OPENING + 4], w[:PARAMETERS], block(memory, 4), u, n)
+    _move(w, s, u, about, dx, total, trial, n)
+    return 0
+
+
+def plant_stage(plant: Plant, period: float) -> Stage:
     """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand."""
-    return Stage(_plant, np.array([period, dynamics.steps_in(period)]))
+    about = np.array([period, dynamics.steps_in(period)])
+    perfect = spools.are_perfect(plant.lane_parameters)
+    return Stage(_plant, about) if perfect else Stage(_worn_plant, about, plant.inner_commands)
 
 
 @kernel

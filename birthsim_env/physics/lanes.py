@@ -40,6 +40,7 @@ PARAMETER_NAMES = (
     *("conductance", "critical", "leakage", "tau", "supply", "atmosphere", "temperature"),
     *("gas", "gamma", "index", "rho0", "t0"),
     *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
+    *("deadband", "play", "opening_limit"),
 )
 PARAMETERS = len(PARAMETER_NAMES)
 (
@@ -98,6 +99,9 @@ PARAMETERS = len(PARAMETER_NAMES)
     SPOOL_RATE,
     SIGN_SLOPE,
     INVERSE_MASS,
+    DEADBAND,
+    PLAY,
+    OPENING_LIMIT,
 ) = range(PARAMETERS)
 
 
@@ -105,7 +109,8 @@ def parameter_column(parameters: Parameters) -> Array:
     """One lane's column of the parameter array: (PARAMETERS,), SI units.
 
     ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` and ``elasto_plastic`` are 1 for the friction law of that
-    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). The last rows spare divisions: ``knee`` is
+    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). Rows from ``knee`` to
+    ``inverse_mass`` spare divisions: ``knee`` is
     1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
     equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed.
     """
@@ -140,6 +145,7 @@ def _rows(parameters: Parameters) -> tuple[Any, ...]:
         *(1 / (1 - v.critical_ratio), valves.laminar_slope(v.critical_ratio)),
         *(a.reference_temperature / a.temperature, 1 / a.supply_pressure, 1 / a.atmospheric_pressure),
         *(1 / v.time_constant, 1 / f.sign_speed, 1 / m.mass),
+        *(v.deadband, v.hysteresis, v.opening_limit),
     )
 
 

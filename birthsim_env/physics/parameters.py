@@ -115,6 +115,18 @@ class Valves(Part):
     critical_ratio: float = quantity(0.30, "-", "from 100 l/min nominal, 6 to 5 bar; b", least=0, most=0.9)
     leakage_ratio: float = quantity(0.005, "-", "assumed; Cl/C", least=0, most=0.5)
     time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, most=10, randomized=(0.0015, 0.008))
+    deadband: float = quantity(
+        0.0,
+        "-",
+        "off; opening within which nothing opens, up to 0.05 assumed of overlapped spools",
+        least=0,
+        most=0.5,
+        option=True,
+    )
+    hysteresis: float = quantity(
+        0.0, "-", "off; width of the play in the opening, up to 0.02 assumed", least=0, most=0.5, option=True
+    )
+    opening_limit: float = quantity(1.0, "-", "off; largest opening, 0.8 to 1 assumed", above=0, most=1, option=True)
 
 
 @dataclass(frozen=True)

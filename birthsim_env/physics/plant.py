@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics import dynamics, geometry
+from birthsim_env.physics import dynamics, geometry, spools
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.parameters import Parameters, load_parameters
@@ -52,6 +52,8 @@ class Plant:
         self._state = balanced_state(self.lane_parameters, np.zeros((2, self.num_envs)))
         self.impacts: Array = np.zeros((2, self.num_envs))
         """Largest speed at which each piston ran into an end stop during the last ``advance``, m/s, (2, num_envs)."""
+        self.inner_commands: Array = np.zeros((4, self.num_envs))
+        """Where the play of valves with hysteresis is, (4, num_envs)."""
 
     @property
     def state(self) -> Array:
@@ -63,7 +65,10 @@ class Plant:
         self._state[:] = checked("state", state, (STATES, self.num_envs), "SI")
 
     def derivatives(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> Array:
-        """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N."""
+        """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N.
+
+        The openings are those that spools go to: deadband, hysteresis and limit of the valves are ``advance``'s.
+        """
         rates = np.empty((STATES, self.num_envs))
         dynamics.derivatives(*self._arguments(state, opening_command, user_force), self.lane_parameters, rates)
         return rates
@@ -83,6 +88,10 @@ class Plant:
 
     def advance_unchecked(self, command: Array, forces: Array, duration: float) -> None:
         """``advance`` for arrays known to be right: command (4, num_envs), forces (K, 2, num_envs), contiguous float64."""
+        if not spools.are_perfect(self.lane_parameters):
+            opening = np.empty_like(command)
+            spools.admit_lanes(command, self.lane_parameters, self.inner_commands, opening)
+            command = opening
         held = duration / forces.shape[0]
         steps = dynamics.steps_in(held)
         dynamics.advance(self.state, command, forces, self.lane_parameters, steps, held / steps, self.impacts)

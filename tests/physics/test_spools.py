@@ -1,0 +1,113 @@
+"""Valves that do not open as they are told, against the stop operator, a drawn characteristic and the second model."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.bench.motions import PERIOD, PERIODS, strong
+from baselines.bench.second_model import SecondModel
+from birthsim_env.physics import spools
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.lanes import parameter_array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+
+CIRCLE = "BirthSIM/Circle-v1"
+WORN = {"valves.deadband": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}
+
+
+class OtherSpool:
+    """Play as what the stop operator leaves: a spring of +-half the width between the command and what follows it."""
+
+    def __init__(self, deadband, width, limit, valves=4):
+        self.deadband, self.half, self.limit = deadband, width / 2, limit
+        self.command, self.spring = np.zeros(valves), np.zeros(valves)
+
+    def __call__(self, command):
+        self.spring = np.clip(self.spring + (command - self.command), -self.half, self.half)
+        self.command = np.array(command)
+        corners = [-1 - 1e-12, -self.deadband, self.deadband, 1 + 1e-12]
+        return np.clip(np.interp(self.command - self.spring, corners, [-1, 0, 0, 1]), -self.limit, self.limit)
+
+
+@pytest.mark.parametrize("worn", [(0.0, 0.0, 1.0), (0.1, 0.0, 1.0), (0.0, 0.1, 1.0), (0.0, 0.0, 0.5), (0.05, 0.04, 0.7)])
+def test_openings_are_those_of_the_stop_operator_and_the_characteristic(worn):
+    rig = Parameters().replace(dict(zip(WORN, worn, strict=True)))
+    parameters, rng = parameter_array(rig, 3), np.random.default_rng(0)
+    last, opening, other = np.zeros((4, 3)), np.empty((4, 3)), OtherSpool(*worn, valves=(4, 3))
+    path = np.clip(np.cumsum(rng.normal(0, 0.05, (400, 4, 3)), axis=0), -1, 1)
+    for command in path:
+        spools.admit_lanes(command, parameters, last, opening)
+        np.testing.assert_allclose(opening, other(command), atol=1e-9)
+        if worn == (0.0, 0.0, 1.0):
+            np.testing.assert_array_equal(opening, command)
+    assert spools.are_perfect(parameters) == (worn == (0.0, 0.0, 1.0))
+
+
+def test_a_worn_plant_moves_as_the_second_model_behind_another_spool():
+    rig = Parameters().replace(WORN)
+    plant, perfect, spool = Plant(rig), Plant(), OtherSpool(0.05, 0.04, 0.7)
+    plant.state[:] = balanced_state(plant.lane_parameters, np.zeros((2, 1)), np.zeros((2, 1)))
+    perfect.state[:] = plant.state
+    model = SecondModel(Parameters(), plant.end_effector()[:, 0], plant.state[:, 0])
+    for k in range(PERIODS):
+        command, push = strong(k)
+        model.advance(spool(command), push, PERIOD)
+        plant.advance(command[:, None], push[:, None], PERIOD)
+        perfect.advance(command[:, None], push[:, None], PERIOD)
+        np.testing.assert_allclose(plant.end_effector()[:2, 0], model.state[:2], atol=2e-5)
+        np.testing.assert_allclose(plant.pressures[:, 0], model.pressures, rtol=2e-3)
+    assert np.abs(plant.end_effector() - perfect.end_effector())[:2].max() > 1e-3, "it matters"
+
+
+def test_the_loop_moves_as_the_plant_alone():
+    rig = Parameters().replace(WORN)
+    env = gymnasium.make_vec(CIRCLE, num_envs=3, parameters=rig, user_force=lambda time: (0.0, 0.0), policy_period=0.001)
+    env.reset(seed=0)
+    plant, rng = Plant(rig, 3), np.random.default_rng(0)
+    plant.state = env.unwrapped.simulation.plant.state
+    for _ in range(100):
+        action = rng.uniform(-0.3, 0.3, (3, 4)).astype(np.float32)
+        env.step(action)
+        plant.advance(action.T.astype(float), np.zeros((2, 3)), 0.001)
+    np.testing.assert_allclose(env.unwrapped.simulation.plant.state, plant.state, rtol=1e-12, atol=1e-12)
+
+
+def run(lanes, seed, **setting):
+    env = gymnasium.make_vec(CIRCLE, num_envs=lanes, **setting)
+    found, rng = [env.reset(seed=seed)[0]], np.random.default_rng(0)
+    for _ in range(40):
+        action = rng.uniform(-0.2, 0.2, 4).astype(np.float32)
+        found.append(env.step(np.tile(action, (lanes, 1)))[0])
+    return np.array(found)
+
+
+def test_worn_valves_are_drawn_by_lane_and_a_lane_does_not_depend_on_the_others():
+    ranges = {"valves.deadband": (0.0, 0.05), "valves.hysteresis": (0.0, 0.02)}
+    many = run(40, 3, randomize=ranges)
+    np.testing.assert_array_equal(many[:, 36:37], run(1, 39, randomize=ranges))
+    assert np.abs(many[-1] - many[-1, :1]).max() > 1e-3
+
+
+def test_a_perfect_lane_among_worn_ones_has_the_bits_of_a_perfect_rig():
+    ranges = {"valves.deadband": (0.0, 0.0), "valves.opening_limit": (1.0, 1.0)}
+    np.testing.assert_array_equal(run(2, 3, randomize=ranges), run(2, 3))
+    env = gymnasium.make_vec(CIRCLE, num_envs=2)
+    env.reset(seed=3)
+    env.unwrapped.simulation.plant.lane_parameters[-3, 1] = 0.05
+    env.unwrapped.simulation.forget_loops()
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        observation = env.step(np.tile(rng.uniform(-0.2, 0.2, 4).astype(np.float32), (2, 1)))[0]
+    np.testing.assert_array_equal(observation[0], run(2, 3)[-1, 0])
+    assert not np.array_equal(observation[1], run(2, 3)[-1, 1])
+
+
+def test_options_of_the_valves_change_no_stored_rig():
+    assert "deadband" not in Parameters().to_dict()["valves"]
+    rig = Parameters().replace(WORN)
+    assert Parameters.from_dict(rig.to_dict()) == rig
+    with pytest.raises(ValueError, match=r"Valves\.opening_limit = 1\.2 is impossible; allowed"):
+        Parameters().replace({"valves.opening_limit": 1.2})
