@@ -231,7 +231,7 @@ def main() -> None:
         "--tb=no",
         "--no-header",
         "-m",
-        "not slow and not weekly",
+        "not slow",
         "-p",
         "no:xdist",
         "-p",

@@ -32,7 +32,7 @@ EVERY = 4
 LONGEST = 600.0
 """s, assumed: a recording ends by itself; it fills 40 MB of memory then."""
 
-LARGEST = 2**30
+LARGEST = 2**27
 """Bytes, unpacked, that a file may claim to hold."""
 
 EVENTS = ("settings", "path", "lost")
