@@ -112,9 +112,9 @@ class BacksteppingController(StagedController):
             fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
             valves drain, no force is left to come back, and the episode is lost.
 
-    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. A
-    damping factor is the damping in units of the least there is; up to 1.01 it is that, and where a ``damping_ratio`` is given
-    it says nothing.
+    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
+    damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
+    ``damping_ratio`` is given.
     Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
     """
 
