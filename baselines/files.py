@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import shutil
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -15,6 +16,9 @@ from typing import Any, BinaryIO
 from filelock import FileLock, Timeout
 
 _PARTIAL = ".partial"
+LEFTOVERS = f".*{_PARTIAL}"
+"""Pattern of the names of what is not complete."""
+
 _HOST = socket.gethostname().replace("-", "_")
 
 
@@ -26,10 +30,15 @@ def make_folder(path: Path) -> Path:
         raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
     except OSError as error:
         raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
-    for leftover in path.rglob(f".*{_PARTIAL}"):
+    remove_leftovers(path.rglob(LEFTOVERS))
+    return path
+
+
+def remove_leftovers(found: Iterable[Path]) -> None:
+    """Remove hidden files and folders that killed processes left; those of a process that may still run stay."""
+    for leftover in found:
         if not _is_written(leftover):
             shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
-    return path
 
 
 @contextmanager
@@ -49,10 +58,11 @@ def own_folder(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[BinaryIO]:
+def whole_file(path: Path, new: bool = False) -> Iterator[BinaryIO]:
     """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
 
     It is on the disk before it has its name. A process that is killed leaves a hidden file, which ``make_folder`` removes.
+    A ``new`` file replaces none: ``FileExistsError`` where there is one.
     """
     partial = _partial(path)
     try:
@@ -60,7 +70,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        partial.replace(path)
+        _link(partial, path) if new else partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
 
@@ -123,6 +133,18 @@ def _partial(path: Path) -> Path:
     """The hidden name of what this process writes and ``path`` will be."""
     host, process = this_process()
     return path.with_name(f".{path.name}.{host}-{process}{_PARTIAL}")
+
+
+def _link(partial: Path, path: Path) -> None:
+    """Give a file the name ``path``; ``FileExistsError`` where another one has it."""
+    try:
+        os.link(partial, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without hard links
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+        partial.replace(path)
 
 
 def _is_written(partial: Path) -> bool:

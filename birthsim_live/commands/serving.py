@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import signal
 import socket
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,7 +47,7 @@ def need_server() -> None:
 
 
 def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
-    """Serve a hub on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
+    """Serve a hub on a socket of ``listen``, by the name ``host``, until a signal asks it to end; after ``need_server``."""
     import uvicorn
 
     from birthsim_live.server.app import create_app
@@ -65,9 +66,13 @@ def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings:
         app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
     )  # fmt: skip
+    server = uvicorn.Server(options)
+    if hasattr(signal, "SIGHUP"):
+        # As the server does with Ctrl-C and SIGTERM: the hub is closed before the command ends.
+        signal.signal(signal.SIGHUP, server.handle_exit)
     try:
         with contextlib.suppress(KeyboardInterrupt):
-            uvicorn.Server(options).run(sockets=[listening])
+            server.run(sockets=[listening])
     finally:
         # After a second interrupt the server leaves without closing the hub.
         hub.finish()

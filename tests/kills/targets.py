@@ -1,0 +1,93 @@
+"""What is killed: commands with arguments that take seconds, and which of their files may differ from run to run."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+CONFIGURATION = """[training]
+environment = "BirthSIM/ProbeResidual-v1"
+lanes = 32
+rollout = 32
+batch = 256
+epochs = 4
+learning_rate = 2e-3
+hidden = [32, 32]
+validation_lanes = 4
+validations = 4
+[residual]
+policy_period = 0.04
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A command as a user runs it.
+
+    ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{work}``, a folder with ``small.toml``.
+    ``older`` are arguments that give other results in the same place, as an earlier run has left them. ``differ`` names the
+    files, and ``costs`` the keys in the JSON files of pieces, that differ from run to run. With ``alone`` one process has the
+    folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is complete.
+    """
+
+    name: str
+    command: str
+    arguments: tuple[str, ...]
+    older: tuple[str, ...] = ()
+    file: str = ""
+    differ: tuple[str, ...] = ()
+    costs: tuple[str, ...] = ()
+    alone: bool = False
+    partway: bool = False
+
+    def line(self, work: Path, folder: Path, older: bool = False) -> list[str]:
+        """The words after the command's name."""
+        words = (*self.arguments, *(self.older if older else ()))
+        return [word.format(out=folder / self.file, work=work) for word in words]
+
+
+TARGETS = {
+    target.name: target
+    for target in (
+        Target(
+            "evaluate", "birthsim-evaluate",
+            ("--env", "BirthSIM/Probe-v1", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
+            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+        ),
+        Target(
+            "compare", "birthsim-evaluate",
+            (
+                *("--all", "--no-studies", "--env", "BirthSIM/Probe-v1", "--sensors", "ideal"),
+                *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
+            ),
+            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+        ),
+        Target(
+            "stability", "birthsim-stability",
+            ("--controller", "backstepping", "--map", "rig", "--points", "2", "--out", "{out}"),
+            older=("--seed", "7", "--sensors", "lab"),
+        ),
+        Target(
+            "tune", "birthsim-tune",
+            ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
+            differ=("trials.journal",), alone=True, partway=True,
+        ),
+        Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
+        Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),
+        Target(
+            "animate", "birthsim-animate",
+            ("--begin", "0.5", "--end", "1.5", "--rate", "10", "--out", "{out}"), older=("--seed", "7"), file="pair.webp",
+        ),
+    )
+}  # fmt: skip
+"""Without the recording, which is no command that ends by itself: ``recording.py``."""
+
+
+def program(command: str) -> str:
+    """Python source that runs a command by the entry point that ``pyproject.toml`` gives it."""
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    module, _, function = scripts[command].partition(":")
+    return f"import sys; sys.argv[0] = {command!r}; from {module} import {function}; {function}()"
