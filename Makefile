@@ -28,7 +28,7 @@ POLICIES := agents/policies
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,tune,video,live,dev]'
+	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,tune,sweep,video,live,dev]'
 	touch $(READY)
 
 run: $(READY)

@@ -3,45 +3,44 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import socket
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from baselines.side_by_side import LISTENING, ONE_THREAD
 
-ALLOWED = "allowed: ray, or ray:ADDRESS of a running cluster such as ray:10.0.0.1:6379"
-
-
-def check_cluster(cluster: str) -> str:
-    """The address in ``ray[:ADDRESS]``, "" where there is none; ``ValueError`` for anything else and where Ray is missing."""
-    kind, colon, address = cluster.partition(":")
-    if kind != "ray" or (colon and not address):
-        raise ValueError(f"--cluster {cluster!r}; {ALLOWED}")
-    try:
-        import ray  # noqa: F401
-    except ImportError as error:
-        raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
-    return address
+CONNECTING = 10.0
+"""s until an address is taken for one where nobody answers, assumed."""
 
 
 class RayPool:
-    """As many pieces at once as the cluster has processors; without an address the cluster is this machine's own.
+    """As many pieces at once as the cluster ``ray[:ADDRESS]`` has processors; without an address it is this machine's own.
 
     Every host needs the same version of this package, and what a piece names by path, such as a controller's file.
     """
 
     def __init__(self, cluster: str) -> None:
-        address = check_cluster(cluster)
-        import ray
-
-        self._ray = ray
+        if any("RAY_AUTH_TOKEN" in name for name in os.environ) or (Path.home() / ".ray" / "auth_token").exists():
+            # Ray's own command starts clusters with this token, and its library shows it only when told so.
+            os.environ.setdefault("RAY_AUTH_MODE", "token")
         try:
-            ray.init(
+            import ray
+        except ImportError as error:
+            raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
+        self._ray: Any = ray
+        address = cluster.partition(":")[2]
+        if address:
+            _check_that_it_answers(cluster, address)
+        try:
+            self._ray.init(
                 address=address or "local", log_to_driver=False, include_dashboard=False if not address else None,
                 runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
             )  # fmt: skip
         except ConnectionError as error:
-            raise ValueError(f"--cluster {cluster!r}: no cluster answers there; {ALLOWED}") from error
-        self.width = max(1, int(ray.cluster_resources().get("CPU", 1)))
+            raise ValueError(f"--cluster {cluster!r}: no cluster answers there; allowed: ray, or the address of one") from error
+        self.width = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         self._begun: set[Any] = set()
 
     def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
@@ -66,6 +65,18 @@ class RayPool:
             with contextlib.suppress(self._ray.exceptions.RayError):
                 self._ray.cancel(begun, force=True)
         self._ray.shutdown()
+
+
+def _check_that_it_answers(cluster: str, address: str) -> None:
+    """Ray itself would try for minutes."""
+    host, _, port = address.rpartition(":")
+    try:
+        with socket.create_connection((host, int(port)), CONNECTING):
+            pass
+    except (OSError, ValueError) as error:
+        raise ValueError(
+            f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
+        ) from error
 
 
 def _call(work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:

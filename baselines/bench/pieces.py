@@ -48,8 +48,8 @@ def evaluation_tasks(
 ) -> list[Task]:  # fmt: skip
     """The pieces of an evaluation of the controller with these ``controller_settings``, seeds ``seed``, ``seed`` + 1, ...
 
-    ``world`` holds the environment's arguments as JSON takes them, without the rig; ``work`` is ``evaluate_piece`` or what
-    calls it.
+    ``world`` holds the environment's arguments as JSON takes them, the rig only where it is not as believed;
+    ``work`` is ``evaluate_piece`` or what calls it.
     """
     every = SLOW_EPISODES if split_options(settings["controller"])[0] in SLOW else EPISODES
     hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
@@ -69,10 +69,13 @@ def evaluate_piece(
     controller: str, source: str, rig: dict[str, Any], environment: str, world: dict[str, Any], files: list[str], seed: int,
     episodes: int, **options: Any,
 ) -> Result:  # fmt: skip
-    """One piece; ``options`` go to the controller's constructor, ``source`` and ``files`` only tell pieces apart."""
-    parameters = Parameters.from_dict(rig)
-    law = make_controller(controller, parameters, **options)
-    found = evaluate(environment, law, controller, episodes, seed, progress=False, parameters=parameters, **world)
+    """One piece; ``options`` go to the controller's constructor, ``source`` and ``files`` only tell pieces apart.
+
+    ``rig`` is what the controller believes, and where ``world`` has no ``parameters`` it is so.
+    """
+    law = make_controller(controller, Parameters.from_dict(rig), **options)
+    world = {**world, "parameters": Parameters.from_dict(world.get("parameters", rig))}
+    found = evaluate(environment, law, controller, episodes, seed, progress=False, **world)
     if len(found.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a piece is complete or it is none
     trace = np.ascontiguousarray(np.concatenate(found.traces, axis=1), dtype="<f4")

@@ -39,13 +39,15 @@ Result = dict[str, Any]
 class Task:
     """One piece: ``work(**settings)`` of a module's function gives its result; settings and result are JSON.
 
-    ``name`` begins the name of its file below the folder; ``group`` is what the screen counts it under.
+    ``name`` begins the name of its file below the folder; ``group`` is what the screen counts it under. Where it ``keeps``
+    something between kills, ``work`` gets a folder of its own for that, ``place``, which is no part of the settings.
     """
 
     name: str
     group: str
     work: Callable[..., Result]
     settings: dict[str, Any]
+    keeps: bool = False
 
     def code(self) -> dict[str, str]:
         """The ``code_stamp`` of what it runs."""
@@ -97,7 +99,7 @@ def run_tasks(
         _say_what_is_there(title, tasks, results, folder)
         with tqdm(total=len(tasks), initial=len(results), desc=title, unit="piece", disable=not missing) as bar:
 
-            def pieces() -> Iterator[tuple[Task] | None]:
+            def pieces() -> Iterator[tuple[Task, Path] | None]:
                 while missing:
                     begun_before, kept_before = len(begun), len(results)
                     for _ in range(len(missing)):
@@ -112,7 +114,7 @@ def run_tasks(
                                 claims.give_up(path)
                         elif mine:
                             begun.append(task)
-                            yield (task,)
+                            yield task, path.with_suffix("")
                         else:
                             missing.append(task)
                     if missing and (len(begun), len(results)) == (begun_before, kept_before):
@@ -169,9 +171,9 @@ def _digest(result: Result) -> str:
     return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
 
 
-def _attempt(task: Task) -> Result | str:
+def _attempt(task: Task, place: Path) -> Result | str:
     """The result, or what went wrong in words: one controller that fails must not cost the others' results."""
     try:
-        return task.work(**task.settings)
+        return task.work(**task.settings, **({"place": str(place)} if task.keeps else {}))
     except Exception as error:
         return f"{type(error).__name__}: {error}"

@@ -73,6 +73,14 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def cluster_name(text: str) -> str:
+    """``ray`` or ``ray:ADDRESS``, for argparse."""
+    kind, colon, address = text.partition(":")
+    if kind != "ray" or (colon and not address):
+        raise argparse.ArgumentTypeError(f"{text!r}; allowed: ray, or ray:ADDRESS of a running cluster, as ray:10.0.0.1:6379")
+    return text
+
+
 def seed_number(text: str) -> int:
     """A seed that NumPy and PyTorch take, for argparse."""
     if not text.isdecimal() or int(text) >= 2**32:
@@ -88,7 +96,10 @@ def add_processes(parser: argparse.ArgumentParser) -> None:
     """Add ``--jobs`` and ``--cluster``."""
     parser.add_argument("--jobs", type=whole, help=f"processes side by side (default: {JOBS})")
     parser.add_argument(
-        "--cluster", metavar="ray[:ADDRESS]", help="Ray's workers instead, of a running cluster or of this machine"
+        "--cluster",
+        type=cluster_name,
+        metavar="ray[:ADDRESS]",
+        help="Ray's workers instead, of a running cluster or of this machine",
     )
 
 

@@ -120,14 +120,20 @@ def costs(
     return parts
 
 
-def open_study(folder: Path, setting: dict[str, Any]) -> Study:
-    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
+def check_optuna() -> None:
+    """Raises ``ValueError`` where Optuna is missing, before anything is made."""
     try:
-        import optuna
-        from optuna.storages import JournalStorage
-        from optuna.storages.journal import JournalFileBackend
+        import optuna  # noqa: F401
     except ImportError as error:
         raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
+
+
+def open_study(folder: Path, setting: dict[str, Any]) -> Study:
+    """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
+    import optuna
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     path = folder / "trials.journal"
     try:
@@ -208,6 +214,7 @@ def _tune(arguments: argparse.Namespace) -> None:
     }  # fmt: skip
     check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
     print(described(rig, True))
+    check_optuna()
     with own_folder(arguments.out) as folder:
         study = open_study(folder, setting)
         kept = len(complete(study)[: arguments.trials])

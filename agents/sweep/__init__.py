@@ -1,0 +1,1 @@
+"""Sweeps: many evaluations and trainings from one file."""

@@ -1,0 +1,104 @@
+"""What a sweep's file says: grids, draws that do not depend on their number, searches, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from agents.sweep.plan import HeatMap, Range, load_sweep
+
+WHOLE = """
+[base]
+environment = "BirthSIM/Probe-v1"
+episodes = 4
+seed = 7
+
+[grid]
+controller = ["backstepping", "pid"]
+"rig.mechanics.mass" = { from = 2, to = 4, count = 3 }
+
+[draw]
+count = 5
+seed = 3
+"rig.valves.time_constant" = { from = 0.001, to = 0.01, log = true }
+sensors = ["ideal", "lab"]
+
+[[map]]
+x = "rig.valves.time_constant"
+y = "rig.mechanics.mass"
+per = "controller"
+"""
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    def written(text):
+        (tmp_path / "sweep.toml").write_text(text)
+        return load_sweep(tmp_path / "sweep.toml")
+
+    return written
+
+
+def test_every_combination_of_the_grid_meets_every_draw(sweep):
+    found = sweep(WHOLE)
+    assert (found.base["environment"], found.base["episodes"], found.base["seed"]) == ("BirthSIM/Probe-v1", 4, 7)
+    assert len(found.points) == 2 * 3 * 5
+    assert {(point["controller"], point["rig.mechanics.mass"]) for point in found.points} == {
+        (name, mass) for name in ("backstepping", "pid") for mass in (2.0, 3.0, 4.0)
+    }
+    draws = {(point["rig.valves.time_constant"], point["sensors"]) for point in found.points}
+    assert len(draws) == 5
+    assert all(0.001 <= lag <= 0.01 and sensors in ("ideal", "lab") for lag, sensors in draws)
+    assert found.maps == [HeatMap("rig.valves.time_constant", "rig.mechanics.mass", per="controller")]
+    assert found.search is None
+
+
+def test_a_draw_does_not_depend_on_how_many_there_are(sweep):
+    few, many = sweep(WHOLE).points, sweep(WHOLE.replace("count = 5", "count = 8")).points
+    assert few[:5] == many[:5]
+    other = sweep(WHOLE.replace("seed = 3", "seed = 4")).points
+    assert not {point["rig.valves.time_constant"] for point in few} & {point["rig.valves.time_constant"] for point in other}
+
+
+def test_ranges_are_even_or_by_equal_factors():
+    assert Range(1.0, 3.0, 3).values() == [1.0, 2.0, 3.0]
+    assert Range(1.0, 100.0, 3, True).values() == pytest.approx([1.0, 10.0, 100.0])
+    assert Range(1.0, 100.0, log=True).at(0.5) == pytest.approx(10.0)
+    assert Range(1.0, 3.0).at(0.5) == 2.0
+    # Uniform in the logarithm: as many draws below the geometric mean as above it.
+    places = [math.log(Range(1.0, 100.0, log=True).at(k / 1000)) for k in range(1000)]
+    assert sum(place < math.log(10.0) for place in places) == 500
+
+
+def test_a_file_without_tables_is_one_point(sweep):
+    assert sweep("").points == [{}]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[gird]\nsensors = ['lab']", r"'gird'; allowed: \[base\], \[grid\], \[draw\], \[search\] and \[\[map\]\]"),
+        ("grid = 3", "'grid'; allowed"),
+        ("[base]\ncolour = 'red'", "'colour'; allowed: environment, controller, "),
+        ("[grid]\nrig = [1]", "'rig'; allowed: environment, controller, "),
+        ("[grid]\nsensors = 'lab'", r"\[grid\] sensors = 'lab'; allowed: a list of values, or "),
+        ("[grid]\nsensors = []", r"\[grid\] sensors = \[\]; allowed: a list of values"),
+        ("[grid]\n'gain.bandwidth' = {from = 3, to = 2, count = 2}", "allowed: from below to"),
+        ("[grid]\n'gain.bandwidth' = {from = 0, to = 2, count = 2, log = true}", "from above 0 with log"),
+        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2}", "count = None; allowed: a whole number from 2"),
+        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 2, step = 1}", "allowed: { from, to, count, log }"),
+        ("[grid]\n'gain.bandwidth' = {from = 1, to = 2, count = 4000000000}", "allowed"),
+        ("[draw]\nsensors = ['lab']", r"\[draw\] count = None; allowed: a whole number from 1"),
+        ("[draw]\ncount = 2000000\nsensors = ['lab']", "makes 2000000 points; allowed: at most 1000000"),
+        ("[base]\nepisodes = 0", r"\[base\] episodes = 0; allowed: a whole number from 1"),
+        ("[base]\nseed = true", r"\[base\] seed = True; allowed: a whole number from 0"),
+        ("[search]\ntrials = 3", r"\[search\] has no ranges; allowed: names with"),
+        ("[search]\n'gain.bandwidth' = [1, 2]", r"\[search\] gain.bandwidth = \[1, 2\]; allowed: { from, to, log }"),
+        ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'", r"\[\[map\]\] .*; allowed: x, y and perhaps"),
+        ("[[map]]\nx = 'sensors'\ny = 'policy'", "x = 'sensors'; allowed: what varies"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(sweep, text, message):
+    with pytest.raises(ValueError, match=message):
+        sweep(text)
