@@ -1,6 +1,7 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make test-weekly runs the examples on libraries that are not ours
+# make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
@@ -24,7 +25,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving golden clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -63,6 +64,9 @@ portable: $(READY)
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow and not weekly"
+
+kills: $(READY)
+	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests

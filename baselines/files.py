@@ -7,7 +7,9 @@ import json
 import math
 import os
 import shutil
+import signal
 import socket
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +21,7 @@ _PARTIAL = ".partial"
 LEFTOVERS = f".*{_PARTIAL}"
 """Pattern of the names of what is not complete."""
 
+_ENDING = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
 _HOST = socket.gethostname().replace("-", "_")
 
 
@@ -85,10 +88,28 @@ def whole_results(folder: Path) -> Iterator[Path]:
     place.mkdir()
     try:
         yield place
-        for path in sorted(place.iterdir()):
-            path.replace(folder / path.name)
+        with later_signals():
+            for path in sorted(place.iterdir()):
+                path.replace(folder / path.name)
     finally:
         shutil.rmtree(place, ignore_errors=True)
+
+
+@contextmanager
+def later_signals() -> Iterator[None]:
+    """What happens here is not torn by a signal that asks the process to end: that comes after it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {ending: signal.signal(ending, lambda number, _: came.append(number)) for ending in _ENDING}
+    try:
+        yield
+    finally:
+        for ending, handler in before.items():
+            signal.signal(ending, handler)
+        for one in came:
+            signal.raise_signal(one)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -24,6 +24,9 @@ LISTENING = 0.5
 """s between two looks at what is complete: a signal waits no longer."""
 
 
+_PARENTS = (signal.SIGINT, signal.SIGHUP)
+"""Signals that reach a whole process group, and that the parent answers for its workers."""
+
 _END: tuple[Any, ...] = ("no more pieces",)
 
 
@@ -109,7 +112,12 @@ class Processes:
         self._begun: list[Any] = []
 
     def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
-        self._begun.append(self._executor.submit(work, *piece))
+        # A worker begins with the signals masked: what it imports takes seconds, in which Ctrl-C would make it complain.
+        masked = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS)
+        try:
+            self._begun.append(self._executor.submit(work, *piece))
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
         return self._begun[-1]
 
     def done(self, begun: list[Any]) -> list[Any]:
@@ -128,7 +136,7 @@ class Processes:
 
 def _begin_worker(parent: int) -> None:
     """Ctrl-C reaches the whole process group: the parent ends its workers, and a worker ends itself once the parent is gone."""
-    for ending in (signal.SIGINT, signal.SIGHUP):
+    for ending in _PARENTS:
         signal.signal(ending, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's

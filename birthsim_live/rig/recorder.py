@@ -79,7 +79,7 @@ class Recorder:
             self._events.append({"row": self._count, kind: value})
 
     def open(self) -> None:
-        """Make the file, with the first rows in it, and go on writing; ``OSError`` where that cannot be or the name is taken."""
+        """Make the file, with the first rows in it, and go on writing; ``OSError`` where that fails or the name is taken."""
         with self._disk:
             if self._file is not None:
                 return

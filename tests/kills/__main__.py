@@ -24,7 +24,9 @@ def main() -> None:
     names = (*TARGETS, RECORD)
     parser.add_argument("--target", action="append", choices=names, help="may be repeated (default: all)")
     parser.add_argument("--scenario", action="append", choices=SCENARIOS, help="may be repeated (default: all)")
-    parser.add_argument("--kills", type=int, default=54, help="tries per target, spread over the scenarios (default: %(default)s)")
+    parser.add_argument(
+        "--kills", type=int, default=54, help="tries per target, spread over the scenarios (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the moments (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="JSON file to write; what it holds of other targets stays")
     parser.add_argument("--page", nargs="?", type=Path, const=PAGE, help="write the table from --out (default: docs/kills.md)")

@@ -13,51 +13,28 @@ from tests.kills.tries import SCENARIOS, Outcome
 
 COLUMNS = ("tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
 
-INTRODUCTION = """# What killed commands leave
-
-`make kills` runs every command once undisturbed, and then again and again: it kills it at a random moment, looks at what lies there, runs
-the same command to its end, and compares every result with that of the undisturbed run, byte for byte. Half of the
-moments are spread evenly over the run's time. The other half follow a random change of the folder, since files are written in a short part
-of that time. Half of the runs begin with the results of an earlier run with other arguments in the same folder.
-
-| scenario | what happens |
-|---|---|
-| SIGKILL, SIGTERM | the command gets the signal, its workers do not |
-| SIGHUP | the whole process group gets it, as from a terminal that closes |
-| Ctrl-C twice | the whole process group gets SIGINT, and once more within 0.3 s |
-| disk full | the folder is on a disk in memory that is filled at a random byte; the second run has room |
-| two at once | two of the same command, a random time apart, on one folder |
-
-| column | counts tries |
-|---|---|
-| equal | after which results are those of the undisturbed run; for `record`: after which the file plays what was recorded, up to 1.5 s before the kill |
-| mixed | after which, before the second run, results of two runs lay beside each other |
-| broken | after which a file could not be read to its end |
-| leftovers | with hidden files, claims, temporary files or semaphores: after a clean end of the first run, or after the second |
-| tracebacks | in which a command printed one |
-| more than a line | in which a command complained in more than one line |
-| workers left | in which a process was alive 30 s after the command had ended |
-| other | with another fault, such as an exit status that is not the signal's |
-
-May differ: `times.json`, the cost in a piece, the search's journal `trials.journal`, and `seconds` in `training.json`.
-"""
+INTRODUCTION = Path(__file__).with_name("introduction.md")
 
 
 def summary(outcome: Outcome) -> str:
     """One line; faults follow."""
     verdict = "equal" if outcome.equal else "NOT EQUAL"
-    words = [f"{outcome.target:10} {outcome.scenario:13} {outcome.moment:16} {outcome.statuses} {verdict} {outcome.seconds:.1f} s"]
+    words = [
+        f"{outcome.target:10} {outcome.scenario:13} {outcome.moment:16} {outcome.statuses} {verdict} {outcome.seconds:.1f} s"
+    ]
     for name in ("mixed", "broken", "leftovers", "tracebacks", "talk", "alive", "trouble"):
         if found := getattr(outcome, name):
             words.append(f"    {name}: {found}")
     return "\n".join(words)
 
 
-def write_outcomes(path: Path, outcomes: Sequence[Outcome], seed: int) -> None:
-    """Write what was found; outcomes of other targets that the file holds stay."""
+def write_outcomes(path: Path, outcomes: Sequence[Outcome], seed: int) -> list[dict[str, Any]]:
+    """Write what was found, and return all of the file; outcomes of other targets that it holds stay."""
     new = {outcome.target for outcome in outcomes}
     kept = [one for one in (read_outcomes(path) if path.exists() else []) if one["target"] not in new]
-    write_json(path, {"outcomes": [*kept, *({**asdict(outcome), "seed": seed} for outcome in outcomes)]})
+    every = [*kept, *({**asdict(outcome), "seed": seed} for outcome in outcomes)]
+    write_json(path, {"outcomes": every})
+    return every
 
 
 def read_outcomes(path: Path) -> list[dict[str, Any]]:
@@ -68,7 +45,11 @@ def read_outcomes(path: Path) -> list[dict[str, Any]]:
 
 def write_page(path: Path, outcomes: Sequence[dict[str, Any]]) -> None:
     """Write the table of all targets and scenarios."""
-    lines = [INTRODUCTION, f"| command | scenario | {' | '.join(COLUMNS)} |", "|" + "---|" * (len(COLUMNS) + 2)]
+    lines = [
+        INTRODUCTION.read_text(encoding="utf-8"),
+        f"| command | scenario | {' | '.join(COLUMNS)} |",
+        "|" + "---|" * (len(COLUMNS) + 2),
+    ]
     for target in dict.fromkeys(one["target"] for one in outcomes):
         for scenario in SCENARIOS:
             chosen = [one for one in outcomes if (one["target"], one["scenario"]) == (target, scenario)]

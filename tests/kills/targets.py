@@ -1,4 +1,4 @@
-"""What is killed: commands with arguments that take seconds, and which of their files may differ from run to run."""
+"""What is killed: commands with arguments that take seconds, and which files may differ from run to run."""
 
 from __future__ import annotations
 
@@ -8,27 +8,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
-CONFIGURATION = """[training]
-environment = "BirthSIM/ProbeResidual-v1"
-lanes = 32
-rollout = 32
-batch = 256
-epochs = 4
-learning_rate = 2e-3
-hidden = [32, 32]
-validation_lanes = 4
-validations = 4
-[residual]
-policy_period = 0.04
-"""
+INPUTS = Path(__file__).resolve().parent / "inputs"
 
 
 @dataclass(frozen=True)
 class Target:
     """A command as a user runs it.
 
-    ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{work}``, a folder with ``small.toml``.
-    ``older`` are arguments that give other results in the same place, as an earlier run has left them. ``differ`` names the
+    ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{inputs}``, the folder of TOML files.
+    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` names the
     files, and ``costs`` the keys in the JSON files of pieces, that differ from run to run. With ``alone`` one process has the
     folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is complete.
     """
@@ -36,6 +24,7 @@ class Target:
     name: str
     command: str
     arguments: tuple[str, ...]
+    first: tuple[str, ...] = ()
     older: tuple[str, ...] = ()
     file: str = ""
     differ: tuple[str, ...] = ()
@@ -43,10 +32,10 @@ class Target:
     alone: bool = False
     partway: bool = False
 
-    def line(self, work: Path, folder: Path, older: bool = False) -> list[str]:
+    def line(self, folder: Path, older: bool = False) -> list[str]:
         """The words after the command's name."""
-        words = (*self.arguments, *(self.older if older else ()))
-        return [word.format(out=folder / self.file, work=work) for word in words]
+        words = (*(self.older if older else self.first), *self.arguments)
+        return [word.format(out=folder / self.file, inputs=INPUTS) for word in words]
 
 
 TARGETS = {
@@ -77,6 +66,14 @@ TARGETS = {
         ),
         Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
         Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),
+        Target(
+            "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
+            costs=("cost", "sha256"),
+        ),
+        Target(
+            "search", "birthsim-sweep", ("{inputs}/search.toml", "--out", "{out}"), differ=("trials.journal",),
+            costs=("cost", "sha256"), alone=True,
+        ),
         Target(
             "animate", "birthsim-animate",
             ("--begin", "0.5", "--end", "1.5", "--rate", "10", "--out", "{out}"), older=("--seed", "7"), file="pair.webp",

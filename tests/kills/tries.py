@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.kills import checks
 from tests.kills.processes import LOOK, Hangs, Running
-from tests.kills.targets import CONFIGURATION, Target
+from tests.kills.targets import Target
 
 ENDINGS: dict[str, tuple[signal.Signals, bool, int]] = {
     "SIGKILL": (signal.SIGKILL, False, 1),
@@ -76,7 +76,6 @@ class Course:
 
     def __init__(self, target: Target, work: Path, rng: np.random.Generator) -> None:
         self.target, self.work, self._rng = target, work, rng
-        (work / "small.toml").write_text(CONFIGURATION)
         self._older = self._undisturbed("older", older=True) if target.older else None
         whole = self._undisturbed("whole")
         self.results = checks.results(target, whole)
@@ -202,7 +201,7 @@ class Course:
         return folder, checks.results(self.target, folder)
 
     def _begin(self, folder: Path, place: Path, label: str = "run", older: bool = False) -> Running:
-        return Running(self.target.command, self.target.line(self.work, folder, older), place, label)
+        return Running(self.target.command, self.target.line(folder, older), place, label)
 
     def _strike(self, running: Running, folder: Path) -> str:
         """Wait for a random moment: a time of the run's, or a change of its folder and a little later; which it was."""

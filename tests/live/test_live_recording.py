@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -236,7 +235,7 @@ def test_a_recording_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
     session = Session(RIG)
     (tmp_path / "taken.rec").write_bytes(b"another's")
     for place in ("taken.rec", "none/one.rec"):
-        with pytest.raises(OSError, match="exists|No such file"):
+        with pytest.raises(OSError, match=r"exists|No such file"):
             Recorder(session, tmp_path / place).open()
     assert [path.name for path in tmp_path.iterdir()] == ["taken.rec"]
 
