@@ -24,9 +24,7 @@ def main() -> None:
     names = (*TARGETS, RECORD)
     parser.add_argument("--target", action="append", choices=names, help="may be repeated (default: all)")
     parser.add_argument("--scenario", action="append", choices=SCENARIOS, help="may be repeated (default: all)")
-    parser.add_argument(
-        "--kills", type=int, default=54, help="tries per target, spread over the scenarios (default: %(default)s)"
-    )
+    parser.add_argument("--kills", type=int, default=54, help="per target, over all scenarios (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the moments (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="JSON file to write; what it holds of other targets stays")
     parser.add_argument("--page", nargs="?", type=Path, const=PAGE, help="write the table from --out (default: docs/kills.md)")
@@ -38,8 +36,11 @@ def main() -> None:
         work = Path(tempfile.mkdtemp(prefix=f"kills-{name}-"))
         try:
             course = RecordingCourse(work, rng) if name == RECORD else Course(TARGETS[name], work, rng)
-            for k in range(arguments.kills):
-                outcomes.append(course.attempt(scenarios[k % len(scenarios)]))
+            done = dict.fromkeys(scenarios, 0)
+            while sum(done.values()) < arguments.kills:
+                scenario = min(done, key=lambda name: done[name])
+                outcomes.append(course.attempt(scenario))
+                done[scenario] += outcomes[-1].count
                 print(summary(outcomes[-1]), flush=True)
                 if arguments.out is not None:
                     write_outcomes(arguments.out, outcomes, arguments.seed)

@@ -11,7 +11,7 @@ from typing import Any
 from baselines.files import write_json, write_text
 from tests.kills.tries import SCENARIOS, Outcome
 
-COLUMNS = ("tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
+COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
 
 INTRODUCTION = Path(__file__).with_name("introduction.md")
 
@@ -55,10 +55,9 @@ def write_page(path: Path, outcomes: Sequence[dict[str, Any]]) -> None:
             chosen = [one for one in outcomes if (one["target"], one["scenario"]) == (target, scenario)]
             if chosen:
                 lines.append(f"| {target} | {scenario} | {' | '.join(map(str, _counts(chosen)))} |")
-    slowest = max(one["seconds"] for one in outcomes)
-    count = len(outcomes)
+    slowest, count = max(one["seconds"] for one in outcomes), sum(one["count"] for one in outcomes)
     faults = [f"- {one['target']}, {one['scenario']}, {one['moment']}: {word}" for one in outcomes for word in _faults(one)]
-    lines += ["", f"{count} tries in all. The last process of a killed command was gone {slowest:.1f} s after it at most."]
+    lines += ["", f"{count} times in {len(outcomes)} tries. Nothing of a killed command ran for longer than {slowest:.1f} s."]
     if faults:
         lines += ["", "## What fell short", "", *faults]
     write_text(path, "\n".join(lines) + "\n")
@@ -66,7 +65,7 @@ def write_page(path: Path, outcomes: Sequence[dict[str, Any]]) -> None:
 
 def _counts(outcomes: Sequence[dict[str, Any]]) -> list[int]:
     names = ("equal", "mixed", "broken", "leftovers", "tracebacks", "talk", "alive", "trouble")
-    return [len(outcomes), *(sum(bool(one[name]) for one in outcomes) for name in names)]
+    return [sum(one["count"] for one in outcomes), len(outcomes), *(sum(bool(one[name]) for one in outcomes) for name in names)]
 
 
 def _faults(outcome: dict[str, Any]) -> list[str]:

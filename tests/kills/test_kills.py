@@ -62,12 +62,12 @@ def test_progress_bars_are_no_complaints():
 
 def test_the_page_counts_and_names_what_fell_short(tmp_path):
     outcomes = [
-        Outcome("tune", "SIGKILL", "1 s", [-9, 0], equal=True),
-        Outcome("tune", "SIGKILL", "2 s", [-9, 0], leftovers=["a.claim"], trouble=["differs: a"]),
+        Outcome("tune", "SIGKILL", "1 s", 1, [-9, 0], equal=True),
+        Outcome("tune", "SIGKILL", "2 s", 3, [-9, -9, -9, 0], leftovers=["a.claim"], trouble=["differs: a"]),
     ]
     write_outcomes(tmp_path / "kills.json", outcomes[:1], 0)
     write_page(tmp_path / "kills.md", write_outcomes(tmp_path / "kills.json", outcomes, 0))
     page = (tmp_path / "kills.md").read_text()
-    assert "| tune | SIGKILL | 2 | 1 | 0 | 0 | 1 | 0 | 0 | 0 | 1 |" in page
+    assert "| tune | SIGKILL | 4 | 2 | 1 | 0 | 0 | 1 | 0 | 0 | 0 | 1 |" in page
     assert "- tune, SIGKILL, 2 s: left: a.claim" in page
     assert "- tune, SIGKILL, 2 s: differs: a" in page

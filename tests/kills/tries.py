@@ -1,4 +1,4 @@
-"""One try: a command is killed at a random moment, meets a full disk or another process, and is then run again to its end."""
+"""One try: a command is killed at random moments, meets a full disk or another process, and is then run again to its end."""
 
 from __future__ import annotations
 
@@ -35,6 +35,9 @@ SCENARIOS = (*ENDINGS, DISK, TWO)
 BETWEEN = 0.3
 """s at most between the two of Ctrl-C twice."""
 
+MOST = 3
+"""Kills of a try at most, one after another in one folder, before the command may run to its end."""
+
 ATTEMPTS = 20
 """Tries that may miss, since the command had ended or the disk had room, for each that hits."""
 
@@ -43,11 +46,15 @@ Results = dict[str, str]
 
 @dataclass
 class Outcome:
-    """What a try has shown; a scenario that went as it should has ``equal`` and nothing in the lists."""
+    """What a try has shown: ``count`` kills and what came of them, full disks or pairs of processes.
+
+    A try that went as it should has ``equal`` and nothing in the lists.
+    """
 
     target: str
     scenario: str
     moment: str
+    count: int = 1
     statuses: list[int] = field(default_factory=list)
     seconds: float = 0.0
     equal: bool = False
@@ -103,23 +110,28 @@ class Course:
         raise RuntimeError(f"{self.target.name}, {scenario}: none of {ATTEMPTS} tries met the command at work")
 
     def _killed(self, scenario: str, place: Path) -> Outcome | None:
-        number, group, times = ENDINGS[scenario]
         folder, before = self._start(place / "out")
-        running = self._begin(folder, place)
-        moment = self._strike(running, folder)
+        outcome = Outcome(self.target.name, scenario, "", count=0)
+        for _ in range(int(self._rng.integers(1, MOST + 1))):
+            running = self._begin(folder, place)
+            moment = self._strike(running, folder)
+            if running.ended():
+                break
+            self._kill(scenario, running, outcome, folder)
+            outcome.moment += f"{', ' if outcome.count else ''}{moment}"
+            outcome.count += 1
+            self._look(outcome, folder, before)
+        return self._again(outcome, folder, before, place) if outcome.count else None
+
+    def _kill(self, scenario: str, running: Running, outcome: Outcome, folder: Path) -> None:
+        number, group, times = ENDINGS[scenario]
         for k in range(times):
-            if k:
-                time.sleep(self._rng.uniform(0, BETWEEN))
-            elif running.ended():
-                return None
+            time.sleep(self._rng.uniform(0, BETWEEN) if k else 0.0)
             running.signal(number, group)
-        outcome = Outcome(self.target.name, scenario, moment)
         self._end(outcome, running, (-number, 128 + number, 0))
         # What is killed, or hears a second Ctrl-C, cannot tidy up: hidden files are the next run's to remove.
-        if outcome.statuses == [128 + number] and times == 1:
+        if outcome.statuses[-1:] == [128 + number] and times == 1:
             outcome.leftovers += [*checks.leftovers(folder), *checks.remains(running)]
-        self._look(outcome, folder, before)
-        return self._again(outcome, folder, before, place)
 
     def _full_disk(self, scenario: str, place: Path) -> Outcome | None:
         with small_disk(place / "disk") as (disk, resize):
@@ -188,9 +200,9 @@ class Course:
         outcome.broken += checks.broken(folder)
         now, whole = (checks.merged(found) for found in (checks.results(self.target, folder), self.results))
         if self.target.partway:
-            outcome.mixed = bool(now) and now.keys() != whole.keys()
+            outcome.mixed |= bool(now) and now.keys() != whole.keys()
         else:
-            outcome.mixed = now not in (checks.merged(before), whole)
+            outcome.mixed |= now not in (checks.merged(before), whole)
 
     def _start(self, folder: Path) -> tuple[Path, Results]:
         """The folder to write to, in every other try with the results of an earlier run, and these."""
