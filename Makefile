@@ -1,36 +1,55 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
-# make test-weekly runs the examples on libraries that are not ours
 # make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
+# make test-weekly runs real clients, each in an environment of its own (half an hour or so)
+# make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
+# make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make moving compares the laws under hands that move
 
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
+TOOLS := $(OUT)/tools
 OLDEST := numba==0.65.0 llvmlite==0.47.0
-WEEKLY := torchrl tensordict pyvers orjson importlib_metadata zipp "ray>=2.60,<3" dm-tree lz4 ormsgpack pyarrow pandas \
-  filelock jsonschema jsonschema-specifications referencing rpds-py msgpack requests urllib3 idna certifi charset-normalizer \
-  click attrs packaging protobuf python-dateutil pytz tzdata six tensorboardX wrapt absl-py
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
+# Every file of an installation has its hash in requirements/, which make lock writes from constraints.txt.
+LOCKED := install --quiet --no-deps --require-hashes --requirement requirements
+LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
+  --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
+TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
+# What an installation here has; cluster (Ray) is left out.
+EXTRAS := agents onnx mpc tune sweep video live dev
+CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti nvidia-cuda-nvrtc nvidia-cuda-runtime \
+  nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 \
+  nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx
 
 SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest lint bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
 
-$(READY): pyproject.toml constraints.txt
+# PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
+$(READY): pyproject.toml requirements/project.txt requirements/torch.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(PIP) install --quiet --constraint constraints.txt --editable '.[agents,onnx,mpc,tune,sweep,video,live,dev]'
+	$(PIP) $(LOCKED)/torch.txt 2>/dev/null || $(PIP) $(TORCH_CPU) $(LOCKED)/torch.txt \
+	  || { echo "No CPU build of PyTorch within reach: PyPI's comes with CUDA, 2.2 GB more"; $(PIP) $(LOCKED)/torch-cuda.txt; }
+	$(PIP) $(LOCKED)/project.txt
+	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	touch $(READY)
+
+$(TOOLS)/.ready: requirements/tools.txt
+	test -x $(TOOLS)/bin/python || python3 -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip --disable-pip-version-check --no-input $(LOCKED)/tools.txt
+	touch $@
 
 run: $(READY)
 	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
@@ -47,15 +66,14 @@ run: $(READY)
 	@echo "$(BIN)/birthsim-evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
 
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 -m "not slow and not weekly"
+	$(BIN)/python -m pytest -n 2 -m "not slow"
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -n 2 -m slow
 
-# TorchRL and RLlib beside what is installed; RLlib comes with ray, but its extra pins an older Gymnasium.
-test-weekly: $(READY)
-	test -d $(OUT)/weekly/ray || $(PIP) install --quiet --no-deps --target $(OUT)/weekly $(WEEKLY)
-	PYTHONPATH=$(CURDIR)/$(OUT)/weekly $(BIN)/python -m pytest -m weekly
+# Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
+test-weekly:
+	python3 -m tests.weekly $(CLIENTS)
 
 portable: $(READY)
 	$(BIN)/python -m tests.processors
@@ -63,16 +81,55 @@ portable: $(READY)
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow and not weekly"
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
+
+verify: $(READY)
+	$(BIN)/birthsim-verify --out $(OUT)/verify
+	$(BIN)/python -m tests.verification accuracy $(OUT)/verify
+	$(BIN)/python -m tests.verification balances
+	$(BIN)/python -m tests.verification report
+
+# Survivors are judged by hand, in tests/verification/survivors.toml; a test names those that are not.
+verify-slow: $(READY)
+	mkdir -p $(OUT)/verify
+	$(BIN)/python -m tests.mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
+	$(BIN)/python -m tests.verification mutation $(OUT)/verify/mutation.json
+	$(BIN)/python -m tests.verification coverage
+	$(MAKE) verify
 
 kills: $(READY)
 	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests
-	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests
+	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci
+	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+# Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
+lock: $(TOOLS)/.ready
+	$(LOCK)/project.txt $(addprefix --extra ,$(EXTRAS)) $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
+	$(LOCK)/torch-cuda.txt requirements/torch-cuda.in
+	$(LOCK)/tools.txt requirements/tools.in
+
+# What is known against the locked versions, as PyPI tells it; --strict: a package that PyPI says nothing of fails too.
+audit: $(TOOLS)/.ready
+	$(TOOLS)/bin/pip-audit --strict --no-deps --disable-pip --requirement requirements/project.txt --requirement requirements/torch-cuda.txt
+
+sbom: $(READY) $(TOOLS)/.ready
+	mkdir -p $(OUT)
+	$(TOOLS)/bin/python .ci/sbom.py $(BIN)/python $(OUT)/sbom.json
+
+# A wheel and a source archive, checked as PyPI would.
+dist: $(TOOLS)/.ready
+	rm -rf dist
+	$(TOOLS)/bin/python -m build --quiet --outdir dist .
+	$(TOOLS)/bin/twine check --strict dist/*
+
+lint-workflows: $(TOOLS)/.ready
+	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(TOOLS)/bin/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(TOOLS)/bin/zizmor --offline --quiet .github
 
 bench: $(READY)
 	$(BIN)/birthsim-bench --out $(OUT)/bench
@@ -83,6 +140,8 @@ pictures: $(READY)
 	$(BIN)/birthsim-animate --seed 1 --out docs/forceps.webp
 	$(BIN)/birthsim-evaluate --all --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
+	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
+	cp $(OUT)/robustness/map_0.png docs/robustness.png
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
@@ -94,9 +153,9 @@ compare: $(READY)
 
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
-	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --resume --out $(OUT)/training/$$name || exit 1; \
+	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; \
 	  for seed in 0 1 2 3 4; do mkdir -p $(POLICIES)/$$name/seed_$$seed && \
-	    cp $(OUT)/training/$$name/seed_$$seed/policy.* $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
+	    cp $(OUT)/training/$$name/seed_$$seed/policy.safetensors $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
 
 learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle

@@ -15,6 +15,7 @@ from birthsim_env.episodes import Episodes
 from birthsim_env.info import single_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.reward import REWARD_TERMS
+from birthsim_env.state import State
 
 _ONE = np.ones(1, dtype=np.bool_)
 
@@ -181,6 +182,16 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         info["is_success"] = bool(episodes.success[0])
         self._render_human()
         return episodes.observation()[0], reward, terminated, truncated, info
+
+    def get_state(self) -> State:
+        """All that the future depends on, as arrays by name: see ``BirthSIMVectorEnv.get_state``."""
+        return self._episodes.get_state(self.np_random)
+
+    def set_state(self, state: State) -> None:
+        """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
+        if not self._episodes.begun:
+            self.reset(seed=0)
+        self._episodes.set_state(state, self.np_random)
 
     def render(self) -> Any:
         """A frame (height, width, 3), uint8, in mode ``rgb_array``."""

@@ -13,6 +13,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.seeding import lane_seeds
 from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
+from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:
     from birthsim_env.drawing.rendering import Renderer
@@ -42,14 +43,34 @@ class Episodes:
         self._path: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the renderer, whose surfaces belong to this process; another is made when it is asked for."""
-        return {**self.__dict__, "_renderer": None}
+        """Without the renderer, whose surfaces belong to this process, and the path, which is drawn: made when asked for."""
+        return {**self.__dict__, "_renderer": None, "_path": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """The simulation's copies of what closes a policy step are those of the outcome."""
         self.__dict__.update(state)
         beginning, closing = self._outcome.stages()
         self.simulation.beginning, self.simulation.closing = [beginning], [closing]
+
+    @property
+    def begun(self) -> bool:
+        """Whether episodes have begun, which makes room for what parts remember."""
+        return bool(self._seeds)
+
+    def get_state(self, random: np.random.Generator, ended: NDArray[np.bool_] | None = None) -> State:
+        """All that the future depends on, with what the environment keeps besides: its generator, and which lanes ended."""
+        if not self.begun:
+            raise RuntimeError("get_state() before reset(): call reset(seed=...) first")
+        return take_state(self._parts(random, ended))
+
+    def set_state(self, state: State, random: np.random.Generator, ended: NDArray[np.bool_] | None = None) -> None:
+        """Go on from what ``get_state`` returned; episodes must have begun."""
+        give_state(self._parts(random, ended), state)
+        self.simulation.forget_loops()
+        self._path = None
+
+    def _parts(self, random: np.random.Generator, ended: NDArray[np.bool_] | None) -> dict[str, Any]:
+        return {"episodes": self, "random": random, **({} if ended is None else {"ended": ended})}
 
     @property
     def duration(self) -> float:
@@ -74,7 +95,7 @@ class Episodes:
 
     def step(self, actions: Array) -> tuple[Array, NDArray[np.bool_]]:
         """One policy step; returns terms of the reward and the reward, (6, N), and which lanes have left the physical range."""
-        if not self._seeds:
+        if not self.begun:
             raise RuntimeError("step() before reset(): call reset(seed=...) first")
         self.simulation.step(actions)
         self.elapsed += 1

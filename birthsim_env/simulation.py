@@ -106,6 +106,10 @@ class Simulation:
         """Without the loops, which know addresses."""
         return {**self.__dict__, "_loop": None, "_look": None, "_made": ()}
 
+    def forget_loops(self) -> None:
+        """Build the loops anew at the next step: arrays may be others."""
+        self._loop = None
+
     @property
     def time(self) -> Array:
         """s since each lane's episode began, (N,)."""

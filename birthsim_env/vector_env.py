@@ -15,6 +15,7 @@ from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.reward import REWARD_TERMS
+from birthsim_env.state import State
 
 Observations = NDArray[np.float32]
 
@@ -145,6 +146,22 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
                 infos["final_obs"][lane] = last[lane]
             infos["_final_obs"] = infos["_final_info"] = ended
         return observation, rewards, terminated, truncated, infos
+
+    def get_state(self) -> State:
+        """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
+
+        An environment that was made with the same arguments goes on from it, to the bit, once ``set_state`` has got it; in
+        this process or another one. Not in it is what a user's part keeps outside of its attributes. Raises ``RuntimeError``
+        before the first ``reset``, ``ValueError`` for a user's part with an attribute that is no number, text, array,
+        generator, or list, tuple, dict or object of these.
+        """
+        return self._episodes.get_state(self.np_random, self._ended)
+
+    def set_state(self, state: State) -> None:
+        """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
+        if not self._episodes.begun:
+            self.reset(seed=0)
+        self._episodes.set_state(state, self.np_random, self._ended)
 
     def render(self) -> tuple[Any, ...] | None:
         """A frame of every lane (``rgb_array``), or lane 0 in a window (``human``)."""

@@ -15,6 +15,9 @@ from tests.console import run
 settings.register_profile("birthsim", deadline=None, derandomize=True, database=None)
 settings.load_profile("birthsim")
 
+# Clients' tests run in environments of their own: make test-weekly.
+collect_ignore = ["weekly"]
+
 SMALL = """[training]
 environment = "BirthSIM/ProbeResidual-v1"
 lanes = 32

@@ -1,7 +1,8 @@
 """Mutation tester of the small numerical modules: a changed operator or number in them should make some test fail.
 
 ``python -m tests.mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the fraction of
-mutants killed of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant.
+mutants killed of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant;
+``--again`` goes on from one: after new tests only the survivors are tried.
 
 Kernels run uncompiled here, so that a mutant needs no compilation: a forked child replaces the code of one function, runs the
 tests of its module until one fails, and ends. The tests that are quick enough uncompiled are found by running each once.
@@ -11,158 +12,63 @@ An error that compiled code would not raise, such as the root of a negative numb
 from __future__ import annotations
 
 import argparse
-import ast
-import copy
 import gc
 import importlib
-import inspect
 import json
 import math
 import os
 import resource
+import signal
 import sys
+import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 
 import pytest
+
+from tests.changes import mutants_of
+from tests.uncompiled import switch_off
 
 HERE = Path(__file__).parent
 
 MODULES = {
-    "birthsim_env.physics.geometry": ("strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
-    "birthsim_env.physics.mechanics": ("strict_feedback", "cartesian_stiffness", "mechanics"),
-    "birthsim_env.physics.friction": ("strict_feedback", "reference_friction", "friction", "elasto_plastic"),
-    "birthsim_env.physics.chambers": ("chambers",),
-    "birthsim_env.physics.valves": ("valve_inverse", "valves"),
+    "birthsim_env.physics.geometry": ("dynamics", "strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
+    "birthsim_env.physics.mechanics": ("dynamics", "strict_feedback", "cartesian_stiffness", "mechanics"),
+    "birthsim_env.physics.friction": ("dynamics", "strict_feedback", "reference_friction", "friction", "elasto_plastic"),
+    "birthsim_env.physics.chambers": ("dynamics", "chambers"),
+    "birthsim_env.physics.valves": ("dynamics", "valve_inverse", "valves"),
     "birthsim_env.physics.control_model": ("strict_feedback", "valve_inverse", "control_model"),
+    "birthsim_env.physics.dynamics": ("dynamics", "mechanics", "plant"),
+    "birthsim_env.physics.equilibrium": ("equilibrium", "plant", "elasto_plastic", "mechanics"),
+    "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
+    "birthsim_env.physics.exact": ("exact",),
     "baselines.backstepping.gains": ("gains", "damping"),
+    "baselines.backstepping.law": (
+        "law_kernel",
+        "backstepping",
+        "damping",
+        "backstepping_lanes",
+        "one_valve",
+        "force_first_law",
+        "lyapunov",
+    ),
+    "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
+    "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
+    "baselines.admittance.law": ("admittance_law", "admittance_backstepping"),
+    "baselines.valve_inverse": ("valve_inverse", "backstepping", "one_valve", "force_first"),
 }
 """The test files (``tests/*/test_*.py``) that concern a module, the quickest first."""
 
 LIMIT = 40.0
-"""CPU seconds of one test, uncompiled, beyond which it is left out. The mass and energy balance of the chambers needs 25."""
+"""CPU seconds of one test, uncompiled, beyond which it is left out (``--limit``). The balance of the chambers needs 25."""
 
 BUDGET = 60.0
-"""CPU seconds of all tests of one module, the quickest first: what a surviving mutant costs at most."""
+"""CPU seconds of all tests of one module, the quickest first: what a surviving mutant costs at most (``--budget``)."""
 
 PATIENCE = 3.0
 """A mutant that needs so many times the CPU time of its tests, and five seconds more, is taken to run for ever."""
-
-ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
-BOUNDARY = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
-NAMES = {"min": "max", "sin": "cos", "arcsin": "arccos", "argmin": "argmax", "all": "any"}
-NAMES |= {after: before for before, after in NAMES.items()}
-DROPPED = ("sqrt", "abs")
-UNTOUCHED = ("annotation", "returns", "decorator_list")
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """One change. Its name says module, function, operator and the operator's number in the function."""
-
-    name: str
-    line: int
-    change: str
-    apply: Callable[[], None]
-
-
-def alternatives(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
-    """The changes of one node: name of the operator and new node."""
-    changed = copy.copy(node)
-    match node:
-        case ast.BinOp(op=op) if type(op) in ARITHMETIC:
-            changed.op = ARITHMETIC[type(op)]()
-            yield "arithmetic", changed
-        case ast.Compare(ops=ops):
-            for name, table in (("boundary", BOUNDARY), ("opposite", OPPOSITE)):
-                for k, op in enumerate(ops):
-                    if type(op) in table:
-                        changed = copy.copy(node)
-                        changed.ops = [*ops[:k], table[type(op)](), *ops[k + 1 :]]
-                        yield name, changed
-        case ast.BoolOp(op=op):
-            changed.op = ast.And() if isinstance(op, ast.Or) else ast.Or()
-            yield "logic", changed
-        case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
-            yield "unary", operand
-        case ast.IfExp():
-            changed.body, changed.orelse = node.orelse, node.body
-            yield "ternary", changed
-        case ast.Constant(value=bool(value)):
-            changed.value = not value
-            yield "constant", changed
-        case ast.Constant(value=int(value)):
-            changed.value = value + 1
-            yield "constant", changed
-        case ast.Constant(value=float(value)):
-            changed.value = value * 1.1 or 0.1
-            yield "constant", changed
-        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-            if name in NAMES:
-                changed.func = copy.copy(node.func)
-                setattr(changed.func, "id" if isinstance(node.func, ast.Name) else "attr", NAMES[name])
-                yield "function", changed
-            elif name in DROPPED:
-                yield "call", node.args[0]
-
-
-def sites(node: ast.AST) -> Iterator[tuple[ast.AST, list | dict, int | str]]:
-    """Every node below ``node`` in the order of the text, with the list or dictionary that holds it and its key there."""
-    for field, value in ast.iter_fields(node):
-        if field not in UNTOUCHED:
-            holder, keys = (value, range(len(value))) if isinstance(value, list) else (vars(node), [field])
-            for key in keys:
-                if isinstance(child := holder[key], ast.AST):
-                    yield child, holder, key
-                    yield from sites(child)
-
-
-def essence(code: CodeType) -> tuple[object, ...]:
-    """What a code object does, whatever its lines."""
-    constants = tuple(essence(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts)
-    return code.co_code, code.co_names, code.co_varnames, constants
-
-
-def compiled(function: ast.FunctionDef, path: str) -> CodeType:
-    """The code object of a function without its decorators."""
-    bare = copy.copy(function)
-    bare.decorator_list = []
-    everything = compile(ast.Module([bare], []), path, "exec", flags=annotations.compiler_flag, dont_inherit=True)
-    return next(c for c in everything.co_consts if isinstance(c, CodeType) and c.co_name == function.name)
-
-
-def function_mutants(module: ModuleType, function: ast.FunctionDef) -> Iterator[Mutant]:
-    """The mutants of a function whose code differs."""
-    target, counts = inspect.unwrap(getattr(module, function.name)), Counter()
-    seen = {essence(compiled(function, module.__file__))}
-    for node, holder, key in sites(function):
-        for operator, new in alternatives(node):
-            holder[key] = new
-            code = compiled(function, module.__file__)
-            holder[key] = node
-            counts[operator] += 1
-            if essence(code) not in seen:
-                seen.add(essence(code))
-                name = f"{module.__name__}:{function.name}:{operator}:{counts[operator]}"
-                change = f"{ast.unparse(node)}  ->  {ast.unparse(new)}"
-                yield Mutant(name, node.lineno, change, lambda code=code: setattr(target, "__code__", code))
-
-
-def mutants_of(module: ModuleType) -> Iterator[Mutant]:
-    """All mutants of a module: of its functions, and of its constants that are plain numbers."""
-    for node in ast.parse(inspect.getsource(module)).body:
-        match node:
-            case ast.FunctionDef():
-                yield from function_mutants(module, node)
-            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Constant(value=int() | float()) as old):
-                [(operator, new)] = alternatives(old)
-                change = f"{name} = {old.value}  ->  {new.value}"
-                apply = lambda name=name, new=new: setattr(module, name, new.value)  # noqa: E731
-                yield Mutant(f"{module.__name__}:{name}:{operator}:1", node.lineno, change, apply)
 
 
 def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], None]) -> tuple[str | None, float]:
@@ -189,14 +95,36 @@ def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], N
     _, status, usage = os.wait4(child, 0)
     with os.fdopen(reader) as pipe:
         said = pipe.read()
-    return said or ("time limit" if status else None), usage.ru_utime + usage.ru_stime
+    ended = "time limit" if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL) else "a crash"
+    return said or (ended if status else None), usage.ru_utime + usage.ru_stime
+
+
+def run_here(item: pytest.Item, seconds: float) -> str | None:
+    """Why a test does not pass within so many CPU seconds of this process, or None."""
+
+    def stop(*_: object) -> None:
+        raise TimeoutError("time limit")
+
+    before = signal.signal(signal.SIGPROF, stop)
+    started = time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+    failed, item.session.testsfailed = item.session.testsfailed, 0
+    slow = time.process_time() - started >= seconds
+    return ("time limit" if slow else "fails") if failed else None
 
 
 class Tester:
     """A pytest plugin that runs the collected tests of each module once per mutant."""
 
-    def __init__(self, modules: list[str], every: int, report: Callable[[str, dict], None]) -> None:
-        self.modules, self.every, self.report = modules, every, report
+    def __init__(self, options: argparse.Namespace, report: Callable[[str, dict], None]) -> None:
+        self.modules, self.every, self.report = options.module, options.every, report
+        self.limit, self.budget = options.limit, options.budget
+        self.again = json.loads(options.again.read_text()) if options.again else {}
         self.measured: dict[str, tuple[str | None, float]] = {}
 
     @pytest.hookimpl(tryfirst=True)
@@ -222,11 +150,13 @@ class Tester:
         concerned = [item for item in items if item.path.stem.removeprefix("test_") in MODULES[module]]
         for item in concerned:
             if item.nodeid not in self.measured:
-                self.measured[item.nodeid] = run_in_child([item], LIMIT, lambda: None)
+                # In this process first: what oracles derive once and keep, every child then inherits.
+                refused = run_here(item, self.limit)
+                self.measured[item.nodeid] = (refused, 0.0) if refused else run_in_child([item], self.limit, lambda: None)
         chosen, left_out, total = [], {}, 0.0
         for item in sorted(concerned, key=lambda item: self.measured[item.nodeid][1]):
             failed, seconds = self.measured[item.nodeid]
-            if failed or total + seconds > BUDGET:
+            if failed or total + seconds > self.budget:
                 left_out[item.nodeid] = "budget" if not failed else failed if failed == "time limit" else "fails uncompiled"
             else:
                 total += seconds
@@ -237,25 +167,22 @@ class Tester:
         """CPU seconds of the tests and of all mutants; the tests left out; what killed each mutant, None where it survived."""
         chosen, left_out = self.select(module.__name__, items)
         cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter()
-        control, together = run_in_child(chosen, 2 * BUDGET, lambda: None)
+        control, together = run_in_child(chosen, 2 * self.budget + 5, lambda: None)
         if control:
             raise RuntimeError(f"{module.__name__} without a change: {control}")
-        found, total = {"tests": dict(cost), "left_out": left_out, "mutants": {}}, 0.0
+        earlier = self.again.get(module.__name__, {})
+        found, total = {"tests": earlier.get("tests", {}) | cost, "left_out": left_out, "every": self.every, "mutants": {}}, 0.0
         for mutant in list(mutants_of(module))[:: self.every]:
             chosen.sort(key=lambda item: cost[item.nodeid] / (1 + kills[item.nodeid]))
+            known = earlier.get("mutants", {}).get(mutant.name, {})
+            if known.get("change") == mutant.change and known["killed_by"] is not None:
+                found["mutants"][mutant.name] = known
+                continue
             killer, seconds = run_in_child(chosen, PATIENCE * together + 5, mutant.apply)
             kills[killer] += 1
             total += seconds
             found["mutants"][mutant.name] = {"line": mutant.line, "change": mutant.change, "killed_by": killer}
-        return found | {"seconds": total}
-
-
-def interpreted(function: Callable | None = None, **_options: object) -> Callable:
-    """Stands in for ``numba.njit``: the function as it is, also under the name ``py_func``."""
-    if function is None:
-        return interpreted
-    function.py_func = function
-    return function
+        return found | {"seconds": total + earlier.get("seconds", 0.0)}
 
 
 def print_results(module: str, results: dict, before: dict) -> None:
@@ -277,12 +204,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Mutation score of the tests of the small numerical modules.")
     parser.add_argument("--module", nargs="+", choices=list(MODULES), default=list(MODULES), metavar="NAME")
     parser.add_argument("--every", type=int, default=1, metavar="K", help="try only every k-th mutant of a module")
+    parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help="CPU seconds of a test (default: %(default)s)")
+    parser.add_argument(
+        "--budget", type=float, default=BUDGET, metavar="S", help="CPU seconds per survivor (default: %(default)s)"
+    )
     parser.add_argument("--before", type=Path, metavar="FILE", help="report of an earlier run to compare with")
+    parser.add_argument("--again", type=Path, metavar="FILE", help="report of the same sources: try only what survived there")
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write the report, as JSON")
     options = parser.parse_args()
     before = json.loads(options.before.read_text()) if options.before else {}
-    os.environ |= {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    importlib.import_module("numba").njit = interpreted
+    switch_off()
     found = {}
 
     def report(module: str, results: dict) -> None:
@@ -300,13 +231,13 @@ def main() -> None:
         "--tb=no",
         "--no-header",
         "-m",
-        "not slow and not weekly",
+        "not slow",
         "-p",
         "no:xdist",
         "-p",
         "no:cacheprovider",
     ]
-    sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options.module, options.every, report)]))
+    sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options, report)]))
 
 
 if __name__ == "__main__":

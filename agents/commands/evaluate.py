@@ -145,8 +145,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     classical, learned = evaluations[:known], evaluations[known:]
     text, pictures = table(evaluations), "error_over_time"
     if len(learned) > 1:
-        from agents.policy.seeds import learning_curves, seed_table
-        from agents.reports.learning_curves import draw_learning_curves
+        from agents.policy.seeds import seed_table
+        from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
         together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]

@@ -86,7 +86,8 @@ def _evaluated(
 
 def _write(points: list[Point], results: list[list[Result]], sweep: Sweep, folder: Path) -> None:
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
-    from agents.sweep.report import draw_map, episodes, figures, summary_json, table, write_parquet
+    from agents.sweep.maps import draw_map
+    from agents.sweep.report import episodes, figures, summary_json, table, write_parquet
 
     found = figures(points, results)
     base = ", ".join(f"{name} = {value}" for name, value in sweep.base.items() if value is not None)
@@ -95,7 +96,7 @@ def _write(points: list[Point], results: list[list[Result]], sweep: Sweep, folde
         write_parquet(episodes(points, results), place / "episodes.parquet")
         write_json(place / "sweep.json", {"base": sweep.base, "points": summary_json(found)})
         write_text(place / "sweep.md", f"# Sweep\n\n{caption}\n\n{table(found)}\n")
-        drawn = [path for number, chart in enumerate(sweep.maps) for path in draw_map(number, chart, found, place)]
+        drawn = [path for number, chart in enumerate(sweep.maps) for path in draw_map(f"map_{number}", chart, found, place)]
     pictures = "".join(f", {path.name}" for path in drawn if path.suffix == ".png")
     lines: list[Any] = table(found).splitlines()
     print("\n".join(lines[:42]) + ("\n..." if len(lines) > 42 else ""))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.training.time_split import told
 from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
-from baselines.files import make_folder, write_json
+from baselines.files import make_folder, own_folder, write_json
 from baselines.side_by_side import side_by_side
 from birthsim_env.parts.randomization import described
 from birthsim_env.physics.parameters import Parameters, load_parameters
@@ -26,7 +27,7 @@ def main() -> None:
         description="Train residual policies on top of a control law, by PPO, SAC or TQC.",
         epilog="Options override what the configuration says, and have its values by default. The best policy on validation "
         "worlds is kept whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command "
-        "with --resume goes on.",
+        "goes on, and ends with the same policy.",
     )
     listed = ", ".join(configuration_names())
     parser.add_argument("--config", default="circle", help=f"{listed}, or a TOML file (default: %(default)s)")
@@ -45,7 +46,6 @@ def main() -> None:
     parser.add_argument("--randomize", choices=tuple(RANDOMIZE), help="what training varies")
     parser.add_argument("--authority", type=float, help="bound of the residual force, N")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in --out")
     parser.add_argument(
         "--out", type=Path, required=True, help="folder; each seed has one in it with its policy, checkpoint, curve and events"
     )
@@ -61,18 +61,19 @@ def _train(arguments: argparse.Namespace) -> None:
     check_world(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors)
     first = training.seed if arguments.seed is None else arguments.seed
     seeds = range(first, first + arguments.seeds)
-    folders = [arguments.out / f"seed_{seed}" for seed in seeds]
-    if not arguments.resume:
-        for folder in folders:
-            if (folder / "training.json").exists() or (folder / "checkpoint.pt").exists():
-                raise ValueError(f"{str(folder)!r} holds a training; allowed: --resume to go on, or another --out")
+    make_folder(arguments.out)
     work = [
-        (replace(training, seed=seed), residual, make_folder(folder), rig, arguments.resume, k % arguments.jobs)
-        for k, (seed, folder) in enumerate(zip(seeds, folders, strict=True))
+        (replace(training, seed=seed), residual, arguments.out / f"seed_{seed}", rig, k % arguments.jobs)
+        for k, seed in enumerate(seeds)
     ]
     print(described(rig, training.randomize))
     results: dict[int, dict[str, Any]] = {}
-    side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    try:
+        side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    except BaseException:
+        if arguments.jobs > 1:
+            print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
+        raise
     _report(training, residual, list(seeds), [results[k] for k in range(len(work))])
     print(f"written to {arguments.out}/")
 
@@ -92,15 +93,16 @@ def _settings(arguments: argparse.Namespace) -> tuple[TrainingSettings, Residual
 
 
 def _one(
-    settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, resume: bool, position: int
-) -> dict[str, Any]:  # fmt: skip
+    settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, position: int
+) -> dict[str, Any]:
     try:
         # Stable-Baselines3 and torch take three seconds to load and come with the extra "agents" only.
         from agents.training.trainer import train
     except ImportError as error:
         raise ValueError(f"{error}; training needs the extra: pip install 'birthsim[agents]'") from error
-    reached = train(settings, residual, folder, rig, resume, position)
-    write_json(folder / "training.json", reached)
+    with own_folder(folder):
+        reached = train(settings, residual, folder, rig, position)
+        write_json(folder / "training.json", reached)
     return reached
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from agents.policy.files import load_policy
+from agents.policy.files import WEIGHTS, load_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, number, penalize_lost, quantile
@@ -33,10 +32,11 @@ def policy_folders(path: str | Path) -> list[Path]:
     Raises ``ValueError`` where there is none.
     """
     folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(path)
-    if (folder / "policy.json").is_file():
+    if (folder / WEIGHTS).is_file():
         return [folder]
     found = sorted(
-        (place.parent for place in folder.glob("seed_*/policy.json")), key=lambda place: int(place.name.rpartition("_")[2])
+        (place.parent for place in folder.glob(f"seed_*/{WEIGHTS}") if place.parent.name.removeprefix("seed_").isdecimal()),
+        key=lambda place: int(place.name.removeprefix("seed_")),
     )
     if not found:
         raise ValueError(
@@ -52,17 +52,18 @@ def best_policy(path: str | Path) -> Path:
         folders = policy_folders(path)
     except ValueError:
         return Path(path)
-    return (
-        min(folders, key=lambda folder: load_policy(folder).training["reached"]["pooled_mm"])
-        if len(folders) > 1
-        else folders[0]
-    )
+    return min(folders, key=_validation_error) if len(folders) > 1 else folders[0]
 
 
-def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
-    """What ``training.json`` of each folder says, of those that have one."""
-    files = [folder / "training.json" for folder in folders]
-    return [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
+def _validation_error(folder: Path) -> float:
+    """Pooled error of a policy in validation, mm; infinite where that says nothing."""
+    try:
+        error = load_policy(folder).training["reached"]["pooled_mm"]
+        return math.inf if error is None else float(error)
+    except (KeyError, TypeError) as missing:
+        raise ValueError(
+            f"policy = {str(folder)!r} does not say what it reached in validation; allowed: a folder that birthsim-train wrote"
+        ) from missing
 
 
 def pooled(values: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,26 @@ SHOWN = (
     ("saturation_percent", "time at a valve's limit (%)"),
 )
 """Figures of a validation, where they say something."""
+
+
+def learning_curves(folders: Sequence[Path]) -> list[dict[str, Any]]:
+    """What ``training.json`` of each folder says, of those that have one; ``ValueError`` for a damaged one."""
+    files = [folder / "training.json" for folder in folders]
+    return [_learning_curve(file) for file in files if file.is_file()]
+
+
+def _learning_curve(file: Path) -> dict[str, Any]:
+    try:
+        training = dict(json.loads(file.read_text(encoding="utf-8")))
+        for figures in (training["law"], *training["curve"]):
+            for name, _ in SHOWN:
+                _number(figures[name])
+        for steps in [training["curve"][0], *training["curve"]]:
+            float(steps["steps"])
+        str(training["settings"]["environment"])
+    except (LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"{str(file)!r} is damaged ({error!r}); allowed: a file that birthsim-train wrote") from error
+    return training
 
 
 def over_seeds(trainings: Sequence[dict[str, Any]], figure: str) -> tuple[Array, Array]:

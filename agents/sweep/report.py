@@ -1,4 +1,4 @@
-"""A sweep's results: one row per episode as Parquet, a table with one row per point, and heat maps."""
+"""A sweep's results: one row per episode as Parquet, and a table with one row per point."""
 
 from __future__ import annotations
 
@@ -7,23 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.patches import Patch
 
-from agents.sweep.plan import HeatMap, Point
+from agents.sweep.plan import Point
 from baselines.bench.comparison_tables import markdown
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.bench.tasks import Result
-from baselines.figures.runs import STYLE, legend_below, save
-from birthsim_env.physics.lanes import Array
 
 SHOWN_POINTS = 500
 """Rows of the table; the Parquet file has all."""
 
 STATISTICS = ("median", "mean", "q95", "max")
-
-LOST_COLOUR = "#303030"
 
 
 def episodes(points: Sequence[Point], results: Sequence[Sequence[Result]]) -> dict[str, list[Any]]:
@@ -87,7 +81,7 @@ def table(found: Sequence[dict[str, Any]]) -> str:
     head = [*names, "lost", "settled error, mm: median", "95 %", "largest", "success", "return, mean"]
     rows = [head]
     for row in found[:SHOWN_POINTS]:
-        varied = [_short(row["point"].get(name)) for name in names]
+        varied = [short(row["point"].get(name)) for name in names]
         error = [number(row["metrics"]["settled_rms"][key]) for key in ("median", "q95", "max")]
         count = row["episodes"]
         rows.append([
@@ -97,65 +91,11 @@ def table(found: Sequence[dict[str, Any]]) -> str:
     return text if len(found) <= SHOWN_POINTS else f"{text}\n\n{len(found) - SHOWN_POINTS} more points are in episodes.parquet."
 
 
-def draw_map(number_of: int, chart: HeatMap, found: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
-    """Cells coloured by the figure, the mean over what else varies, for values on a grid; coloured points for drawn ones."""
-    panels = list(dict.fromkeys(row["point"].get(chart.per) for row in found)) if chart.per else [None]
-    with plt.rc_context({**STYLE, "axes.grid": False}):
-        figure, axes = plt.subplots(
-            1, len(panels), figsize=(max(4.6, 3.7 * len(panels)), 4.0), layout="constrained", sharey=True, squeeze=False
-        )
-        shown = [[row for row in found if not chart.per or row["point"].get(chart.per) == panel] for panel in panels]
-        values = [[row["metrics"][chart.metric][chart.statistic] for row in rows] for rows in shown]
-        finite = [value for panel in values for value in panel if np.isfinite(value)]
-        low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-        drawn, lost = None, False
-        for place, panel, rows, figure_of in zip(axes[0], panels, shown, values, strict=True):
-            x, y = (_numbers([row["point"].get(side) for row in rows]) for side in (chart.x, chart.y))
-            size = np.array(figure_of)
-            lost |= bool(np.isinf(size).any())
-            drawn = _panel(place, x, y, size, low, high)
-            place.set(xlabel=chart.x, title="" if panel is None else f"{chart.per} = {_short(panel)}")
-        axes[0, 0].set_ylabel(chart.y)
-        if drawn is not None:
-            unit = UNITS[chart.metric]
-            figure.colorbar(drawn, ax=axes, pad=0.015).set_label(f"{chart.metric}, {chart.statistic} ({unit})")
-        if lost:
-            legend_below(figure, [Patch(color=LOST_COLOUR)], ["infinite: so many episodes were lost"])
-        return save(figure, folder, f"map_{number_of}")
-
-
-def _panel(axes: Any, x: Array, y: Array, size: Array, low: float, high: float) -> Any:
-    across, up = np.unique(x), np.unique(y)
-    axes.set_facecolor(LOST_COLOUR)
-    if len(across) * len(up) > len(size):
-        axes.set_facecolor("white")
-        axes.scatter(x[np.isinf(size)], y[np.isinf(size)], color=LOST_COLOUR, marker="x")
-        return axes.scatter(
-            x, y, c=np.where(np.isinf(size), np.nan, size), vmin=low, vmax=high, cmap="YlOrBr", ec="0.4", lw=0.4
-        )
-    cells = np.full((len(up), len(across)), np.nan)
-    for i, row in enumerate(up):
-        for j, column in enumerate(across):
-            cells[i, j] = size[(x == column) & (y == row)].mean()
-    cells[np.isinf(cells)] = np.nan
-    drawn = axes.pcolormesh(range(len(across) + 1), range(len(up) + 1), cells, vmin=low, vmax=high, cmap="YlOrBr", ec="white")
-    axes.set_xticks(np.arange(len(across)) + 0.5, [f"{value:.4g}" for value in across])
-    axes.set_yticks(np.arange(len(up)) + 0.5, [f"{value:.4g}" for value in up])
-    return drawn
-
-
 def summary_json(found: Sequence[dict[str, Any]]) -> Any:
     """``figures`` as JSON takes them; "lost" where a figure is infinite."""
     return jsonable(list(found))
 
 
-def _numbers(values: Sequence[Any]) -> Array:
-    """Values as coordinates; words by the order in which they come."""
-    if all(isinstance(value, (int, float)) for value in values):
-        return np.array(values, dtype=float)
-    order = {value: float(k) for k, value in enumerate(dict.fromkeys(map(str, values)))}
-    return np.array([order[str(value)] for value in values])
-
-
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """A value in a table or under an axis."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -80,7 +80,7 @@ def train_point(
     folder, parameters = Path(place), Parameters.from_dict(rig)
     folder.mkdir(parents=True, exist_ok=True)
     settings = TrainingSettings(**{**training, "hidden": tuple(training["hidden"])})
-    train(settings, ResidualSettings(**residual), folder, parameters, resume=True)
+    train(settings, ResidualSettings(**residual), folder, parameters)
     result = evaluate_point(
         controller="residual", source="", rig=rig, environment=environment, world=world, files=files, seed=seed,
         episodes=episodes, policy=str(folder),

@@ -10,14 +10,14 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from agents.policy.files import Policy, save_policy
+from agents.policy.files import Policy, policy_content, save_policy
 from agents.residual.settings import ResidualSettings
 from agents.training.algorithms import network_of
 from agents.training.checkpoint import save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.time_split import split
-from agents.training.validation import Score, validate
+from agents.training.validation import validate
 from birthsim_env.physics.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
@@ -42,15 +42,23 @@ class Monitor(BaseCallback):
         self._every = settings.steps / settings.validations
         self._stepped, self._validating = stepped, 0.0
         self._started = time.perf_counter()
-        if past is None:
-            past = {"law": _without_policy(env), "policy": None, "curve": []}
-            past["paper"] = _without_policy(paper) if paper is not None else None
-            self._validating = time.perf_counter() - self._started
-        self._past = past
-        curve = past["curve"]
-        self._before = curve[-1]["seconds"] if curve else 0.0
         # A checkpoint is written right after a validation, which need not be repeated.
-        self._due = curve[-1]["steps"] + self._every if curve else 0.0
+        self._goes_on = past is not None
+        if past is None:
+            self._reached: dict[str, Any] = {"law": _without_policy(env), "policy": None, "curve": []}
+            self._reached["paper"] = _without_policy(paper) if paper is not None else None
+            self._validating = time.perf_counter() - self._started
+            self._due, self._best = 0.0, b""
+            if self._reached["law"]["infeasible"] == env.num_envs:
+                raise ValueError(
+                    f"all {env.num_envs} validation worlds ask for more than the rig's strength, so that no policy could be "
+                    "told from another; allowed: a stronger rig, milder randomization, or another environment"
+                )
+        else:
+            self._reached, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
+            self.keep()
+        curve = self._reached["curve"]
+        self._before = curve[-1]["seconds"] if curve else 0.0
         self._bar = tqdm(
             total=settings.steps, initial=curve[-1]["steps"] if curve else 0, desc=f"seed {settings.seed}", unit=" steps",
             unit_scale=True, position=position,
@@ -58,6 +66,9 @@ class Monitor(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         # After an update and not inside a rollout: every validated policy is one that the algorithm has finished with.
+        if self._goes_on:
+            self._goes_on = False
+            return
         self.model.average.update_parameters(self.model.policy)  # type: ignore[attr-defined]
         if self.num_timesteps >= self._due:
             self._due = min(max(self._due, 0.0) + self._every, float(self._settings.steps))
@@ -72,7 +83,7 @@ class Monitor(BaseCallback):
     @property
     def enough(self) -> bool:
         """Whether the best policy is as far below the paper's law as the training shall get."""
-        paper, best = self._past["paper"], self._past["policy"]
+        paper, best = self._reached["paper"], self._reached["policy"]
         if paper is None or best is None:
             return False
         return bool(best["pooled_mm"] <= (1 - self._settings.until / 100) * paper["pooled_mm"])
@@ -88,13 +99,13 @@ class Monitor(BaseCallback):
         average: Any = self.model.average  # type: ignore[attr-defined]
         network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
         score = validate(self._env, network.actions)
-        figures, law = score.to_dict(), self._past["law"]
+        figures, law = score.to_dict(), self._reached["law"]
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started
         fraction = self._stepped.seconds / max(time.perf_counter() - self._started - self._validating, 1e-9)
         stepped = self._stepped
         parts = split(stepped.env.simulation, stepped.seconds / stepped.steps) if stepped.steps else {}
-        self._past["curve"].append(
+        self._reached["curve"].append(
             {"steps": self.num_timesteps, "seconds": seconds, "environment_fraction": fraction, "split": parts, **figures}
         )  # fmt: skip
         for name in LOGGED:
@@ -105,17 +116,20 @@ class Monitor(BaseCallback):
         self.logger.record("validation/better_than_law_percent", better)
         self.logger.dump(self.num_timesteps)
         self._bar.set_postfix_str(f"error {score.pooled:.2f} mm, law {law['pooled_mm']:.2f} mm, {better:+.0f} % better")
-        best = self._past["policy"]
+        best = self._reached["policy"]
         if best is None or _merit(figures) < _merit(best):
-            self._past["policy"] = figures
-            self._keep(network, score)
-        save_checkpoint(
-            self._folder, self.model, self.training_env, self.describe(), self._past  # type: ignore[arg-type]
-        )  # fmt: skip
+            self._reached["policy"] = figures
+            training = {**self._settings.to_dict(), "law": law, "reached": figures}
+            self._best = policy_content(Policy(network, self._settings.environment, self._residual, training))
+        # The checkpoint holds the best policy too: the file that follows is the same or is written anew after a kill.
+        past = {"reached": self._reached, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
+        save_checkpoint(self._folder, self.model, self.training_env, self.describe(), past)  # type: ignore[arg-type]
+        if self._reached["policy"] is figures:
+            self.keep()
 
-    def _keep(self, network: Any, score: Score) -> None:
-        training = {**self._settings.to_dict(), "law": self._past["law"], "reached": score.to_dict()}
-        save_policy(Policy(network, self._settings.environment, self._residual, training), self._folder)
+    def keep(self) -> None:
+        """Write the best policy so far."""
+        save_policy(self._best, self._folder)
 
     def describe(self) -> dict[str, Any]:
         """The settings that a checkpoint must share."""
@@ -127,7 +141,7 @@ class Monitor(BaseCallback):
 
     def reached(self) -> dict[str, Any]:
         """Validation figures of the law and of the kept policy, and the learning curve."""
-        return {"settings": self.describe(), **self._past}
+        return {"settings": self.describe(), **self._reached}
 
 
 def _without_policy(env: Any) -> dict[str, float]:

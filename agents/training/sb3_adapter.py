@@ -12,6 +12,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from birthsim_env.state import State
+
 
 class SB3VecEnv(VecEnv):
     """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
@@ -66,6 +68,15 @@ class SB3VecEnv(VecEnv):
         self._returns[ended] = 0
         self._lengths[ended] = 0
         return observation, rewards.astype(np.float32), ended, infos
+
+    def get_state(self) -> State:
+        """``env.get_state()``, and with it the returns and lengths of the episodes so far."""
+        return {**self.env.get_state(), "returns": self._returns.copy(), "lengths": self._lengths.copy()}
+
+    def set_state(self, state: State) -> None:
+        """Go on from what ``get_state`` returned; ``ValueError`` for the state of another environment."""
+        self.env.set_state({name: value for name, value in state.items() if name not in ("returns", "lengths")})
+        self._returns[:], self._lengths[:] = state["returns"], state["lengths"]
 
     def close(self) -> None:
         self.env.close()

@@ -10,10 +10,13 @@ import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.algorithms import make_model
+from agents.training.checkpoint import NAME as CHECKPOINT
 from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
+from agents.training.events import EVENTS, events_in
 from agents.training.monitor import Monitor, described
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.shifted_reward import ShiftedReward
@@ -27,16 +30,20 @@ def train(
     residual: ResidualSettings,
     folder: Path,
     parameters: Any = None,
-    resume: bool = False,
     position: int = 0,
 ) -> dict[str, Any]:
     """Train one residual policy and write it to ``folder``; returns what was reached.
 
     The policy that is best on the validation worlds (pooled error and its 95 % tail together) is the one that is kept,
-    written whenever it improves; a checkpoint is written at every validation, ``settings.validations`` times. With ``resume``
-    the training goes on from there, in worlds that it has not met. ``position`` is the row of its progress bar.
-    Raises ``ValueError`` for a checkpoint that is damaged or of other settings.
+    written whenever it improves; a checkpoint is written at every validation, ``settings.validations`` times. Where ``folder``
+    has one the training goes on from there, and ends with the same policy as one that was never killed. ``position`` is the row
+    of its progress bar. Raises ``ValueError`` for a checkpoint that is damaged or of other settings, for a folder with a policy
+    and without its checkpoint, and where no validation world is within the rig's strength.
     """
+    if not (folder / CHECKPOINT).exists():
+        for name in (WEIGHTS, "training.json"):
+            if (folder / name).exists():
+                raise ValueError(f"{str(folder)!r} has {name} but not its {CHECKPOINT}; allowed: another folder")
     torch.set_num_threads(1)
     arguments = {
         "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
@@ -51,21 +58,21 @@ def train(
     # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
     paid = ShiftedReward(env, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else env
     normalized = VecNormalize(paid, gamma=settings.discount)
-    model = make_model(settings, normalized, str(folder / "tensorboard"))
-    past = (
-        load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))
-        if resume
-        else None
-    )
+    model = make_model(settings, normalized, str(folder / EVENTS))
+    normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
+    past = load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))
     done = model.num_timesteps
-    # A training that goes on meets other worlds than it did: lanes use a seed each, which the steps done shift.
-    normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed + done // settings.lanes % SEED_SPACING)
+    if past is not None:
+        print(f"seed {settings.seed}: {min(done, settings.steps):,} of {settings.steps:,} steps are there and are kept")
     callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
     try:
         if done < settings.steps and not callback.enough:
-            model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
+            with events_in(folder / EVENTS):
+                model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
     except KeyboardInterrupt:
-        print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
+        if (folder / CHECKPOINT).exists():
+            callback.keep()
+            print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
         raise
     finally:
         callback.close()

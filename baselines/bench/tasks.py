@@ -29,6 +29,7 @@ _SHOWN_ONLY = (
     *("baselines/bench/statistics.py", "baselines/bench/comparison_tables.py", "baselines/figures/comparison.py"),
     *("baselines/figures/studies.py", "birthsim_env/scores.json"),
     *("agents/commands", "agents/reports", "agents/policies", "agents/training"),
+    *("agents/sweep/maps.py", "agents/sweep/report.py", "agents/sweep/search.py", "agents/sweep/plan.py"),
 )
 """Sources that show results and do not make them: pieces outlive a change of theirs."""
 

@@ -82,6 +82,7 @@ class ValveActuation(Forgetful):
         chambers = ("cylinder 1", "cylinder 2") if self._one_valve else ("P1", "N1", "P2", "N2")
         self.names = tuple(f"opening of the valve of {chamber}, 1" for chamber in chambers)
         self.size = len(self.names)
+        self._openings: Array = np.zeros((4, 0))
 
     def begin(self, lanes: Mask) -> None:
         pass
@@ -148,6 +149,7 @@ class FlowActuation(Forgetful):
             else tuple(f"flow into chamber {chamber}, {unit}" for chamber in ("P1", "N1", "P2", "N2"))
         )
         self.size = len(self.names)
+        self._wanted: Array = np.zeros((self.size, 0))
 
     def begin(self, lanes: Mask) -> None:
         pass

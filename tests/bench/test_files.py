@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+
 import pytest
 
 from baselines.files import whole_file, write_json
@@ -24,3 +27,9 @@ def test_what_is_raised_leaves_the_file_as_it_was_and_nothing_beside_it(tmp_path
         write_json(path, {"a": object()})
     assert path.read_text() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_full_disk_names_the_file_that_it_had_no_room_for(tmp_path):
+    with pytest.raises(OSError, match="No space left") as caught, whole_file(tmp_path / "results.json"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert caught.value.filename == str(tmp_path / "results.json")

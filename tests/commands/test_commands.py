@@ -52,7 +52,7 @@ def test_the_scripts_of_the_package_are_these_commands():
             "train",
             (
                 *("config", "env", "algorithm", "law", "impedance", "steps", "until", "seed", "seeds", "jobs", "sensors"),
-                *("randomize", "authority", "parameters", "resume", "out"),
+                *("randomize", "authority", "parameters", "out"),
             ),
         ),
     ],
@@ -90,7 +90,11 @@ BAD = [
     ("evaluate", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
     ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that"),
     ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim-train wrote"),
-    ("evaluate", ("--controller", "residual", "--policy", "{damaged}"), "policy.safetensors is not the file that policy.json"),
+    (
+        "evaluate",
+        ("--controller", "residual", "--policy", "{damaged}"),
+        "policy.safetensors is damaged: its checksum is of another",
+    ),
     ("evaluate", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
     ("evaluate", ("--episodes", "-3"), "--episodes: '-3'; allowed: a whole number >= 1"),
     ("evaluate", ("--episodes", "some"), "--episodes: 'some'; allowed: a whole number >= 1"),
@@ -150,7 +154,7 @@ BAD = [
     ("train", ("--authority", "nan"), "authority = nan; allowed: more than 0, at most 500"),
     ("train", ("--randomize", "some"), "--randomize: invalid choice: 'some' (choose from"),
     ("train", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 (kg)"),
-    ("train", ("--out", "{tmp}/own.py"), "own.py/seed_0'"),
+    ("train", ("--out", "{tmp}/own.py"), "own.py' is a file; allowed: a folder"),
 ]
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.policy.files import CONFIGURATION, WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, load_policy
+from agents.training.checkpoint import NAME as CHECKPOINT
+from baselines.files import own_folder
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
 
@@ -15,9 +17,9 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
     assert done.returncode == 0, done.stderr
     assert [path.name for path in folder.iterdir()] == ["seed_3"]
     own = folder / "seed_3"
-    assert {path.name for path in own.iterdir()} == {CONFIGURATION, WEIGHTS, "training.json", "checkpoint.pt", "tensorboard"}
+    assert {path.name for path in own.iterdir()} - {".lock"} == {WEIGHTS, CHECKPOINT, "training.json", "tensorboard"}
     reached, policy = strict(own / "training.json"), load_policy(own)
-    assert strict(own / CONFIGURATION)["training"]["reached"] == reached["policy"]
+    assert policy.training["reached"] == reached["policy"]
     assert (policy.environment, policy.settings.authority, policy.training["seed"]) == (RESIDUAL, 60.0, 3)
     assert (reached["settings"]["steps"], reached["settings"]["authority"], reached["settings"]["lanes"]) == (4096, 60.0, 32)
     assert reached["policy"]["pooled_mm"] < reached["law"]["pooled_mm"]
@@ -43,21 +45,36 @@ def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_pa
     assert not np.array_equal(*medians[0])
 
 
-def test_train_refuses_a_folder_with_a_training_and_resumes_it_where_asked(trained, small, monkeypatch, capsys):
+def test_train_goes_on_where_its_folder_stopped_and_refuses_the_folder_of_another(
+    trained, small, tmp_path, monkeypatch, capsys
+):
     folder, _ = trained
-    options = ("--config", small, "--steps", 4096, "--seed", 3, "--authority", 60, "--out", folder)
+    options = ("--config", small, "--steps", 4096, "--seed", 3, "--authority", 60)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
-    status, printed, complained = call("train", monkeypatch, capsys, *options)
-    assert (status, printed) == (2, "")
-    assert complained.endswith("/seed_3' holds a training; allowed: --resume to go on, or another --out\n")
-    status, printed, _ = call("train", monkeypatch, capsys, *options, "--resume")
+    status, printed, _ = call("train", monkeypatch, capsys, *options, "--out", folder)
     assert status == 0, "a training that is over is reported once more"
-    assert "seed 3" in printed
-    status, _, complained = call("train", monkeypatch, capsys, *options, "--resume", "--law", "backstepping-weight")
+    assert "seed 3: 4,096 of 4,096 steps are there and are kept\n" in printed
+    status, _, complained = call("train", monkeypatch, capsys, *options, "--out", folder, "--law", "backstepping-weight")
     assert status == 2
     assert "is of a training with other law; allowed: the same settings, or a folder of its own" in complained
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and "tfevents" not in path.name}
     assert after == before
+    # A policy that came from elsewhere is not written over.
+    for name in (WEIGHTS, "training.json"):
+        own = tmp_path / name.partition(".")[0] / "seed_3"
+        own.mkdir(parents=True)
+        (own / name).write_bytes((folder / "seed_3" / name).read_bytes())
+        status, _, complained = call("train", monkeypatch, capsys, *options, "--out", own.parent)
+        assert status == 2
+        assert complained.endswith(f"/seed_3' has {name} but not its {CHECKPOINT}; allowed: another folder\n")
+
+
+def test_two_processes_do_not_train_in_one_folder(small, tmp_path, monkeypatch, capsys):
+    with own_folder(tmp_path / "seed_0"):
+        status, _, complained = call("train", monkeypatch, capsys, "--config", small, "--out", tmp_path)
+    assert status == 2
+    assert complained.endswith("/seed_0' is in use by another process; allowed: to wait for it, or another folder\n")
+    assert {path.name for path in (tmp_path / "seed_0").iterdir()} <= {".lock"}
 
 
 @pytest.mark.slow
@@ -78,9 +95,8 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
     # A seed trained alone, in this very process, becomes the same policy.
     status, _, complained = call("train", monkeypatch, capsys, *options, "--seed", 6, "--out", tmp_path / "alone")
     assert status == 0, complained
-    for name in (WEIGHTS, CONFIGURATION):
-        alone, together = ((tmp_path / place / "seed_6" / name).read_bytes() for place in ("alone", "out"))
-        assert alone == together
+    alone, together = ((tmp_path / place / "seed_6" / WEIGHTS).read_bytes() for place in ("alone", "out"))
+    assert alone == together
     evaluate = ("--env", "BirthSIM/Probe-v1", "--policy", tmp_path / "out", "--episodes", 1, "--out", tmp_path / "evaluated")
     status, printed, complained = call("evaluate", monkeypatch, capsys, *evaluate)
     assert status == 0, complained
@@ -94,7 +110,7 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
 def test_ctrl_c_during_training_keeps_the_best_policy_and_the_checkpoint(tmp_path, small):
     """The first checkpoint follows the first validation, before anything is learned."""
     arguments = ("--config", small, "--steps", 10**8, "--out", tmp_path)
-    status, printed = interrupted("train", arguments, (tmp_path / "seed_0" / "checkpoint.pt").is_file)
+    status, printed = interrupted("train", arguments, (tmp_path / "seed_0" / CHECKPOINT).is_file)
     assert status == 130
     assert "interrupted after" in printed
     assert f"policy and checkpoint are kept in {tmp_path}/seed_0/" in printed
@@ -105,7 +121,7 @@ def test_ctrl_c_during_training_keeps_the_best_policy_and_the_checkpoint(tmp_pat
 def test_ctrl_c_ends_all_jobs_in_silence(tmp_path, small):
     arguments = ("--config", small, "--steps", 10**8, "--seeds", 2, "--jobs", 2, "--out", tmp_path)
     folders = [tmp_path / f"seed_{seed}" for seed in (0, 1)]
-    status, _ = interrupted("train", arguments, lambda: all((folder / "checkpoint.pt").is_file() for folder in folders))
+    status, _ = interrupted("train", arguments, lambda: all((folder / CHECKPOINT).is_file() for folder in folders))
     assert status == 130
     for folder in folders:
         load_policy(folder)

@@ -50,11 +50,11 @@ class Law:
     def command(
         self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
         rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
-        told: Array | None = None,
+        told: Array | None = None, pneumatic: Array | None = None,
     ) -> Array:  # fmt: skip
         lanes = motion.shape[1]
         target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
-        target[10:12] = now.stiffness
+        target[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
         # A spool that follows as fast as it does by itself is told where to go, no further.
         quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
         admittance_law.command(

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -108,7 +109,7 @@ def results(target: Target, folder: Path) -> dict[str, str]:
     return {
         str(path.relative_to(folder)): _digest(path, target.costs if path.parent != folder else ())
         for path in files_in(folder)
-        if path.name not in (*target.differ, ".lock") and not is_leftover(path, folder)
+        if not any(fnmatch(path.name, pattern) for pattern in (*target.differ, ".lock")) and not is_leftover(path, folder)
     }
 
 

@@ -16,8 +16,8 @@ class Target:
     """A command as a user runs it.
 
     ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{inputs}``, the folder of TOML files.
-    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` names
-    files, and ``costs`` keys in the JSON files of pieces, that differ from run to run. With ``alone`` one process has the
+    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` has patterns
+    of files, and ``costs`` keys of JSON files in its folders, that differ from run to run. With ``alone`` one process has the
     folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is complete.
     """
 
@@ -63,6 +63,11 @@ TARGETS = {
             "tune", "birthsim-tune",
             ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
             differ=("trials.journal",), alone=True, partway=True,
+        ),
+        Target(
+            "train", "birthsim-train",
+            ("--config", "{inputs}/train.toml", "--steps", "2048", "--seeds", "2", "--jobs", "2", "--out", "{out}"),
+            differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
         ),
         Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
         Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
+from baselines.bench.motions import PERIOD, PERIODS, Motion, stick_slip, strong
+from baselines.bench.second_model import SecondModel
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
-from tests.oracles.second_model import SecondModel
-
-PERIOD, PERIODS = 0.01, 50
-"""Commands and pushes are held for 10 ms; 0.5 s in all."""
 
 OTHER_RIG = {
     **{"geometry.gamma3": 1.3, "geometry.d3": 0.4, "geometry.d6": 0.22, "geometry.k1": 0.44, "geometry.k2": 0.55},
@@ -34,25 +29,6 @@ DEMANDING_RIG = {
 ELASTO_PLASTIC = {"friction.law": "elasto_plastic"}
 LATE_BREAKAWAY = {**ELASTO_PLASTIC, "friction.breakaway_ratio": 0.9}
 
-_rng = np.random.default_rng(0)
-JERKS = [(_rng.uniform(0.4, 1), _rng.uniform(-80, 80, 2)) for _ in range(PERIODS)]
-
-Sequence = Callable[[int], tuple[Array, Array]]
-
-
-def stick_slip(k: int) -> tuple[Array, Array]:
-    """Short puffs with rests between, and a hand that hardly moves anything: both pistons stick, slip and stick again."""
-    puff = (-1) ** (k // 20) * (k % 10 < 5)
-    hand = 4 * math.sin(2 * math.pi * 3 * k * PERIOD), 3 * math.sin(2 * math.pi * 2 * k * PERIOD)
-    return puff * np.array([0.05, -0.05, 0.1, -0.1]), np.array(hand)
-
-
-def strong(k: int) -> tuple[Array, Array]:
-    """Valves to 0.7 and jerks of 80 N: up to 0.8 m/s and 1.5 m/s, over half the stroke of cylinder 1."""
-    swing = 0.7 * np.sin(2 * math.pi * 2.5 * k * PERIOD + np.array([0, math.pi, 1.0, 1.0 + math.pi]))
-    size, jerk = JERKS[k]
-    return swing * size, jerk
-
 
 def start(rig: Parameters, speed: tuple[float, float] = (0.0, 0.0)) -> tuple[Plant, SecondModel]:
     plant = Plant(rig)
@@ -60,7 +36,7 @@ def start(rig: Parameters, speed: tuple[float, float] = (0.0, 0.0)) -> tuple[Pla
     return plant, SecondModel(rig, plant.end_effector()[:, 0], plant.state[:, 0])
 
 
-def differences(rig: Parameters, sequence: Sequence, refinement: int) -> tuple[Array, Array]:
+def differences(rig: Parameters, sequence: Motion, refinement: int) -> tuple[Array, Array]:
     """Largest difference in position (m) and pressure (relative) at every 10 ms, and speeds of both pistons there.
 
     ``refinement`` 1 is ``Plant.advance`` as it is; above, its kernel runs with that many times smaller steps.
@@ -102,7 +78,7 @@ CASES = {
 
 @pytest.mark.parametrize(("changes", "sequence", "refinement", "allowed"), CASES.values(), ids=CASES.keys())
 def test_plant_moves_like_the_second_model(
-    changes: dict[str, object], sequence: Sequence, refinement: int, allowed: tuple[float, float]
+    changes: dict[str, object], sequence: Motion, refinement: int, allowed: tuple[float, float]
 ) -> None:
     worst, speeds = differences(Parameters().replace(changes), sequence, refinement)
     print(f"position {worst[0]:.1e} m, pressure {worst[1]:.1e}; speeds up to {np.abs(speeds).max(axis=0)}")

@@ -1,9 +1,8 @@
-"""A policy folder: what is written is what is read, what is damaged or foreign is refused by name, nothing is unpickled."""
+"""A policy's file: what is written is what is read, what is damaged or foreign is refused by name, nothing is unpickled."""
 
 from __future__ import annotations
 
 import ast
-import hashlib
 import json
 import pickle
 import subprocess
@@ -13,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors import safe_open
 from safetensors.numpy import load, save
 
 from agents.policy.controller import ResidualController, observation_size
-from agents.policy.files import CONFIGURATION, FORMAT, WEIGHTS, Policy, load_policy, save_policy
+from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
+from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 
 ROOT = Path(__file__).parent.parent.parent
@@ -46,25 +47,18 @@ def folder(tmp_path):
     return tmp_path / "policy"
 
 
-def resign(folder):
-    """Make the configuration vouch for the weights that lie beside it, whatever they are."""
-    configuration = json.loads((folder / CONFIGURATION).read_text())
-    configuration["sha256"] = hashlib.sha256((folder / WEIGHTS).read_bytes()).hexdigest()
-    (folder / CONFIGURATION).write_text(json.dumps(configuration))
-
-
 def rewrite(folder, **changes):
-    """Change the configuration; None removes an entry."""
-    configuration = {**json.loads((folder / CONFIGURATION).read_text()), **changes}
-    configuration = {name: value for name, value in configuration.items() if value is not None}
-    (folder / CONFIGURATION).write_text(json.dumps(configuration))
+    """Change what is said about the arrays, and vouch for the result; None removes an entry."""
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    about = {name: value for name, value in {**about, **changes}.items() if value is not None}
+    (folder / WEIGHTS).write_bytes(sealed(arrays, about))
 
 
 def replace_arrays(folder, **changes):
-    """Change arrays of the weights file (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
-    arrays = {**load((folder / WEIGHTS).read_bytes()), **{name.replace("_", "."): value for name, value in changes.items()}}
-    (folder / WEIGHTS).write_bytes(save({name: value for name, value in arrays.items() if value is not None}))
-    resign(folder)
+    """Change arrays (``_`` in a name stands for a dot; None removes one) and vouch for the result."""
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    arrays = {**arrays, **{name.replace("_", "."): value for name, value in changes.items()}}
+    (folder / WEIGHTS).write_bytes(sealed({name: value for name, value in arrays.items() if value is not None}, about))
 
 
 def assert_refused(folder, message):
@@ -81,7 +75,7 @@ def assert_refused(folder, message):
 
 def test_a_round_trip_is_exact(folder):
     read = load_policy(folder)
-    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
+    assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
     assert (read.environment, read.settings, read.training) == (ENVIRONMENT, SETTINGS, POLICY.training)
     for name in ("mean", "variance"):
         np.testing.assert_array_equal(getattr(read.network, name), getattr(POLICY.network, name), strict=True)
@@ -121,15 +115,33 @@ def test_whatever_a_residual_may_do_comes_back(tmp_path, settings):
     ResidualController(policy=tmp_path)
 
 
-def test_the_configuration_is_json_as_others_read_it(tmp_path):
-    """Some figures say nothing, hunting where the reference never rests; JSON has no word for NaN but null."""
+def about_as_others_read_it(path):
+    """The JSON in the header, as any reader of safetensors finds it."""
 
     def refuse(word):
         raise AssertionError(f"{word} is no JSON")
 
+    with safe_open(path, framework="numpy") as file:
+        return json.loads(file.metadata()["birthsim"], parse_constant=refuse)
+
+
+def test_others_read_arrays_and_json(tmp_path):
+    """Some figures say nothing, hunting where the reference never rests; JSON has no word for NaN but null."""
     save_policy(Policy(network(), ENVIRONMENT, SETTINGS, {"reached": {"hunting_mm": float("nan")}}), tmp_path)
-    content = json.loads((tmp_path / CONFIGURATION).read_text(), parse_constant=refuse)
-    assert content["training"]["reached"]["hunting_mm"] is None
+    about = about_as_others_read_it(tmp_path / WEIGHTS)
+    assert about["training"]["reached"]["hunting_mm"] is None
+    assert (about["format"], about["environment"], len(about["sha256"])) == (FORMAT, ENVIRONMENT, 64)
+    np.testing.assert_array_equal(load((tmp_path / WEIGHTS).read_bytes())["mean"], network().mean)
+
+
+def test_the_same_policy_is_the_same_bytes_in_another_process(folder):
+    program = (
+        "import sys; from pathlib import Path; from agents.policy.files import load_policy, save_policy\n"
+        "save_policy(load_policy(sys.argv[1]), Path(sys.argv[2]))"
+    )
+    again = folder.parent / "again"
+    subprocess.run([sys.executable, "-c", program, str(folder), str(again)], cwd=ROOT, check=True)
+    assert (again / WEIGHTS).read_bytes() == (folder / WEIGHTS).read_bytes()
 
 
 def test_eleven_layers_come_back_in_order(tmp_path):
@@ -146,76 +158,62 @@ def test_writing_again_replaces_the_policy_whole(folder):
     read = load_policy(folder)
     assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v1", {"steps": 9})
     assert len(read.network.layers) == 2
-    assert sorted(path.name for path in folder.iterdir()) == [CONFIGURATION, WEIGHTS]
+    assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
 
 
-@pytest.mark.parametrize("name", [WEIGHTS, CONFIGURATION])
-def test_a_write_that_is_cut_off_leaves_the_old_file_or_is_noticed(folder, name, monkeypatch):
-    replace = Path.replace
-
+def test_a_write_that_is_cut_off_leaves_the_old_file(folder, monkeypatch):
     def cut(self, target):
-        if Path(target).name == name:
-            raise KeyboardInterrupt
-        return replace(self, target)
+        raise KeyboardInterrupt
 
     monkeypatch.setattr(Path, "replace", cut)
-    other = Policy(network(hidden=(4,), seed=5), ENVIRONMENT, ResidualSettings(), {})
     with pytest.raises(KeyboardInterrupt):
-        save_policy(other, folder)
-    if name == WEIGHTS:
-        assert load_policy(folder).settings == SETTINGS
-    else:
-        assert_refused(folder, "policy.safetensors is not the file that policy.json was written with")
+        save_policy(Policy(network(hidden=(4,), seed=5), ENVIRONMENT, ResidualSettings(), {}), folder)
+    assert load_policy(folder).settings == SETTINGS
+    assert [path.name for path in folder.iterdir()] == [WEIGHTS]
 
 
-@pytest.mark.parametrize("name", [CONFIGURATION, WEIGHTS])
-def test_a_missing_file_is_named(folder, name):
-    (folder / name).unlink()
+def test_a_folder_without_a_policy_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "empty").mkdir()
+    for name in ("file", "empty", "nowhere"):
+        assert_refused(tmp_path / name, rf"has no {WEIGHTS}; allowed: a folder that birthsim-train wrote, with {WEIGHTS}")
+
+
+def test_every_flipped_bit_is_noticed(folder):
+    content = (folder / WEIGHTS).read_bytes()
+    # All of the header's bytes, and some of the arrays'.
+    header = 8 + int.from_bytes(content[:8], "little")
+    rng = np.random.default_rng(0)
+    for place in [*range(header), *rng.integers(header, len(content), 200), len(content) - 1]:
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        with pytest.raises(ValueError, match=r"^(no birthsim-residual-3 or )?damaged"):
+            unsealed(bytes(flipped), FORMAT)
+    (folder / WEIGHTS).write_bytes(flipped)
     assert_refused(
-        folder, f"has no {name}; allowed: a folder that birthsim-train wrote, with policy.json and policy.safetensors"
+        folder, f"{WEIGHTS} is damaged: its checksum is of another content; allowed: a folder that birthsim-train wrote"
     )
 
 
-def test_a_folder_that_is_not_there_or_no_folder_is_named(tmp_path):
-    assert_refused(tmp_path / "nowhere", r"has no policy\.json")
-    (tmp_path / "file").write_text("")
-    assert_refused(tmp_path / "file", r"has no policy\.json")
-
-
-@pytest.mark.parametrize("place", [0, 9, 100, -1])
-def test_a_flipped_byte_in_the_weights_is_noticed(folder, place):
-    content = bytearray((folder / WEIGHTS).read_bytes())
-    content[place] ^= 1
-    (folder / WEIGHTS).write_bytes(content)
-    assert_refused(folder, "policy.safetensors is not the file that policy.json was written with")
-
-
-def test_truncated_or_empty_weights_are_noticed(folder):
+def test_a_file_that_is_cut_off_or_longer_is_noticed(folder):
     content = (folder / WEIGHTS).read_bytes()
-    for part in (content[:-4], content[:20], b""):
+    for part in (content[:-4], content[:20], b"", content + b"0", content[:200]):
         (folder / WEIGHTS).write_bytes(part)
-        assert_refused(folder, "is not the file")
-        # Even if the configuration vouches for them.
-        resign(folder)
-        assert_refused(folder, "is damaged")
+        assert_refused(folder, "damaged")
 
 
-def test_the_weights_of_another_policy_are_noticed(folder, tmp_path):
-    save_policy(Policy(network(seed=9), ENVIRONMENT, SETTINGS, {}), tmp_path / "other")
-    (folder / WEIGHTS).write_bytes((tmp_path / "other" / WEIGHTS).read_bytes())
-    assert_refused(folder, "is not the file")
+@pytest.mark.parametrize("text", ["", "{", "[1, 2]", "3", "null", '{"format": 3}', "\xff", '{"a": ' * 5000])
+def test_what_is_said_about_other_arrays_is_refused(folder, text):
+    for metadata in (None, {"other": text}, {"birthsim": text}):
+        (folder / WEIGHTS).write_bytes(save({"mean": np.zeros(3)}, metadata))
+        assert_refused(folder, f"{WEIGHTS} is no {FORMAT} or damaged; allowed: a folder that birthsim-train wrote")
 
 
-@pytest.mark.parametrize("text", ["", "{", "not json", '{"format": ', "\xff"])
-def test_a_configuration_that_is_no_json_is_refused(folder, text):
-    (folder / CONFIGURATION).write_bytes(text.encode("latin-1"))
-    assert_refused(folder, r"policy\.json is damaged")
-
-
-@pytest.mark.parametrize("content", [{}, {"format": "other-1"}, {"format": "birthsim-residual-1"}, [1, 2], 3, None, "text"])
-def test_json_of_something_else_is_called_foreign(folder, content):
-    (folder / CONFIGURATION).write_text(json.dumps(content))
-    assert_refused(folder, rf"format .* is foreign; allowed: '{FORMAT}'")
+@pytest.mark.parametrize("form", ["other-1", "birthsim-residual-4", "birthsim-checkpoint-1", 3, None, ["birthsim"]])
+def test_another_format_is_called_foreign(folder, form):
+    arrays, about = unsealed((folder / WEIGHTS).read_bytes(), FORMAT)
+    (folder / WEIGHTS).write_bytes(sealed(arrays, {**about, "format": form}))
+    assert_refused(folder, rf"of the foreign format .*, not '{FORMAT}'")
 
 
 @pytest.mark.parametrize(
@@ -248,11 +246,6 @@ def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, change
 def test_a_squashing_that_is_neither_true_nor_false_is_refused(folder, squashed):
     rewrite(folder, squashed=squashed)
     assert_refused(folder, "is damaged")
-
-
-def test_a_configuration_without_the_hash_is_refused(folder):
-    rewrite(folder, sha256=None)
-    assert_refused(folder, "is not the file")
 
 
 def shape(*sizes, fill=0.1, dtype=np.float32):
@@ -317,14 +310,10 @@ class Trap:
         return (Path.touch, (self.path,))
 
 
-@pytest.mark.parametrize("name", [WEIGHTS, CONFIGURATION])
-@pytest.mark.parametrize("signed", [False, True])
-def test_a_pickle_under_another_name_is_refused_and_not_opened(folder, tmp_path, name, signed):
+def test_a_pickle_under_another_name_is_refused_and_not_opened(folder, tmp_path):
     trap = tmp_path / "sprung"
-    (folder / name).write_bytes(pickle.dumps(Trap(trap)))
-    if signed and name == WEIGHTS:
-        resign(folder)
-    assert_refused(folder, "is damaged" if signed or name == CONFIGURATION else "is not the file")
+    (folder / WEIGHTS).write_bytes(pickle.dumps(Trap(trap)))
+    assert_refused(folder, f"is no {FORMAT} or damaged")
     assert not trap.exists()
     # The trap is a real one.
     pickle.loads(pickle.dumps(Trap(trap)))
@@ -341,10 +330,8 @@ def test_no_module_of_the_project_unpickles():
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
             assert not {name.split(".")[0] for name in names} & forbidden, path
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "load":
-                own = ast.unparse(node.func) == "torch.load"
-                # PyTorch's format holds tensors and plain numbers where nothing else is let in.
-                said = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
-                assert said.get("weights_only") == "True" if own else said == {}, path
+                assert ast.unparse(node.func) != "torch.load", path
+                assert not node.keywords, path
             if isinstance(node, ast.keyword):
                 assert node.arg != "allow_pickle", path
 

@@ -1,15 +1,11 @@
-"""Trainings that are killed: what a checkpoint brings back, what it refuses, and that nothing in it is unpickled."""
+"""A checkpoint: what it brings back, what it refuses, and that nothing in it is unpickled."""
 
 from __future__ import annotations
 
-import json
+import contextlib
+import os
 import pickle
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import gymnasium
@@ -18,17 +14,16 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy.files import load_policy
+from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor
 from agents.training import trainer as training
 from agents.training.algorithms import make_model, network_of
-from agents.training.checkpoint import NAME, load_checkpoint, save_checkpoint
+from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
-from tests.console import COMMANDS, PATIENCE, ROOT, call
 
 PROBE = "BirthSIM/ProbeResidual-v1"
 RESIDUAL = ResidualSettings()
@@ -36,30 +31,23 @@ TINY = TrainingSettings(
     PROBE, steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
     validation_lanes=2, validations=4,
 )  # fmt: skip
-SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"law": {"pooled_mm": 2.5}, "policy": None, "curve": [{"steps": 0, "x": 0.1}]}
+SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"reached": {"policy": None, "curve": [{"steps": 0, "x": 0.1}]}, "due": 256.0}
 
 
 @pytest.fixture
 def brief(monkeypatch):
-    """Episodes of half a second; yields the seeds with which the training environments started their lanes."""
-    make_vec, seeds = gymnasium.make_vec, []
-
-    def made(name, num_envs, **arguments):
-        env = make_vec(name, num_envs=num_envs, **{"duration": 0.5, **arguments})
-        if num_envs == TINY.lanes:
-            reset = env.reset
-            env.reset = lambda seed=None, **options: (seeds.append(seed), reset(seed=seed, **options))[1]
-        return env
-
-    monkeypatch.setattr(training.gymnasium, "make_vec", made)
-    return seeds
+    """Episodes of half a second."""
+    make_vec = gymnasium.make_vec
+    monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **more: make_vec(*args, **{"duration": 0.5, **more}))
 
 
 def new(algorithm="ppo", seed=0):
-    """A model and its normalised environment that have seen nothing yet."""
+    """A model that has seen nothing yet, and its normalised environment."""
     torch.set_num_threads(1)
     arguments = {"duration": 0.5, "randomize": True, "autoreset_mode": "SameStep"}
     env = VecNormalize(SB3VecEnv(gymnasium.make_vec(PROBE, num_envs=TINY.lanes, **arguments)))
+    env.seed(seed)
+    env.reset()
     return make_model(replace(TINY, algorithm=algorithm, seed=seed), env), env
 
 
@@ -139,11 +127,10 @@ def test_writing_again_replaces_it_whole_or_not_at_all(tmp_path, monkeypatch):
     save_checkpoint(tmp_path, model, env, SETTINGS, {"curve": []})
     assert load_checkpoint(tmp_path, model, env, SETTINGS) == {"curve": []}
 
-    def cut(content, file):
-        file.write(b"half a checkp")
+    def cut(number):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(torch, "save", cut)
+    monkeypatch.setattr(os, "fsync", cut)
     with pytest.raises(KeyboardInterrupt):
         save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
     assert load_checkpoint(tmp_path, model, env, SETTINGS) == {"curve": []}
@@ -184,8 +171,8 @@ class Trap:
         return (Path.touch, (self.path,))
 
 
-def assert_damaged(folder, model, env):
-    with pytest.raises(ValueError, match=r"(?s)is damaged.*; allowed: a checkpoint that birthsim-train wrote$") as caught:
+def assert_damaged(folder, model, env, words="(no birthsim-checkpoint-1 or )?damaged"):
+    with pytest.raises(ValueError, match=f"(?s) is {words}.*; allowed: a checkpoint that birthsim-train wrote$") as caught:
         load_checkpoint(folder, model, env, SETTINGS)
     assert repr(str(folder / NAME)) in str(caught.value)
     return str(caught.value)
@@ -200,118 +187,74 @@ def test_a_damaged_checkpoint_is_refused_and_nothing_is_unpickled(tmp_path):
     for damaged in wrong:
         path.write_bytes(damaged)
         assert_damaged(tmp_path, model, env)
-    # A trap where a tensor should be, in PyTorch's own format.
-    torch.save({"parameters": Trap(trap), "settings": json.dumps(SETTINGS)}, path)
-    assert_damaged(tmp_path, model, env)
     assert not trap.exists()
-    torch.load(path, weights_only=False)
+    pickle.loads(pickle.dumps(Trap(trap)))
     assert trap.exists(), "the trap is a real one"
 
 
-def test_a_refusal_is_one_line_and_does_not_advise_to_unpickle(tmp_path):
-    model, env = new()
-    (tmp_path / NAME).write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
-    said = assert_damaged(tmp_path, model, env)
-    assert "\n" not in said
-    assert "weights_only" not in said
+def test_a_flipped_bit_anywhere_is_refused(tmp_path):
+    model, env = learned()
+    save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
+    content, rng = (tmp_path / NAME).read_bytes(), np.random.default_rng(0)
+    for _ in range(300):
+        flipped = bytearray(content)
+        flipped[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
+        (tmp_path / NAME).write_bytes(flipped)
+        said = assert_damaged(tmp_path, model, env)
+        assert "\n" not in said
+    (tmp_path / NAME).write_bytes(content)
+    assert load_checkpoint(tmp_path, model, env, SETTINGS) == PAST
 
 
-@pytest.mark.parametrize("content", [[1, 2], 3, {}, {"settings": "{"}, {"settings": 3}])
-def test_what_is_no_checkpoint_in_the_right_format_is_refused(tmp_path, content):
-    model, env = new()
-    torch.save(content, tmp_path / NAME)
-    assert_damaged(tmp_path, model, env)
+def rewritten(folder, change):
+    """The checkpoint with what ``change`` does to its JSON and its arrays, and a checksum that vouches for it."""
+    arrays, about = unsealed((folder / NAME).read_bytes(), FORMAT)
+    change(about, arrays)
+    (folder / NAME).write_bytes(sealed(arrays, about))
 
 
-@pytest.mark.parametrize("missing", ["parameters", "steps", "observations", "past", "random"])
-def test_a_checkpoint_that_lacks_a_part_is_called_damaged(tmp_path, missing):
+@pytest.mark.parametrize("missing", ["past", "parameters", "average", "counts", "observations", "last", "lanes", "random"])
+def test_a_checkpoint_of_another_version_is_refused(tmp_path, missing):
     model, env = new()
     save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
-    content = torch.load(tmp_path / NAME, weights_only=True)
-    del content[missing]
-    torch.save(content, tmp_path / NAME)
-    try:
+
+    def leave_out(about, _):
+        about["content"]["dict"] = [pair for pair in about["content"]["dict"] if pair[0] != missing]
+
+    rewritten(tmp_path, leave_out)
+    with pytest.raises(ValueError, match=r"does not fit this version \(.*\); allowed: a checkpoint that") as caught:
         load_checkpoint(tmp_path, model, env, SETTINGS)
-    except ValueError as error:
-        if "is damaged" not in str(error):
-            raise
+    assert repr(str(tmp_path / NAME)) in str(caught.value)
 
 
-def steps_of(reached):
-    return [point["steps"] for point in reached["curve"]]
+def test_whatever_an_intact_checkpoint_lacks_is_a_value_error(tmp_path):
+    """Every array left out, cut to nothing, and given as text."""
+    model, env = learned("sac", 100)
+    save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
+    whole = (tmp_path / NAME).read_bytes()
+    names = sorted(unsealed(whole, FORMAT)[0])
+    for name in names[:: len(names) // 12]:
+        for instead in (None, np.zeros((0, 0, 0)), np.frombuffer(b"text", np.uint8)):
 
+            def change(_, arrays, name=name, instead=instead):
+                del arrays[name]
+                if instead is not None:
+                    arrays[name] = instead
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
-def test_a_training_that_dies_goes_on_from_its_last_checkpoint(tmp_path, monkeypatch, brief, algorithm):
-    """It dies 1.6 intervals on: what it had learned up to the last validation is there, what came after is learned anew."""
-    settings, died = replace(TINY, algorithm=algorithm), 3 * 256 - 100
-    models = []
-
-    def die(self):
-        if self.num_timesteps >= died:
-            raise RuntimeError("out of memory")
-        return True
-
-    def made(*args):
-        models.append(make_model(*args))
-        return models[-1]
-
-    monkeypatch.setattr(training, "make_model", made)
-    with monkeypatch.context() as patch:
-        patch.setattr(monitor.Monitor, "_on_step", die)
-        with pytest.raises(RuntimeError, match="out of memory"):
-            train(settings, RESIDUAL, tmp_path)
-    content = torch.load(tmp_path / NAME, weights_only=True)
-    kept, past = content["steps"], json.loads(content["past"])
-    assert kept == past["curve"][-1]["steps"] == 512
-    assert died - kept <= settings.steps / settings.validations, "at most one interval is lost"
-    load_policy(tmp_path)
-    reached = train(settings, RESIDUAL, tmp_path, resume=True)
-    # The curve is the one so far, and goes on to the end.
-    assert reached["curve"][:3] == past["curve"]
-    assert steps_of(reached) == [0, 256, 512, 768, 1024]
-    assert reached["law"] == past["law"]
-    assert all(later["seconds"] > sooner["seconds"] for sooner, later in pairwise(reached["curve"]))
-    second = models[1]
-    assert second.num_timesteps == 1024
-    assert second._n_updates > content["updates"] > 0
-    # The learning rate has gone on falling over the whole training, to a tenth.
-    assert second._total_timesteps == 1024
-    assert second.lr_schedule(second._current_progress_remaining) < 0.35 * TINY.learning_rate
-    # The second part met other worlds than the first.
-    before, after = (set(seeds) for seeds in brief if seeds is not None)
-    assert not before & after
-    # A training that is over is not trained any further.
-    weights = (tmp_path / "policy.safetensors").read_bytes()
-    again = train(settings, RESIDUAL, tmp_path, resume=True)
-    assert steps_of(again) == steps_of(reached)
-    assert models[2].num_timesteps == 1024
-    assert (tmp_path / "policy.safetensors").read_bytes() == weights
-
-
-def test_what_goes_on_begins_with_what_was_learned(tmp_path, monkeypatch, brief):
-    """Killed right after its checkpoint, a training validates the same policy as at that moment."""
-    networks, take = [], monitor.network_of
-    monkeypatch.setattr(monitor, "network_of", lambda *args: (networks.append(take(*args)), networks[-1])[1])
-
-    def die(self):
-        if self.num_timesteps > 512:
-            raise RuntimeError
-
-    with monkeypatch.context() as patch:
-        patch.setattr(monitor.Monitor, "_on_rollout_end", die)
-        with pytest.raises(RuntimeError):
-            train(TINY, RESIDUAL, tmp_path)
-    model, env = new()
-    load_checkpoint(tmp_path, model, env, monitor.described(TINY, RESIDUAL, Parameters()))
-    seen = np.random.default_rng(0).normal(size=(40, env.observation_space.shape[0])).astype(np.float32)
-    np.testing.assert_array_equal(network_of(model.average.module, env).actions(seen), networks[-1].actions(seen))
-    assert np.abs(networks[-1].actions(seen)).max() > 0
-
-
-def test_resuming_without_a_checkpoint_begins(tmp_path, brief):
-    one = train(replace(TINY, steps=128, validations=1), RESIDUAL, tmp_path / "one", resume=True)
-    assert steps_of(one) == [0, 128]
+            (tmp_path / NAME).write_bytes(whole)
+            rewritten(tmp_path, change)
+            with contextlib.suppress(ValueError):
+                load_checkpoint(tmp_path, model, env, SETTINGS)
+    for content in ([1, 2], 3, {}, "text", None, {"dict": 3}, {"dict": [[1]]}, {"array": "none"}):
+        (tmp_path / NAME).write_bytes(whole)
+        rewritten(tmp_path, lambda about, _, content=content: about.update(content=content))
+        with pytest.raises(ValueError, match="does not fit this version"):
+            load_checkpoint(tmp_path, model, env, SETTINGS)
+    for settings in ([1, 2], 3, None, "text"):
+        (tmp_path / NAME).write_bytes(whole)
+        rewritten(tmp_path, lambda about, _, settings=settings: about.update(settings=settings))
+        with pytest.raises(ValueError, match="allowed: "):
+            load_checkpoint(tmp_path, model, env, SETTINGS)
 
 
 @pytest.mark.parametrize(
@@ -329,53 +272,5 @@ def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, 
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     rig = Parameters().replace({"mechanics.mass": 4.5}) if named == "rig" else Parameters()
     with pytest.raises(ValueError, match=rf"is of a training with other {named}; allowed: the same settings"):
-        train(settings, residual, tmp_path, rig, resume=True)
+        train(settings, residual, tmp_path, rig)
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
-
-
-CONFIGURATION = """[training]
-environment = "BirthSIM/ProbeResidual-v1"
-steps = 4096
-lanes = 8
-rollout = 32
-batch = 64
-epochs = 1
-hidden = [8, 8]
-validation_lanes = 2
-validations = 8
-"""
-
-
-@pytest.mark.slow
-def test_a_process_that_is_killed_loses_at_most_one_interval(tmp_path, monkeypatch, capsys):
-    """SIGKILL, which no handler sees, at any moment after a checkpoint of 1024 steps; then the same command with --resume."""
-    (tmp_path / "tiny.toml").write_text(CONFIGURATION)
-    options = ("--config", tmp_path / "tiny.toml", "--out", tmp_path / "out")
-    path = tmp_path / "out" / "seed_0" / NAME
-
-    def steps():
-        return torch.load(path, weights_only=True)["steps"] if path.is_file() else 0
-
-    line = [sys.executable, "-m", COMMANDS["train"], *map(str, options)]
-    with subprocess.Popen(line, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            until = time.monotonic() + PATIENCE
-            while steps() < 1024 and process.poll() is None and time.monotonic() < until:
-                time.sleep(0.01)
-        finally:
-            process.kill()
-    assert process.returncode == -signal.SIGKILL
-    assert not (path.parent / "training.json").exists()
-    content = torch.load(path, weights_only=True)
-    assert 1024 <= content["steps"] < 4096
-    load_policy(path.parent)
-    status, _, complained = call("train", monkeypatch, capsys, *options)
-    assert status == 2
-    assert "holds a training; allowed: --resume to go on, or another --out" in complained
-    status, _, complained = call("train", monkeypatch, capsys, *options, "--resume")
-    assert status == 0, complained
-    reached = json.loads((path.parent / "training.json").read_text())
-    assert reached["curve"][: len(json.loads(content["past"])["curve"])] == json.loads(content["past"])["curve"]
-    assert steps_of(reached)[-1] == 4096
-    assert len(reached["curve"]) >= 9
-    assert all(later > sooner for sooner, later in pairwise(steps_of(reached)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,11 @@ from scipy import stats
 
 from agents.commands import evaluate as command
 from agents.policy.controller import observation_size
-from agents.policy.files import load_policy
+from agents.policy.files import load_policy, save_policy
 from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
 from agents.reports import inspection
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
-from agents.reports.learning_curves import over_seeds
+from agents.reports.learning_curves import learning_curves, over_seeds
 from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
@@ -81,6 +82,29 @@ def test_a_learning_curve_over_seeds_ends_with_the_shortest():
     np.testing.assert_array_equal(steps, [0, 10, 20])
     np.testing.assert_allclose(middle, [8.5, 7.5, 6.5])
     np.testing.assert_allclose([low, high], [[8, 7, 6], [9, 8, 7]])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", "\xff", '{"law": {}, "curve": []}', '{"law": 3}', '{"law": {}, "curve": [{}], "settings": {}}']
+)
+def test_a_damaged_learning_curve_is_named(tmp_path, text):
+    (tmp_path / "training.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(ValueError, match=r"training\.json' is damaged \(.*\); allowed: a file that birthsim-train wrote"):
+        learning_curves([tmp_path])
+    assert learning_curves([tmp_path / "nowhere"]) == []
+    assert len(learning_curves(policy_folders("circle"))) == 5
+
+
+def test_of_several_policies_that_do_not_say_what_they_reached_none_is_the_best(tmp_path):
+    for k, reached in enumerate((3.0, None, 2.0)):
+        policy = load_policy(policy_folders("circle")[k])
+        save_policy(replace(policy, training={"reached": {"pooled_mm": reached}}), tmp_path / f"seed_{k}")
+    (tmp_path / "seed_old").mkdir()
+    save_policy(policy, tmp_path / "seed_old")
+    assert best_policy(tmp_path) == tmp_path / "seed_2"
+    save_policy(replace(policy, training={}), tmp_path / "seed_1")
+    with pytest.raises(ValueError, match=r"seed_1' does not say what it reached in validation; allowed: a folder that"):
+        best_policy(tmp_path)
 
 
 @pytest.mark.parametrize("name", shipped_names())

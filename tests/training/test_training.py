@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import threading
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -12,7 +15,7 @@ import numpy as np
 import pytest
 
 from agents.policy.controller import ResidualController
-from agents.policy.files import CONFIGURATION, WEIGHTS, load_policy
+from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor, validation
 from agents.training import trainer as training
@@ -168,6 +171,31 @@ def test_every_validation_is_in_the_events_at_its_own_step(trained, events):
     assert set(events["validation/pooled_mm"]) == {point["steps"] for point in reached["curve"]}
 
 
+@pytest.mark.parametrize("writes", [0, 1, 5, 30])
+def test_a_full_disk_is_said_once_with_the_place_and_without_a_traceback(tmp_path, monkeypatch, capsys, short_probe, writes):
+    """TensorBoard writes in a thread of its own."""
+    from tensorboard.summary.writer.record_writer import RecordWriter
+
+    done, write = [], RecordWriter.write
+
+    def full(self, data):
+        done.append(data)
+        if len(done) > writes:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(self, data)
+
+    hook = threading.excepthook
+    with monkeypatch.context() as patch:
+        patch.setattr(RecordWriter, "write", full)
+        with pytest.raises(OSError, match="No space left on device") as caught:
+            train(BRIEF, RESIDUAL, tmp_path)
+    assert caught.value.filename == str(tmp_path / "tensorboard")
+    assert "Traceback" not in capsys.readouterr().err
+    assert threading.excepthook is hook
+    # With room again, the same command goes on.
+    assert train(BRIEF, RESIDUAL, tmp_path)["curve"][-1]["steps"] == BRIEF.steps
+
+
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
@@ -176,14 +204,14 @@ def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_pa
     )
     for name, seed in (("one", 0), ("again", 0), ("other", 1)):
         reached = train(replace(settings, seed=seed), RESIDUAL, tmp_path / name)
-        results.append((reached["curve"], *((tmp_path / name / file).read_bytes() for file in (WEIGHTS, CONFIGURATION))))
-    (one, *files), (again, *twins), (other, *strangers) = results
+        results.append((reached["curve"], (tmp_path / name / WEIGHTS).read_bytes()))
+    (one, file), (again, twin), (other, stranger) = results
     assert steady(one) == steady(again)
-    assert files == twins
+    assert file == twin
     # The untrained policies are the same, the law; the trained ones are not.
     assert steady(one[:1]) == steady(other[:1])
     assert steady(one[-1:]) != steady(other[-1:])
-    assert files[1] != strangers[1]
+    assert file != stranger
 
 
 def test_training_and_validation_run_what_was_asked_for(tmp_path, monkeypatch):
@@ -234,7 +262,7 @@ def test_an_interrupt_is_passed_on_and_leaves_the_best_policy_so_far(tmp_path, m
         train(replace(BRIEF, steps=10**6, validations=10**6 // ROLLOUT), RESIDUAL, tmp_path)
     assert f"interrupted after {2 * ROLLOUT + 112} steps" in capsys.readouterr().out
     assert load_policy(tmp_path).training["steps"] == 10**6
-    assert (tmp_path / "checkpoint.pt").is_file()
+    assert (tmp_path / "checkpoint.safetensors").is_file()
 
 
 class Fake:
@@ -325,6 +353,15 @@ def test_a_validation_without_any_feasible_world_says_so(scored):
     assert score.to_dict()["infeasible"] == 3
 
 
+def test_a_training_that_could_not_tell_policies_apart_does_not_begin(tmp_path, monkeypatch, short_probe):
+    monkeypatch.setattr(validation, "required_strength_ratio", lambda env: np.full(env.num_envs, 1.5))
+    with pytest.raises(
+        ValueError, match=r"all 4 validation worlds ask for more than the rig's strength.*; allowed: a stronger rig"
+    ):
+        train(BRIEF, RESIDUAL, tmp_path)
+    assert not (tmp_path / WEIGHTS).exists()
+
+
 def test_a_score_pools_lanes_by_their_mean_square():
     nothing = np.full(2, np.nan)
     score = Score(np.array([3.0, 4.0]), nothing, nothing, nothing, np.zeros(2), 0)
@@ -376,7 +413,7 @@ def test_a_training_ends_once_it_is_far_enough_below_the_papers_law(tmp_path, sh
         below = reached["policy"]["pooled_mm"] <= (1 - settings.until / 100) * reached["paper"]["pooled_mm"]
         assert below == enough
         assert (reached["curve"][-1]["steps"] < settings.steps) == enough
-    again = train(easy, residual, tmp_path / "True", Parameters().replace({"mechanics.mass": 3.0}), resume=True)
-    assert again["curve"][-1]["steps"] < easy.steps, "resumed, it is still good enough"
+    again = train(easy, residual, tmp_path / "True", Parameters().replace({"mechanics.mass": 3.0}))
+    assert again["curve"][-1]["steps"] < easy.steps, "once more, it is still good enough"
     with pytest.raises(ValueError, match=r"until = 0\.0; allowed: above 0 and up to 100 \(%\)"):
         replace(easy, until=0.0)

@@ -1,0 +1,128 @@
+"""Accuracy of the plant: what is measured, the tables and the figure, and that the plant's step keeps its error small."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from baselines.bench import accuracy, accuracy_tables
+from baselines.bench.motions import MOTIONS, smooth, stick_slip, strong
+from baselines.figures.accuracy import accuracy_figure
+from birthsim_env.parts.randomization import documented_ranges
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.parameters import Parameters
+from tests.console import call
+
+
+def test_the_rigs_are_of_the_documented_ranges() -> None:
+    rigs, ranges = accuracy.rigs_to_measure(Parameters(), 3, 0), documented_ranges(Parameters())
+    assert list(rigs) == [
+        "nominal",
+        "quick corner",
+        "slow corner",
+        *(f"{kind} {k}" for kind in ("corner", "draw") for k in (1, 2, 3)),
+    ]
+    for name, rig in rigs.items():
+        for dotted, (low, high) in ranges.items():
+            section, _, field = dotted.partition(".")
+            value = getattr(getattr(rig, section), field)
+            assert low <= value <= high
+            if "corner" in name:
+                assert value in (low, high), "a corner has every figure at one end of its range"
+    assert rigs["quick corner"].valves.time_constant == 0.0015
+    assert rigs["slow corner"].mechanics.mass == 5.0
+    assert rigs == accuracy.rigs_to_measure(Parameters(), 3, 0)
+    assert rigs["draw 1"] != accuracy.rigs_to_measure(Parameters(), 3, 1)["draw 1"]
+
+
+@pytest.mark.parametrize(("method", "order"), accuracy.EVALUATIONS.items())
+def test_a_method_has_its_order_on_a_spool(method: str, order: int) -> None:
+    """The spools alone are a linear lag, whose solution is known: a step multiplies the rest by a piece of its series."""
+    plant = accuracy.start([Parameters()], (0.0, 0.0))
+    command, push = np.full((4, 1), 0.5), np.zeros((2, 1))
+    accuracy.METHODS[method](plant, command, push, 0.004, 0.001)
+    series = sum((-0.25) ** k / math.factorial(k) for k in range(order + 1))
+    np.testing.assert_allclose(plant.state[14:], 0.5 * (1 - series**4), rtol=1e-12)
+
+
+def test_the_plants_own_step_errs_far_less_than_a_tracker() -> None:
+    """Strong motion of the nominal and the quickest rig; a laboratory's position noise is 100 um."""
+    rigs = list(accuracy.rigs_to_measure(Parameters(), 1, 0).values())[:2]
+    course = accuracy.run_method(rigs, strong, accuracy.runge_kutta, dynamics.INTEGRATION_STEP)
+    reference = accuracy.joined(accuracy.run_reference(rig, strong)[0] for rig in rigs)
+    position, pressure = accuracy.errors(course, reference)
+    assert course.clear.all()
+    assert np.all(position < 0.5e-6), position
+    assert np.all(pressure < 5e-6), pressure
+
+
+def test_a_rig_that_meets_a_stop_is_said_and_left_out() -> None:
+    rig = Parameters().replace({"cylinder1.viscous_friction": 10.0, "cylinder2.viscous_friction": 10.0, "mechanics.mass": 5.0})
+    assert not accuracy.run_method([rig], strong, accuracy.runge_kutta, dynamics.INTEGRATION_STEP).clear[0]
+    nowhere = accuracy.errors(accuracy.run_method([rig], strong, accuracy.runge_kutta, 1e-3), accuracy.NOWHERE)
+    assert np.all(np.isinf(nowhere))
+
+
+def test_motions_stay_within_what_a_plant_takes() -> None:
+    for motion in (stick_slip, strong, smooth):
+        commands = np.array([motion(k)[0] for k in range(50)])
+        assert commands.shape == (50, 4)
+        assert np.abs(commands).max() <= 1
+
+
+@pytest.fixture(scope="module")
+def found() -> dict:
+    """A small measurement, as JSON gives it back."""
+    patch = pytest.MonkeyPatch()
+    with patch.context() as short:
+        for name, value in (("TOLERANCES", (1e-4,)), ("ADAPTIVE", ("RK45", "DOP853", "Radau")), ("LAWS", ("lugre",))):
+            short.setattr(accuracy, name, value)
+        ticks = []
+        rigs = {name: rig for name, rig in accuracy.rigs_to_measure(Parameters(), 1, 0).items() if "corner 1" not in name}
+        measured = accuracy.measure(rigs, MOTIONS, lambda: ticks.append(None))
+        assert len(ticks) == accuracy.runs(len(rigs), len(MOTIONS))
+    from baselines.files import finite
+
+    return json.loads(json.dumps(finite(measured), allow_nan=False))
+
+
+def test_a_measurement_says_everything(found: dict) -> None:
+    assert found["rigs"] == ["nominal", "quick corner", "slow corner", "draw 1"]
+    assert found["motions"]["strong"]["clear_of_stops"][2] is False, "the slow corner runs into its stop"
+    for name in MOTIONS:
+        measured = found["motions"][name]
+        rows = measured["methods"][accuracy.SHIPPED]["position_m"]
+        assert np.array(rows).shape == (5, 4)
+        falling = np.array(rows, dtype=float)[:, 0]
+        assert np.all(np.diff(falling) < 0), "smaller steps, smaller errors"
+        assert measured["reference_itself"]["position_m"] < 0.1 * falling[2]
+    observed = found["smooth"]["orders"]
+    assert observed["Euler"][0] == pytest.approx(1, abs=0.05)
+    assert observed["Heun"][0] == pytest.approx(2, abs=0.05)
+    assert observed[accuracy.SHIPPED][0] == pytest.approx(4, abs=0.25)
+
+
+def test_tables_show_the_plants_row_and_what_is_unstable(found: dict, tmp_path) -> None:
+    text = accuracy_tables.tables(found)
+    assert 'Motion "strong", 3 of 4 rigs' in text
+    assert text.count("**Runge-Kutta 4, the plant's**") == 2
+    position, pressure, rig = accuracy_tables.worst(found, "strong")
+    assert 1e-9 < position < 5e-7
+    assert 1e-9 < pressure < 5e-6
+    assert rig in found["rigs"]
+    assert rig != "slow corner"
+    assert accuracy_tables.number(None) == "unstable" == accuracy_tables.number(math.inf)
+    assert [accuracy_tables.number(v) for v in (12.3, 0.0123, 1.2e5)] == ["12", "0.012", "1.2e+05"]
+    assert {path.name for path in accuracy_figure(found, tmp_path)} == {"accuracy.png", "accuracy.svg"}
+
+
+def test_the_command_refuses_plainly(monkeypatch, capsys, tmp_path) -> None:
+    status, _, complained = call("verify", monkeypatch, capsys, "--rigs", "0", "--out", tmp_path)
+    assert status == 2
+    assert "'0'; allowed: a whole number >= 1" in complained
+    status, _, complained = call("verify", monkeypatch, capsys, "--parameters", "none.toml", "--out", tmp_path)
+    assert status == 2
+    assert "'none.toml' cannot be read" in complained

@@ -1,0 +1,208 @@
+"""``get_state`` and ``set_state``: an environment goes on from arrays as the one that they were taken from, bit for bit."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import threading
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents  # noqa: F401  registers the residual environments
+import birthsim_env
+from birthsim_env.state import give_state, take_state
+
+LANES, STEPS = 3, 40
+SCENARIOS = ("Circle", "Probe", "Descent", "Forceps", "Dystocia")
+LAWS = ("backstepping-force-first", "admittance-backstepping", "none")
+WORLDS = {
+    **{f"BirthSIM/{name}-v1 {sensors}": (f"BirthSIM/{name}-v1", {"sensors": sensors, "randomize": True})
+       for name, sensors in itertools.product(SCENARIOS, ("ideal", "lab"))},
+    **{f"hand {hand}": ("BirthSIM/Circle-v1", {"user_force": hand, "randomize": True}) for hand in ("sine", "noise", "guided")},
+    **{f"law {law} {sensors}": ("BirthSIM/CircleResidual-v1", {"law": law, "sensors": sensors, "randomize": True})
+       for law, sensors in itertools.product(LAWS, ("ideal", "lab"))},
+    "every impedance": ("BirthSIM/DystociaResidual-v1", {"impedance": "variable"}),
+    "flows": ("BirthSIM/Forceps-v1", {"action_mode": "flow", "valves": "one_valve"}),
+    "one valve": ("BirthSIM/Forceps-v1", {"valves": "one_valve"}),
+    "drawn mass": ("BirthSIM/Descent-v1", {"randomize": {"mechanics.mass": (2, 5)}}),
+}  # fmt: skip
+
+
+def actions(env, seed=0):
+    return np.random.default_rng(seed).uniform(-1, 1, (2 * STEPS, LANES, *env.single_action_space.shape)).astype(np.float32)
+
+
+def made(world, duration=0.25, **more):
+    name, arguments = WORLDS[world]
+    return gymnasium.make_vec(name, num_envs=LANES, duration=duration, autoreset_mode="SameStep", **arguments, **more)
+
+
+def saved(state):
+    """The state as a file brings it back."""
+    file = io.BytesIO()
+    np.savez(file, **state)
+    file.seek(0)
+    with np.load(file, allow_pickle=False) as content:
+        return dict(content)
+
+
+def assert_same_steps(one, other, given):
+    for action in given:
+        expected, actual = one.step(action), other.step(action)
+        for mine, its in zip(expected[:4], actual[:4], strict=True):
+            np.testing.assert_array_equal(its, mine, strict=True)
+        for name in birthsim_env.info.FIELDS:
+            np.testing.assert_array_equal(actual[4][name], expected[4][name])
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_another_environment_goes_on_to_the_bit_over_ends_of_episodes(world):
+    one, other = made(world), made(world)
+    given = actions(one)
+    one.reset(seed=5, options={"staggered": True})
+    for action in given[:STEPS]:
+        one.step(action)
+    state = one.get_state()
+    # Whatever the other one did before, and it may have stopped anywhere.
+    other.reset(seed=77)
+    for action in given[: STEPS // 3]:
+        other.step(action)
+    other.set_state(saved(state))
+    assert_same_steps(one, other, given[STEPS:])
+    # The state is a copy, and gives the same future once more.
+    other.set_state(state)
+    one.set_state(state)
+    assert_same_steps(one, other, given[:STEPS])
+
+
+@pytest.mark.parametrize("world", ["BirthSIM/Circle-v1 lab", "hand guided", "law admittance-backstepping lab"])
+def test_a_state_taken_right_after_reset_suits_one_that_has_stepped_and_one_that_was_never_reset(world):
+    one, stepped, fresh = (made(world) for _ in range(3))
+    given = actions(one)
+    one.reset(seed=2)
+    state = one.get_state()
+    stepped.reset(seed=3)
+    for action in given[:9]:
+        stepped.step(action)
+    for other in (stepped, fresh):
+        one.set_state(state)
+        other.set_state(state)
+        assert_same_steps(one, other, given[:STEPS])
+
+
+def test_lanes_that_have_ended_and_the_seeds_to_come_are_part_of_it():
+    env, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, duration=0.05, randomize=True) for _ in range(2))
+    env.reset()  # seeds of its own
+    for _ in range(5):
+        _, _, _, truncated, _ = env.step(np.zeros((2, 4), np.float32))
+    assert truncated.all()
+    other.set_state(env.get_state())
+    for _ in range(3):
+        for mine, its in zip(env.step(np.zeros((2, 4)))[:4], other.step(np.zeros((2, 4)))[:4], strict=True):
+            np.testing.assert_array_equal(its, mine)
+    np.testing.assert_array_equal(env.reset()[0], other.reset()[0])
+    assert env.np_random.integers(2**40) == other.np_random.integers(2**40)
+
+
+@pytest.mark.parametrize("arguments", [{"sensors": "lab", "randomize": True}, {"user_force": "guided"}])
+def test_the_single_environment_has_it_too(arguments):
+    one, other = (gymnasium.make("BirthSIM/CircleResidual-v1", duration=0.4, **arguments).unwrapped for _ in range(2))
+    rng = np.random.default_rng(0)
+    one.reset(seed=1)
+    for _ in range(15):
+        one.step(rng.uniform(-1, 1, one.action_space.shape))
+    other.set_state(saved(one.get_state()))
+    for _ in range(20):
+        action = rng.uniform(-1, 1, one.action_space.shape)
+        mine, its = one.step(action), other.step(action)
+        np.testing.assert_array_equal(its[0], mine[0])
+        assert its[1:4] == mine[1:4]
+
+
+class Counting(birthsim_env.UserForce):
+    """A hand in Python with a memory of every kind."""
+
+    def __init__(self):
+        self.count, self.table, self.nothing, self.words = 0, {"of": [1.5]}, None, ("a", (2, 3))
+
+    def prepare(self, num_envs):
+        self.rngs = [np.random.default_rng(k) for k in range(num_envs)]
+        self.last = np.zeros((2, num_envs))
+
+    def begin(self, lane, rng):
+        self.rngs[lane] = rng
+
+    def force(self, time, position, velocity):
+        self.count += 1
+        self.nothing = np.full(3, float(self.count))
+        self.later = self.words
+        self.last += np.array([rng.normal() for rng in self.rngs])
+        return np.broadcast_to(self.last, (len(time), *self.last.shape)) + 0.01 * self.count
+
+
+def test_a_users_own_part_keeps_its_memory():
+    one, other = (gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, duration=0.4, user_force=Counting()) for _ in range(2))
+    one.reset(seed=1)
+    for _ in range(7):
+        one.step(np.zeros((2, 4)))
+    other.set_state(saved(one.get_state()))
+    assert other.simulation.user_force.count == one.simulation.user_force.count > 0
+    assert other.simulation.user_force.later == ("a", (2, 3))
+    for _ in range(20):
+        mine, its = one.step(np.zeros((2, 4))), other.step(np.zeros((2, 4)))
+        np.testing.assert_array_equal(its[0], mine[0])
+
+
+def test_a_part_that_keeps_what_no_array_can_is_named():
+    hand = Counting()
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force=hand)
+    env.reset(seed=1)
+    hand.lock = threading.Lock()
+    with pytest.raises(ValueError, match=r"user_force\.lock is a lock; allowed in a state: numbers, text, None, arrays"):
+        env.get_state()
+
+
+def test_without_episodes_there_is_no_state():
+    for env in (gymnasium.make("BirthSIM/Circle-v1").unwrapped, gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2)):
+        with pytest.raises(RuntimeError, match=r"get_state\(\) before reset\(\): call reset\(seed=\.\.\.\) first"):
+            env.get_state()
+
+
+@pytest.mark.parametrize(
+    ("world", "lanes"), [("BirthSIM/Circle-v1 lab", 4), ("BirthSIM/Circle-v1 ideal", 3), ("hand guided", 3), ("flows", 3)]
+)
+def test_the_state_of_another_environment_is_refused_and_changes_nothing(world, lanes):
+    name, arguments = WORLDS[world]
+    stranger = gymnasium.make_vec(name, num_envs=lanes, **arguments)
+    stranger.reset(seed=0)
+    own = made("BirthSIM/Circle-v1 lab")
+    own.reset(seed=6)
+    own.step(np.zeros((LANES, 4)))
+    before = own.get_state()
+    with pytest.raises(ValueError, match=r"state is of another environment: '.*; allowed: what get_state\(\) of one made with"):
+        own.set_state(stranger.get_state())
+    after = own.get_state()
+    assert all(np.array_equal(after[name], before[name]) for name in before)
+
+
+@pytest.mark.parametrize("wrong", [{}, {"plain": np.zeros(3)}, {"plain": np.frombuffer(b"[1]", np.uint8)}, {"plain": None}])
+def test_what_is_no_state_is_refused(wrong):
+    env = made("BirthSIM/Circle-v1 ideal")
+    with pytest.raises(ValueError, match="state is of another environment: 'plain' is missing or damaged"):
+        env.set_state(wrong)
+
+
+def test_arrays_that_are_one_stay_one():
+    class Part:
+        def __init__(self):
+            self.one = self.two = np.zeros(3)
+
+    part, state = Part(), None
+    part.one[:] = 5.0
+    state = take_state({"part": part})
+    other = Part()
+    give_state({"part": other}, state)
+    assert other.one is other.two
+    np.testing.assert_array_equal(other.two, 5.0)

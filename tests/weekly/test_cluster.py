@@ -1,0 +1,78 @@
+"""Pieces on a Ray cluster of loopback: the same bytes as with joblib, failures by name, a worker that dies, a sweep."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines.bench.tasks import Task, run_tasks
+from baselines.side_by_side import side_by_side
+
+SWEEP = """
+[base]
+environment = "BirthSIM/Probe-v1"
+randomize = "scenario"
+episodes = 2
+[grid]
+controller = ["backstepping", "pid"]
+"rig.mechanics.mass" = [3.0, 4.0]
+"""
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """The address of a head with two workers, which Ray's own command has started."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    # Ray reads it when it is imported, and would take this machine's other address instead of loopback's.
+    os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
+    ray = str(Path(sys.executable).with_name("ray"))
+    start = [
+        *("start", "--head", "--node-ip-address=127.0.0.1", f"--port={port}", "--num-cpus=2", "--include-dashboard=false"),
+        *("--disable-usage-stats", f"--temp-dir={tmp_path_factory.mktemp('ray')}"),
+    ]
+    subprocess.run([ray, *start], check=True, capture_output=True)
+    yield f"ray:127.0.0.1:{port}"
+    subprocess.run([ray, "stop", "--force"], check=True, capture_output=True)
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_files_are_those_of_joblibs_processes(cluster, tmp_path):
+    tasks = [Task(f"deep/{k}", "all", json.loads, {"s": '{"a": 1}' if k != 3 else "{"}) for k in range(8)]
+    found = {name: run_tasks(tasks, tmp_path / name, 2, "work", where) for name, where in (("joblib", None), ("ray", cluster))}
+    assert found["ray"] == found["joblib"]
+    assert list(found["ray"][1]) == ["deep/3"]
+    assert files(tmp_path / "ray") == files(tmp_path / "joblib")
+    assert len(files(tmp_path / "ray")) == 7
+
+
+def test_a_sweep_has_the_same_bytes(cluster, tmp_path):
+    (tmp_path / "sweep.toml").write_text(SWEEP)
+    command = [str(Path(sys.executable).with_name("birthsim-sweep")), str(tmp_path / "sweep.toml"), "--out"]
+    for name, workers in (("joblib", ("--jobs", "2")), ("ray", ("--cluster", cluster))):
+        subprocess.run([*command, str(tmp_path / name), *workers], check=True, capture_output=True)
+    for name in ("episodes.parquet", "sweep.json", "sweep.md"):
+        assert (tmp_path / "ray" / name).read_bytes() == (tmp_path / "joblib" / name).read_bytes()
+
+
+def test_what_a_piece_raises_is_raised_here(cluster):
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(divmod, [(1, 1), (1, 0)], 2, lambda number, result: None, cluster)
+
+
+def test_a_worker_that_dies_is_an_error_that_says_so(cluster):
+    with pytest.raises(OSError, match="a worker of the cluster has died"):
+        side_by_side(os._exit, [(1,)], 2, lambda number, result: None, cluster)
+
+
+def test_where_no_cluster_answers_it_says_so():
+    with pytest.raises(ValueError, match=r"--cluster 'ray:127.0.0.1:1': no cluster answers there .*; allowed: "):
+        side_by_side(divmod, [(1, 1)], 2, lambda number, result: None, "ray:127.0.0.1:1")
