@@ -20,8 +20,8 @@ _BAR = re.compile(r"\d+%\||\[\d\d:\d\d[<,]|BirthSIM: compiling")
 """Progress bars, and the word while kernels compile."""
 
 
-_FOREIGN = ".ses"
-"""A file of fixed name and no content of ours, which onnxruntime keeps among temporary files."""
+_FOREIGN = (".ses", "torchinductor_*")
+"""What onnxruntime and PyTorch keep among temporary files, under names that stay the same."""
 
 
 def _json(path: Path) -> None:
@@ -144,5 +144,9 @@ def said(stderr: str) -> list[str]:
 
 def remains(running: Running) -> list[str]:
     """Temporary files and semaphores that the processes of an ended session have left."""
-    files = [f"TMPDIR/{path.relative_to(running.temporary)}" for path in running.temporary.rglob("*") if path.name != _FOREIGN]
+    files = [
+        f"TMPDIR/{path.relative_to(running.temporary)}"
+        for path in running.temporary.rglob("*")
+        if not any(fnmatch(part, name) for part in path.relative_to(running.temporary).parts for name in _FOREIGN)
+    ]
     return files + [path.name for path in Path("/dev/shm").glob(f"sem.loky-{running.process.pid}-*")]

@@ -16,9 +16,10 @@ class Target:
     """A command as a user runs it.
 
     ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{inputs}``, the folder of TOML files.
-    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` has patterns
-    of files, and ``costs`` keys of JSON files in its folders, that differ from run to run. With ``alone`` one process has the
-    folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is complete.
+    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` has
+    patterns of files, and ``costs`` keys of JSON files in subfolders, that differ from run to run. With ``alone`` one process
+    has the folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is
+    complete.
     """
 
     name: str

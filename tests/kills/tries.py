@@ -30,12 +30,13 @@ ROOM = 1 << 28
 """Bytes of a disk that is not full."""
 
 DISK, TWO = "disk full", "two at once"
-SCENARIOS = (*ENDINGS, DISK, TWO)
+SCENARIOS = {**dict.fromkeys(ENDINGS, 2), DISK: 1, TWO: 1}
+"""Scenario -> how often it comes, beside the others."""
 
 BETWEEN = 0.3
 """s at most between the two of Ctrl-C twice."""
 
-MOST = 3
+MOST = 5
 """Kills of a try at most, one after another in one folder, before the command may run to its end."""
 
 ATTEMPTS = 20
