@@ -1,6 +1,7 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
+# make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
 # make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds
@@ -35,7 +36,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -181,6 +182,14 @@ scratch: $(READY)
 moving: $(READY)
 	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
 	cp $(OUT)/moving/comparison.md docs/moving.md
+
+fuzz: $(READY)
+	mkdir -p $(OUT)
+	$(BIN)/python -m tests.fuzz --cases 5000 --out $(OUT)/fuzz.json
+
+# Interrupted, the same command carries on.
+soak: $(READY)
+	$(BIN)/python -m tests.soak --out $(OUT)/soak
 
 golden: $(READY)
 	$(BIN)/python -m tests.oracles.golden.make

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
@@ -10,6 +9,10 @@ import numpy as np
 
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.values import is_within, limits, shown
+
+BEYOND = 1000.0
+"""A gain may be so many times below the lowest, or above the highest, that tuning tries."""
 
 
 class Controller(Protocol):
@@ -88,10 +91,16 @@ def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
     known = controller.TUNABLE
     for name, value in gains.items():
         if name not in known:
-            raise ValueError(f"{name} = {value!r} is no gain of {type(controller).__name__}; allowed: {', '.join(known)}")
-        zero = known[name][0] == 0
-        if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
-            raise ValueError(f"{name} = {value!r}; allowed: {'zero or a positive number' if zero else 'a positive number'}")
+            raise ValueError(f"{name} = {shown(value)} is no gain of {type(controller).__name__}; allowed: {', '.join(known)}")
+        low, high = known[name]
+        least, most = low / BEYOND, high * BEYOND
+        if not is_within(value, least=least, most=most):
+            words = (
+                f"zero or a positive number{limits(most=most)}"
+                if low == 0
+                else f"a positive number{limits(least=least, most=most)}"
+            )
+            raise ValueError(f"{name} = {shown(value)}; allowed: {words}")
 
 
 def require_stiffness(reference: Reference, least: float) -> None:

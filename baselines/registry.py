@@ -19,6 +19,7 @@ from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, Sliding
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.values import problem, shown
 
 Factory = Callable[..., Controller]
 
@@ -64,7 +65,7 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
     for entry in listed.split(","):
         key, equals, value = (text.strip() for text in entry.partition("="))
         if not (equals and key.isidentifier() and value):
-            raise ValueError(f"controller = {name!r}: {entry!r}; allowed: name[gain=60,other=2]")
+            raise ValueError(f"controller = {shown(name)}: {shown(entry)}; allowed: name[gain=60,other=2]")
         try:
             options[key] = {"true": True, "false": False}[value.lower()] if value.lower() in ("true", "false") else float(value)
         except ValueError:
@@ -82,7 +83,7 @@ def _factory(name: str) -> Factory:
             return factory
     if name.rpartition(":")[0].endswith(".py"):
         return partial(_own, name, from_file("controller", name))
-    raise ValueError(f"controller = {name!r}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+    raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
 
 
 def known_options(name: str) -> list[str] | None:
@@ -109,7 +110,9 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
     for option, value in named.items():
         if known is not None and option not in known:
             allowed = ", ".join(known) or "no options"
-            raise ValueError(f"controller = {name!r}: {option} = {value!r} is unknown; allowed for {plain}: {allowed}")
+            raise ValueError(
+                f"controller = {shown(name)}: {option} = {shown(value)} is unknown; allowed for {plain}: {allowed}"
+            )
     return factory(parameters, **{**named, **options})
 
 
@@ -118,9 +121,11 @@ def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Con
     expected = "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset()"
     try:
         own = factory(parameters, **options)
-    except Exception as error:
-        raise ValueError(f"controller = {name!r} cannot be made ({type(error).__name__}: {error}); {expected}") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # it may also end Python
+        raise ValueError(f"controller = {shown(name)} cannot be made ({problem(error)}); {expected}") from error
     if not (callable(getattr(own, "command", None)) and callable(getattr(own, "reset", None))):
-        raise ValueError(f"controller = {name!r} is made without command() or reset(); {expected}")
+        raise ValueError(f"controller = {shown(name)} is made without command() or reset(); {expected}")
     made: Controller = own
     return made

@@ -7,6 +7,7 @@ import numpy as np
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.values import checked_count
 
 HELD = 0.01
 """s that a random opening is held: the default policy period."""
@@ -40,7 +41,7 @@ class RandomValves:
 
     def __init__(self, parameters: Parameters, seed: int = 0) -> None:
         self._periods = max(1, round(HELD / parameters.electronics.control_period))
-        self._seed = seed
+        self._seed = checked_count("seed", seed, 0, 2**63)
         self.reset()
 
     def command(self, measurement: Measurement, reference: Reference) -> Array:

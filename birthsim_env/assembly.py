@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,16 +16,27 @@ from birthsim_env.drawing.rendering import checked_size
 from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
+from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
 from birthsim_env.parts.randomization import checked_ranges, documented_ranges
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.values import is_within, shown
 from birthsim_env.simulation import Simulation
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
+
+LONGEST, LONGEST_PERIOD = 3600.0, 10.0
+"""s: the longest episode, and the longest time for which an action is held."""
+
+MOST_THREADS = 1024
+"""Threads of an environment."""
+
+PROTOCOL = ("size", "names", "memory_names", "every_period", "begin", "accept", "openings", "memory")
+"""What an ``Actuation`` has."""
 
 ROUNDING = 2.0**-20
 """So far beyond 1 an action still counts as 1: eight units in the last place of a single, as rounding may leave them."""
@@ -35,7 +45,7 @@ ROUNDING = 2.0**-20
 def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
     """``value`` if it is allowed, else a ``ValueError`` that lists what is."""
     if not any(value is option or (isinstance(value, str) and value == option) for option in allowed):
-        raise ValueError(f"{name} = {value!r}; allowed: {', '.join(repr(option) for option in allowed)}")
+        raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(repr(option) for option in allowed)}")
     return value
 
 
@@ -44,17 +54,19 @@ def instance_of(name: str, value: Any, kind: type, default: Any) -> Any:
     if value is None:
         return default
     if not isinstance(value, kind):
-        raise ValueError(f"{name} = {value!r}; allowed: None or a {kind.__module__}.{kind.__name__}")
+        raise ValueError(f"{name} = {shown(value)}; allowed: None or a {kind.__module__}.{kind.__name__}")
     return value
 
 
 def policy_periods(policy_period: float, parameters: Parameters) -> int:
     """Control periods in a policy period, which must be a whole number of them."""
     control = parameters.electronics.control_period
-    valid = isinstance(policy_period, (int, float)) and math.isfinite(policy_period) and policy_period > 0
-    periods = round(policy_period / control) if valid else 0
+    periods = round(policy_period / control) if is_within(policy_period, above=0.0, most=LONGEST_PERIOD) else 0
     if periods < 1 or abs(periods * control - policy_period) > 1e-9:
-        raise ValueError(f"policy_period = {policy_period!r}; allowed: a multiple of the control period {control:g} s")
+        raise ValueError(
+            f"policy_period = {shown(policy_period)}; allowed: a multiple of the control period {control:g} s up to "
+            f"{LONGEST_PERIOD:g} s"
+        )
     return periods
 
 
@@ -108,6 +120,8 @@ def assemble(
     rig = load_parameters(parameters)
     one_of("valves", valves, VALVE_LAYOUTS)
     one_of("sensors", sensors, tuple(SENSORS))
+    if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
+        raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object with {', '.join(PROTOCOL)}")
     chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
     for name, length, most in (("size", chosen.size, MOST_ACTIONS), ("memory_names", len(chosen.memory_names), MOST_SHOWN)):
         if not length <= most:
@@ -119,13 +133,15 @@ def assemble(
         ranges = checked_ranges(documented_ranges(rig), rig) if randomize in (True, "plant") else {}
         varied = randomize in (True, "scenario")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
-    if duration is not None and not (isinstance(duration, (int, float)) and math.isfinite(duration) and duration > 0):
-        raise ValueError(f"duration = {duration!r}; allowed: None or a positive number (s)")
+    if duration is not None and not is_within(duration, above=0.0, most=LONGEST):
+        raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")
+    trajectory = default_reference if reference is None else trajectory_of(reference, duration or table.duration)
+    check_drawn(trajectory, duration or table.duration, rig)
     simulation = Simulation(
         num_envs,
         rig,
         ranges,
-        default_reference if reference is None else trajectory_of(reference, duration or table.duration),
+        trajectory,
         default_force if user_force is None else hand_of(user_force, varied),
         instance_of("stiffness", stiffness, StiffnessSchedule, default_stiffness),
         sensors,
@@ -153,8 +169,8 @@ def threads_for(num_envs: int, num_threads: int | None) -> int:
     """``num_threads`` if that is a whole number of at least 1; for None, one for one lane and else all that there are."""
     if num_threads is None:
         return available_threads() if num_envs > 1 else 1
-    if isinstance(num_threads, bool) or not isinstance(num_threads, (int, np.integer)) or num_threads < 1:
-        raise ValueError(f"num_threads = {num_threads!r}; allowed: None or a whole number >= 1")
+    if isinstance(num_threads, bool) or not isinstance(num_threads, (int, np.integer)) or not 1 <= num_threads <= MOST_THREADS:
+        raise ValueError(f"num_threads = {shown(num_threads)}; allowed: None or a whole number >= 1 and <= {MOST_THREADS}")
     return int(num_threads)
 
 
@@ -173,12 +189,12 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
     """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong."""
     try:
         array = np.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"action = {actions!r}; allowed: {size} numbers in [-1, 1]") from error
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+        raise ValueError(f"action = {shown(actions)}; allowed: {size} numbers in [-1, 1]") from error
     if array.shape != (num_envs, size):
         shape = (size,) if num_envs == 1 else (num_envs, size)
-        shown = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
-        raise ValueError(f"action has shape {shown}; allowed: {shape}, in [-1, 1]")
+        given = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
+        raise ValueError(f"action has shape {given}; allowed: {shape}, in [-1, 1]")
     # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
     columns = np.array(array.T, order="C")
     extreme = np.abs(columns).max()

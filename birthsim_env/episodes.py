@@ -13,6 +13,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.seeding import lane_seeds
 from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
+from birthsim_env.physics.values import shown
 from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:
@@ -161,18 +162,20 @@ class Episodes:
 
 
 def _start(options: dict[str, Any] | None) -> Array | None:
+    if not isinstance(options, dict | None):
+        raise ValueError(f"options = {shown(options)}; allowed: None or a dict")
     unknown = set(options or {}) - {"position"}
     if unknown:
         raise ValueError(
-            f"options has {', '.join(map(repr, sorted(unknown)))}; allowed: 'position', (x, y) in m, and in vector "
+            f"options has {', '.join(sorted(map(shown, unknown)))}; allowed: 'position', (x, y) in m, and in vector "
             "environments 'staggered'"
         )
     if not options:
         return None
     try:
         position = np.asarray(options["position"], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         position = np.empty(0)
     if position.shape != (2,) or not np.isfinite(position).all():
-        raise ValueError(f"options['position'] = {options['position']!r}; allowed: (x, y), finite, in m")
+        raise ValueError(f"options['position'] = {shown(options['position'])}; allowed: (x, y), finite, in m")
     return position

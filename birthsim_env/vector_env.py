@@ -14,6 +14,8 @@ from birthsim_env.episodes import Episodes
 from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.plant import MOST_LANES
+from birthsim_env.physics.values import checked_count, shown
 from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.state import State
 
@@ -45,18 +47,18 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **arguments: Any,
     ) -> None:
-        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-            raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
-        if max_episode_steps == -1:
+        checked_count("num_envs", num_envs, 1, MOST_LANES)
+        if isinstance(max_episode_steps, int) and max_episode_steps == -1:
             max_episode_steps = None
         if max_episode_steps is not None and not (isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1):
-            raise ValueError(f"max_episode_steps = {max_episode_steps!r}; allowed: None, -1 (no limit) or a whole number >= 1")
+            given = shown(max_episode_steps)
+            raise ValueError(f"max_episode_steps = {given}; allowed: None, -1 (no limit) or a whole number >= 1")
         self.render_mode = one_of("render_mode", render_mode, (None, *RENDER_MODES))
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
+        except (ValueError, TypeError):
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
-            raise ValueError(f"autoreset_mode = {autoreset_mode!r}; allowed: {allowed}") from None
+            raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
         setup = assemble(int(num_envs), scenario, **arguments)
         frames = setup.frames_per_second
         self.metadata = {**self.metadata, "render_fps": frames, "autoreset_mode": self.autoreset_mode}
@@ -94,7 +96,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         lanes = self._mask(options.pop("reset_mask", None))
         staggered = options.pop("staggered", False)
         if not isinstance(staggered, bool):
-            raise ValueError(f"options['staggered'] = {staggered!r}; allowed: True or False")
+            raise ValueError(f"options['staggered'] = {shown(staggered)}; allowed: True or False")
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(lanes, options)
         self._ended = self._ended & ~lanes
@@ -108,9 +110,9 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         """The lanes to reset: all, or those of ``options["reset_mask"]``."""
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        lanes = np.asarray(mask)
+        lanes = np.asarray(mask if isinstance(mask, (np.ndarray, list, tuple)) else None)
         if lanes.shape != (self.num_envs,) or lanes.dtype != np.bool_ or not lanes.any():
-            raise ValueError(f"options['reset_mask'] = {mask!r}; allowed: ({self.num_envs},) of bool, at least one True")
+            raise ValueError(f"options['reset_mask'] = {shown(mask)}; allowed: ({self.num_envs},) of bool, at least one True")
         return lanes
 
     def step(self, actions: NDArray[Any]) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:

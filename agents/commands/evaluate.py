@@ -16,6 +16,7 @@ from baselines.bench.tasks import Result, run_tasks
 from baselines.commands.evaluate_all import evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import (
+    EPISODES,
     JOBS,
     RANDOMIZE,
     add_processes,
@@ -24,7 +25,7 @@ from baselines.commands.shared import (
     run,
     seed_number,
     shown_arguments,
-    whole,
+    whole_up_to,
 )
 from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import controller_names
@@ -58,7 +59,9 @@ def main() -> None:
         help="for the controller 'residual': a folder that birthsim-train wrote, of one training seed or of several, or the "
         "name of what comes with the package, such as circle (default: that of the scenario); not with --all",
     )
-    parser.add_argument("--episodes", type=whole, default=32, help="per controller, with --all per cell (default: %(default)s)")
+    parser.add_argument(
+        "--episodes", type=whole_up_to(EPISODES), default=32, help="per controller, with --all per cell (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
     parser.add_argument("--sensors", choices=("ideal", "lab"), help="default: ideal, with --all both")
     parser.add_argument(

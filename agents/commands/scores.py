@@ -16,7 +16,7 @@ from baselines.bench.evaluation import DISCOUNTS, evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
-from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole
+from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, whole_up_to
 from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import UNCONTROLLED, make_controller
 from birthsim_env.parts.sensors import SENSORS
@@ -35,7 +35,9 @@ def main() -> None:
         "policies that come with the package, with every sensor model, on the nominal rig and on rigs drawn at random.",
         epilog="What the output folder holds of the same settings and code is kept, so that an interrupted run goes on.",
     )
-    parser.add_argument("--episodes", type=whole, default=64, help="per controller and condition (default: %(default)s)")
+    parser.add_argument(
+        "--episodes", type=whole_up_to(EPISODES), default=64, help="per controller and condition (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=seed_number, default=70000, help="seed of the first episode (default: %(default)s)")
     add_processes(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for scores.json and scores.md")

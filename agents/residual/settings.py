@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from birthsim_env.physics.values import is_within, shown
+
 NO_LAW = "none"
 
 LAWS = (
@@ -41,11 +43,12 @@ class ResidualSettings:
     def __post_init__(self) -> None:
         for name, low, high in (("authority", 0.0, 500.0), ("time_constant", 0.0, 1.0), ("policy_period", 0.0, 1.0)):
             value = getattr(self, name)
-            if isinstance(value, bool) or not (isinstance(value, (int, float)) and low < value <= high):
-                raise ValueError(f"{name} = {value!r}; allowed: more than {low:g}, at most {high:g}")
+            if not is_within(value, above=low, most=high):
+                raise ValueError(f"{name} = {shown(value)}; allowed: more than {low:g}, at most {high:g}")
         for name, allowed in (("law", LAWS), ("impedance", tuple(IMPEDANCES))):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} = {getattr(self, name)!r}; allowed: {', '.join(map(repr, allowed))}")
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in allowed:
+                raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(map(repr, allowed))}")
         if self.impedance != "fixed" and self.law in ("admittance-backstepping", NO_LAW):
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
 

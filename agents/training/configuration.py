@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,8 +9,22 @@ from typing import Any, TypeVar
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.reading import read_toml
+from birthsim_env.physics.values import checked_count, checked_number, shown
 
 ALGORITHMS = ("ppo", "sac", "tqc")
+
+COUNTS = {
+    "steps": (1, 10**10), "seed": (0, 2**32 - 1), "lanes": (1, 2**16), "rollout": (1, 2**16), "batch": (2, 2**20),
+    "epochs": (1, 1000), "gradient_steps": (1, 1000), "validation_lanes": (1, 2**16), "validations": (1, 10**4),
+}  # fmt: skip
+"""Least and largest of what is counted; a batch of one has no spread to normalise its advantages by."""
+
+LAYERS, WIDEST = 8, 2048
+"""Hidden layers, and units in one."""
+
+COLLECTED = 2**22
+"""Steps of all lanes that PPO keeps between updates: some hundred floats each."""
 
 FOLDER = Path(__file__).resolve().parent.parent / "configurations"
 
@@ -54,34 +66,27 @@ class TrainingSettings:
         ):  # fmt: skip
             one_of(name, getattr(self, name), allowed)
         if not isinstance(self.environment, str):
-            raise ValueError(f"environment = {self.environment!r}; allowed: the id of a residual environment")
-        for name in ("steps", "lanes", "rollout", "batch", "epochs", "gradient_steps", "validation_lanes", "validations"):
-            if not _whole(getattr(self, name), 1):
-                raise ValueError(f"{name} = {getattr(self, name)!r}; allowed: a whole number above 0")
-        if not _whole(self.seed, 0):
-            raise ValueError(f"seed = {self.seed!r}; allowed: a whole number from 0 on")
-        for name, high in (("learning_rate", math.inf), ("discount", 1.0), ("gae_lambda", 1.0)):
-            value = getattr(self, name)
-            if not (_finite(value) and 0 < value <= high):
-                raise ValueError(f"{name} = {value!r}; allowed: a positive number{'' if high == math.inf else ' up to 1'}")
-        if not (_finite(self.until) and 0 < self.until <= 100):
-            raise ValueError(f"until = {self.until!r}; allowed: above 0 and up to 100 (%)")
-        if not _finite(self.log_std):
-            raise ValueError(f"log_std = {self.log_std!r}; allowed: a finite number")
-        if not isinstance(self.hidden, tuple) or not self.hidden or not all(_whole(width, 1) for width in self.hidden):
-            raise ValueError(f"hidden = {self.hidden!r}; allowed: whole numbers above 0")
+            raise ValueError(f"environment = {shown(self.environment)}; allowed: the id of a residual environment")
+        for name, (few, many) in COUNTS.items():
+            checked_count(name, getattr(self, name), few, many)
+        for name, unit, low, high in (
+            *((name, "-", 0.0, 1.0) for name in ("learning_rate", "discount", "gae_lambda")), ("until", "%", 0.0, 100.0),
+        ):  # fmt: skip
+            checked_number(name, getattr(self, name), unit, above=low, most=high)
+        checked_number("log_std", self.log_std, "-", least=-20.0, most=2.0)
+        widths = self.hidden if isinstance(self.hidden, tuple) else ()
+        whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
+        if not (whole and 1 <= len(widths) <= LAYERS):
+            raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
+        if self.algorithm == "ppo" and self.lanes * self.rollout > COLLECTED:
+            raise ValueError(
+                f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "
+                "between two updates"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON takes it."""
         return {**asdict(self), "hidden": list(self.hidden)}
-
-
-def _whole(value: Any, least: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= least
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def configuration_names() -> list[str]:
@@ -96,23 +101,22 @@ def load_configuration(name: str | Path) -> tuple[TrainingSettings, ResidualSett
     """
     path = FOLDER / f"{name}.toml" if str(name) in configuration_names() else Path(name)
     if not path.is_file():
-        raise ValueError(f"configuration {str(name)!r} is no file; allowed: {', '.join(configuration_names())}, or a TOML file")
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"configuration {str(path)!r} is no TOML: {error}") from error
+        raise ValueError(
+            f"configuration = {shown(str(name))} is no file; allowed: {', '.join(configuration_names())}, or a TOML file"
+        )
+    content = read_toml("configuration", path)
     for table in content:
         if table not in ("training", "residual"):
-            raise ValueError(f"configuration {str(path)!r}: table {table!r}; allowed: training, residual")
+            raise ValueError(f"configuration = {str(path)!r}: table {shown(table)}; allowed: training, residual")
         if not isinstance(content[table], dict):
-            raise ValueError(f"configuration {str(path)!r}: {table} = {content[table]!r}; allowed: a table [{table}]")
+            raise ValueError(f"configuration = {str(path)!r}: {table} = {shown(content[table])}; allowed: a table [{table}]")
     training, residual = content.get("training", {}), content.get("residual", {})
     if isinstance(training.get("hidden"), list):
         training["hidden"] = tuple(training["hidden"])
     try:
         return override(TrainingSettings(), **training), override(ResidualSettings(), **residual)
     except ValueError as error:
-        raise ValueError(f"configuration {str(path)!r}: {error}") from error
+        raise ValueError(f"configuration = {str(path)!r}: {error}") from error
 
 
 def override(settings: S, **values: Any) -> S:
@@ -120,5 +124,5 @@ def override(settings: S, **values: Any) -> S:
     known = [field.name for field in fields(settings)]
     for name in values:
         if name not in known:
-            raise ValueError(f"{name} = {values[name]!r} is unknown; allowed: {', '.join(known)}")
+            raise ValueError(f"{name[:80]} = {shown(values[name])} is unknown; allowed: {', '.join(known)}")
     return replace(settings, **values)

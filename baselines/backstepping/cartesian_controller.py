@@ -13,6 +13,7 @@ from baselines.estimation.observers import PistonObserver, measured_joints
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.values import is_within, limits, shown
 
 
 class CartesianBackstepping:
@@ -28,8 +29,8 @@ class CartesianBackstepping:
         sign_width: float = SIGN_WIDTH,
     ) -> None:
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width)):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value!r}; allowed: a positive number")
+            if not is_within(value, least=1e-6, most=1e6):
+                raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
         self.parameters = rig = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
         self._options = (pneumatic_gain, sign_width)

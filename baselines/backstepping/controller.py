@@ -35,6 +35,7 @@ from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.lanes import PARAMETERS, Array
 from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.values import is_within, limits, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -130,10 +131,10 @@ class BacksteppingController(StagedController):
     ) -> None:
         ratio = 1.0 if damping_ratio is None else damping_ratio
         for name, value in (("pneumatic_gain", pneumatic_gain), ("sign_width", sign_width), ("damping_ratio", ratio)):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value!r}; allowed: a positive number")
-        if valves not in VALVE_LAYOUTS:
-            raise ValueError(f"valves = {valves!r}; allowed: {', '.join(VALVE_LAYOUTS)}")
+            if not is_within(value, least=1e-6, most=1e6):
+                raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
+        if not isinstance(valves, str) or valves not in VALVE_LAYOUTS:
+            raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         super().__init__(parameters)

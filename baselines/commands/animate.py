@@ -14,7 +14,7 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number
+from baselines.commands.shared import RANDOMIZE, finite_number, policy_of, run, seed_number
 from baselines.files import make_folder, whole_file
 from baselines.registry import controller_names, make_controller
 from birthsim_env.drawing.rendering import PairRenderer, Scene
@@ -67,8 +67,8 @@ def main() -> None:
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)
     add_set(parser)
-    parser.add_argument("--begin", type=float, default=0.5, help="s into the episode (default: %(default)s)")
-    parser.add_argument("--end", type=float, default=6.5, help="s into the episode (default: %(default)s)")
+    parser.add_argument("--begin", type=finite_number, default=0.5, help="s into the episode (default: %(default)s)")
+    parser.add_argument("--end", type=finite_number, default=6.5, help="s into the episode (default: %(default)s)")
     parser.add_argument("--rate", type=int, default=25, choices=RATES, help="frames per second (default: %(default)s)")
     parser.add_argument("--out", type=Path, required=True, help="file to write, .webp or .gif")
     run(parser, _animate)

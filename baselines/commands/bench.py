@@ -22,7 +22,7 @@ from baselines.bench import speed
 from baselines.bench.comparison import default_controllers
 from baselines.bench.stopwatch import seconds_per_call
 from baselines.bench.twin import Twin, has_compiler
-from baselines.commands.shared import run
+from baselines.commands.shared import finite_number, run
 from baselines.files import make_folder, write_json
 from baselines.registry import make_controller
 from birthsim_env.physics import dynamics
@@ -40,7 +40,7 @@ Row = tuple[str, float, str]
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="birthsim-bench", description="Measure the speed of plant, environments and law.")
-    parser.add_argument("--seconds", type=float, default=1.0, help="time per measurement (default: %(default)s)")
+    parser.add_argument("--seconds", type=finite_number, default=1.0, help="time per measurement (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="folder for bench.json")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import signal
 import sys
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 import gymnasium
 
 from baselines.commands.start import endings
+from birthsim_env.physics.values import shown
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
@@ -67,11 +69,38 @@ def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:
     raise SystemExit(status) from None
 
 
-def whole(text: str) -> int:
-    """A whole number >= 1, for argparse."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number >= 1")
-    return int(text)
+MOST = 10**9
+"""Largest whole number that an option takes, where it has no lower limit of its own."""
+
+
+def whole_up_to(most: int) -> Callable[[str], int]:
+    """A whole number from 1 to ``most``, for argparse."""
+
+    def whole_number(text: str) -> int:
+        # Digits of other scripts are decimal too; more than 20 of any are too many.
+        if not (text.isascii() and text.isdecimal() and len(text) <= 20 and 1 <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"{shown(text)}; allowed: a whole number >= 1 and <= {most}")
+        return int(text)
+
+    return whole_number
+
+
+EPISODES, JOBS_AT_MOST = 1_000_000, 256
+"""Most episodes of an evaluation, some 2 kB each, and most processes side by side."""
+
+whole = whole_up_to(MOST)
+"""A whole number from 1 to ``MOST``, for argparse."""
+
+
+def finite_number(text: str) -> float:
+    """A finite number, for argparse."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{shown(text)}; allowed: a finite number")
+    return number
 
 
 def cluster_name(text: str) -> str:
@@ -84,8 +113,8 @@ def cluster_name(text: str) -> str:
 
 def seed_number(text: str) -> int:
     """A seed that NumPy and PyTorch take, for argparse."""
-    if not text.isdecimal() or int(text) >= 2**32:
-        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to {2**32 - 1}")
+    if not (text.isascii() and text.isdecimal() and len(text) <= 20 and int(text) < 2**32):
+        raise argparse.ArgumentTypeError(f"{shown(text)}; allowed: a whole number from 0 to {2**32 - 1}")
     return int(text)
 
 
@@ -95,7 +124,7 @@ JOBS = 2
 
 def add_processes(parser: argparse.ArgumentParser) -> None:
     """Add ``--jobs`` and ``--cluster``."""
-    parser.add_argument("--jobs", type=whole, help=f"processes side by side (default: {JOBS})")
+    parser.add_argument("--jobs", type=whole_up_to(JOBS_AT_MOST), help=f"processes side by side (default: {JOBS})")
     parser.add_argument(
         "--cluster",
         type=cluster_name,

@@ -11,7 +11,7 @@ from baselines.bench.pieces import controller_settings
 from baselines.bench.stability import MAPS, describe_map, stability_tasks
 from baselines.bench.tasks import run_tasks
 from baselines.commands.parts import add_set, with_options
-from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole
+from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole_up_to
 from baselines.files import make_folder, whole_results, write_json
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.parameters import load_parameters
@@ -31,7 +31,9 @@ def main() -> None:
     )
     parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
     parser.add_argument("--map", action="append", choices=tuple(MAPS), help="may be repeated (default: all)")
-    parser.add_argument("--points", type=whole, help="values along each axis (default: those of the map)")
+    parser.add_argument(
+        "--points", type=whole_up_to(200), help="values along each axis, at most 200 (default: those of the map)"
+    )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
     parser.add_argument("--parameters", help="TOML file of the rig as the controller believes it (default: the paper's)")
     add_set(parser)

@@ -15,7 +15,6 @@ next are drawn at random, the rest are proposed by Optuna's TPE sampler.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +28,7 @@ from baselines.bench.journal import open_journal
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import check_world, run, seed_number, whole
+from baselines.commands.shared import check_world, run, seed_number, whole_up_to
 from baselines.controller import Controller
 from baselines.files import own_folder, whole_results, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
@@ -38,6 +37,8 @@ from birthsim_env.parts.seeding import stream
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.reading import read_json
+from birthsim_env.physics.values import is_finite, is_within, problem, shown
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -49,6 +50,9 @@ WORLDS = 3_000_000
 WORST = 20.0
 """mm, assumed: the most that a lane costs, be it lost or not. It is less than ``LOST_ERROR``, so that one bad lane does not
 outweigh all others."""
+
+LANES, TRIALS = 4096, 100_000
+"""Most rigs and most trials: so many rigs take minutes and a GB a trial, and the sampler reads all trials each time."""
 
 RANDOM = 20
 """Trials before the sampler models their costs: the start and those drawn at random."""
@@ -75,15 +79,14 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
     """The gains of trial 0: those of a gains.json, or the middle of every range."""
     if path is None:
         return {name: math.sqrt(low * high) if low > 0 else high / 2 for name, (low, high) in bounds.items()}
-    try:
-        gains = json.loads(path.read_text(encoding="utf-8"))["gains"]
-        start = {name: float(gains[name]) for name in bounds}
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"--start {str(path)!r} lacks {error}; allowed: JSON with gains: {', '.join(bounds)}") from error
+    content = read_json("--start", path)
+    gains: Any = content.get("gains") if isinstance(content, dict) else None
     for name, (low, high) in bounds.items():
-        if not low <= start[name] <= high:
-            raise ValueError(f"--start {str(path)!r} has {name} = {start[name]:g}; allowed: {low:g} to {high:g}")
-    return start
+        if not isinstance(gains, dict) or name not in gains:
+            raise ValueError(f"--start {str(path)!r} lacks {name!r}; allowed: JSON with gains: {', '.join(bounds)}")
+        if not is_within(gains[name], least=low, most=high):
+            raise ValueError(f"--start {str(path)!r} has {name} = {shown(gains[name])}; allowed: {low:g} to {high:g}")
+    return {name: float(gains[name]) for name in bounds}
 
 
 def probes(rig: Parameters, lanes: int) -> StiffnessTest:
@@ -137,17 +140,22 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     path = folder / "trials.journal"
     try:
         study = optuna.create_study(storage=open_journal(path), study_name="birthsim-tune", load_if_exists=True)
-    except (ValueError, KeyError, TypeError) as error:
+        # The first run may have been killed before it came to all of them.
+        known = {**({} if complete(study) else setting), **study.user_attrs}
+        if all(known.get(key) == value for key, value in setting.items()):
+            for key, value in setting.items():
+                study.set_user_attr(key, value)
+            listed(study)
+            return study
+    except (MemoryError, OSError):
+        raise
+    except Exception as error:
+        # Damage trips Optuna in a dozen ways.
         raise ValueError(
-            f"{path} is no list of trials ({error!r}); allowed: what birthsim-tune wrote, or another --out"
+            f"{path} is no list of trials ({problem(error)}); allowed: what birthsim-tune wrote, or another --out"
         ) from error
-    # The first run may have been killed before it came to all of them.
-    known = {**({} if complete(study) else setting), **study.user_attrs}
-    for key, value in setting.items():
-        if known.get(key) != value:
-            raise ValueError(f"{path} has {key} = {known.get(key)!r}; allowed: {value!r}, or another --out")
-        study.set_user_attr(key, value)
-    return study
+    key = next(key for key, value in setting.items() if known.get(key) != value)
+    raise ValueError(f"{path} has {key} = {shown(known.get(key))}; allowed: {shown(setting[key])}, or another --out")
 
 
 def complete(study: Study) -> list[FrozenTrial]:
@@ -155,6 +163,17 @@ def complete(study: Study) -> list[FrozenTrial]:
     from optuna.trial import TrialState
 
     return study.get_trials(states=(TrialState.COMPLETE,))
+
+
+def listed(study: Study) -> list[dict[str, Any]]:
+    """The complete trials as JSON: gains, cost and its parts; ``ValueError`` for one that birthsim-tune did not write."""
+    trials = []
+    for trial in complete(study):
+        parts = trial.user_attrs.get("parts")
+        if not (isinstance(parts, dict) and all(map(is_finite, parts.values())) and is_finite(trial.value)):
+            raise ValueError(f"trial {trial.number} has no cost in parts")
+        trials.append({"gains": trial.params, "cost": trial.value, "parts": parts})
+    return trials
 
 
 def search(
@@ -190,11 +209,15 @@ def main() -> None:
         description="Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on.",
     )
     parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
-    parser.add_argument("--trials", type=whole, default=60, help="sets of gains to try (default: %(default)s)")
+    parser.add_argument(
+        "--trials", type=whole_up_to(TRIALS), default=60, help="sets of gains to try, at most 100000 (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=seed_number, default=0, help="of the search (default: %(default)s)")
     parser.add_argument("--sensors", default="both", choices=("ideal", "lab", "both"), help="default: both")
     parser.add_argument("--start", type=Path, help="a gains.json, for trial 0 (default: the middle of every range)")
-    parser.add_argument("--lanes", type=whole, default=32, help="rigs of each scenario (default: %(default)s)")
+    parser.add_argument(
+        "--lanes", type=whole_up_to(LANES), default=32, help=f"rigs of each scenario, at most {LANES} (default: %(default)s)"
+    )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)
     add_set(parser)
@@ -232,10 +255,7 @@ def _tune(arguments: argparse.Namespace) -> None:
             print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
         finally:
             bar.close()
-        trials = [
-            {"gains": trial.params, "cost": trial.value, "parts": trial.user_attrs["parts"]}
-            for trial in complete(study)[: arguments.trials]
-        ]
+        trials = listed(study)[: arguments.trials]
         first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
         place = {"trial": trials.index(best), "trials": len(trials)}
         with whole_results(folder) as results:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import math
 from collections.abc import Callable
 from functools import cache
@@ -15,12 +17,18 @@ from birthsim_env.parts.seeding import is_vectorised
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.geometry import inverse_geometry, well_inside
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import checked
 
 CHECKS = 64
 """Instants of a new episode at which its reference is checked."""
+
+DRAWN = 1024
+"""Trajectories out of those that can be drawn that are checked before any is."""
+
+SPARE = 2e-4
+"""m of each stroke, at either end, that those leave free: more than trajectories between them sag."""
 
 TOGETHER = 16384
 """Instants times lanes that are sampled in one call: few enough to stay in a processor's cache."""
@@ -48,6 +56,53 @@ def checked_start(
     if not all(_is_plain(motion(group), setpoints(group), nominal) for group in groups):
         _explain(trajectory, stiffness, lanes, num_envs, instants, rig)
     return start
+
+
+class _Grid:
+    """Stands for the streams of ``lanes`` lanes: the k-th number drawn is one of ``levels`` from low to high, by digit k."""
+
+    def __init__(self, lanes: int, levels: int) -> None:
+        self._numbers, self._levels, self.drawn = np.arange(lanes), levels, 0
+
+    def uniform(self, low: float, high: float) -> Array:
+        digit = self._numbers // self._levels**self.drawn % self._levels
+        self.drawn += 1
+        number: Array = low + (high - low) * digit / max(1, self._levels - 1)
+        return number
+
+
+def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> None:
+    """Raises ``ValueError`` where a trajectory draws its numbers, and some of them would leave the workspace of ``rig``.
+
+    Every number is tried at several values from the lowest to the highest, ``DRAWN`` trajectories in all, ``SPARE`` inside, so
+    that what lies between them is inside too. A trajectory that draws nothing is checked as its episodes begin, and so is one
+    of a user's own.
+    """
+    if not (is_vectorised(trajectory.begin) and is_vectorised(trajectory.sample)):
+        return
+    one, counted = copy.copy(trajectory), _Grid(1, 1)
+    one.prepare(1)
+    one.begin(np.zeros(1, dtype=np.intp), counted)  # type: ignore[arg-type]
+    if counted.drawn == 0:
+        return
+    levels = max(2, int(DRAWN ** (1 / counted.drawn) + 1e-9))
+    lanes = min(DRAWN, levels**counted.drawn)
+    one.prepare(lanes)
+    one.begin(np.arange(lanes), _Grid(lanes, levels))  # type: ignore[arg-type]
+    tight = copy.copy(rig)
+    for name in ("cylinder1", "cylinder2"):
+        cylinder = getattr(rig, name)
+        shorter = max(cylinder.stroke - 2 * SPARE, 0.5 * cylinder.stroke)
+        object.__setattr__(tight, name, dataclasses.replace(cylinder, stroke=shorter))
+    stiff, p = np.ones((7, lanes)), parameter_column(tight)
+    stiff[6] = 0.0
+    for instant in np.linspace(0.0, duration, CHECKS):
+        motion = one.sample(np.full(lanes, instant))
+        if not _is_plain(motion, stiff, p):
+            try:
+                inverse_geometry(motion[:2], tight)
+            except ValueError as error:
+                raise ValueError(f"reference at {instant:.3g} s, of one that can be drawn: {error}") from None
 
 
 def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:

@@ -12,12 +12,13 @@ import numpy as np
 
 from birthsim_env.loop.rows import MOTION, SEEN, TIME, WORLD
 from birthsim_env.loop.stage import Stage, block, numbers, table2, table3, table4
-from birthsim_env.parts.references import minimum_jerk
+from birthsim_env.parts.references import LONGEST, TURNED, minimum_jerk
 from birthsim_env.parts.seeding import Range, draw, put, vectorised
-from birthsim_env.parts.user_forces import AlternatingSteps, UserForce, force_block
+from birthsim_env.parts.user_forces import STRONGEST, AlternatingSteps, UserForce, force_block
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.values import checked_range, shown
 
 FADE = 0.5
 """s over which a sine and noise begin, at minimum jerk."""
@@ -69,6 +70,9 @@ class Sine(_Waves):
     """``amplitude`` N at ``frequency`` Hz along ``angle`` (rad from x)."""
 
     def __init__(self, amplitude: Range = 20.0, frequency: Range = 1.0, angle: Range = 0.0) -> None:
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_range("frequency", frequency, "Hz", least=0.0, most=FASTEST)
+        checked_range("angle", angle, "rad", least=-TURNED, most=TURNED)
         self.amplitude, self.frequency, self.angle = amplitude, frequency, angle
 
     @vectorised
@@ -85,8 +89,9 @@ class Noise(_Waves):
     waves = WAVES
 
     def __init__(self, rms: Range = 15.0, band: tuple[float, float] = (0.1, 3.0)) -> None:
-        if not 0 < band[0] < band[1]:
-            raise ValueError(f"band = {band!r}; allowed: 0 < low < high (Hz)")
+        checked_range("rms", rms, "N", least=0.0, most=STRONGEST)
+        if not isinstance(band, tuple) or checked_range("band", band, "Hz", above=0.0, most=FASTEST)[0] == band[1]:
+            raise ValueError(f"band = {shown(band)}; allowed: (low, high), 0 < low < high (Hz)")
         self.rms, self.band = rms, band
 
     @vectorised
@@ -101,6 +106,9 @@ class Noise(_Waves):
             put(own[:, 1], lane, 2 * math.pi * parts[axis])
             put(own[:, 2], lane, phases[axis])
 
+
+FASTEST = 100.0
+"""Hz: hands move at a few, and a control period is a ms."""
 
 CALM = 1.0
 """s for which the guiding hand holds still at first."""
@@ -179,6 +187,10 @@ class Guided(UserForce):
     def __init__(
         self, mass: Range = 1.0, stiffness: Range = 400.0, reach: tuple[float, float] = (0.02, 0.05), lasts: Range = 2.0
     ) -> None:
+        checked_range("mass", mass, "kg", least=0.05, most=100.0)
+        checked_range("stiffness", stiffness, "N/m", least=0.0, most=2e4)
+        checked_range("reach", reach, "m", least=0.0, most=1.0)
+        checked_range("lasts", lasts, "s", least=0.1, most=LONGEST)
         self.mass, self.stiffness, self.reach, self.lasts = mass, stiffness, reach, lasts
 
     def prepare(self, num_envs: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import inspect
+import io
 import math
 import sys
 from collections.abc import Callable
@@ -20,6 +21,11 @@ from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.user_forces import ForceProfile, UserForce
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.reading import read
+from birthsim_env.physics.values import problem, shown
+
+LARGEST_CSV = 64 * 2**20
+"""Bytes of a file of numbers; an hour at 1 kHz takes them."""
 
 GRID = 0.01
 """s between the instants at which a function of time is taken; a spline of degree 5 runs through them."""
@@ -40,15 +46,18 @@ def from_file(kind: str, text: str) -> Any:
     sys.modules[spec.name] = module  # where dataclasses look their annotations up
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[spec.name]
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a file may also end Python
+        sys.modules.pop(spec.name, None)
         line = next((frame.lineno for frame in reversed(extract_tb(error.__traceback__)) if frame.filename == str(path)), None)
         where = "" if line is None else f", line {line}"
-        problem = f"{type(error).__name__}: {error}"
-        raise ValueError(f"{kind} file {str(path)!r}{where}: {problem}; allowed: a file that Python imports") from error
+        raise ValueError(f"{kind} file {str(path)!r}{where}: {problem(error)}; allowed: a file that Python imports") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
-        raise ValueError(f"{kind} file {str(path)!r} has no {attribute!r}; allowed: a name that it defines: {', '.join(names)}")
+        raise ValueError(
+            f"{kind} file {str(path)!r} has no {attribute!r}; allowed: a name that it defines: {', '.join(names)[:400]}"
+        )
     return getattr(module, attribute)
 
 
@@ -57,23 +66,23 @@ def _numbers(kind: str, path: Path, columns: str) -> Array:
     rows: list[list[float]] = []
     expected = f"allowed: lines of {columns}, with increasing times"
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            for number, line in enumerate(csv.reader(file), start=1):
-                if not line or not "".join(line).strip() or line[0].lstrip().startswith("#"):
-                    continue
-                try:
-                    row = [float(value) for value in line]
-                except ValueError:
-                    if not rows and number == 1:
-                        continue  # the heading
-                    raise ValueError(f"{kind} {str(path)!r}, line {number}: {','.join(line)!r}; {expected}") from None
-                if len(row) != 3 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
-                    raise ValueError(f"{kind} {str(path)!r}, line {number}: {','.join(line)!r}; {expected}")
-                rows.append(row)
-    except OSError as error:
-        raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}; allowed: a CSV file") from error
+        text = read(kind, path, LARGEST_CSV).decode("utf-8-sig")
+        for number, line in enumerate(csv.reader(io.StringIO(text, newline="")), start=1):
+            if not line or not "".join(line).strip() or line[0].lstrip().startswith("#"):
+                continue
+            try:
+                row = [float(value) for value in line]
+            except ValueError:
+                if not rows and number == 1:
+                    continue  # the heading
+                row = []
+            if len(row) != 3 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
+                raise ValueError(f"{kind} = {str(path)!r}, line {number}: {shown(','.join(line))}; {expected}")
+            rows.append(row)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{kind} = {str(path)!r} is no CSV ({problem(error)}); {expected}") from error
     if len(rows) < 2:
-        raise ValueError(f"{kind} {str(path)!r} has {len(rows)} lines of numbers; {expected}, at least 2")
+        raise ValueError(f"{kind} = {str(path)!r} has {len(rows)} lines of numbers; {expected}, at least 2")
     return np.array(rows)
 
 
@@ -128,10 +137,10 @@ def _pair(kind: str, call: str, value: Any, expected: str) -> Array:
     """Two finite numbers that a user's function returned."""
     try:
         pair: Array = np.asarray(value, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         pair = np.empty(0)
     if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise ValueError(f"{kind}: {call} = {value!r}; allowed: {expected}")
+        raise ValueError(f"{kind}: {call} = {shown(value)}; allowed: {expected}")
     return pair
 
 
@@ -139,7 +148,7 @@ def _called(kind: str, call: str, function: Callable[..., Any], arguments: tuple
     try:
         value = function(*arguments)
     except Exception as error:
-        raise ValueError(f"{kind}: {call} fails ({type(error).__name__}: {error}); allowed: {expected}") from error
+        raise ValueError(f"{kind}: {call} fails ({problem(error)}); allowed: {expected}") from error
     return _pair(kind, call, value, expected)
 
 
@@ -173,7 +182,7 @@ def _made(kind: str, part: Any, expected: str) -> Any:
     try:
         return part()
     except Exception as error:
-        raise ValueError(f"{kind}: {part.__name__}() fails ({type(error).__name__}: {error}); allowed: {expected}") from error
+        raise ValueError(f"{kind}: {part.__name__}() fails ({problem(error)}); allowed: {expected}") from error
 
 
 def trajectory_of(reference: Any, duration: float) -> Trajectory:
@@ -187,13 +196,13 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
             rows = _numbers("reference", Path(reference), "time, x, y (s, m, m)")
             return Through(rows[:, 0], rows[:, 1:])
         if ".py:" not in str(reference):
-            raise ValueError(f"reference = {str(reference)!r}; allowed: {expected}")
+            raise ValueError(f"reference = {shown(str(reference))}; allowed: {expected}")
         reference = from_file("reference", str(reference))
     reference = _made("reference", reference, expected)
     if isinstance(reference, Trajectory):
         return reference
     if not callable(reference):
-        raise ValueError(f"reference = {reference!r}; allowed: None, {expected}")
+        raise ValueError(f"reference = {shown(reference)}; allowed: None, {expected}")
     times = np.linspace(0.0, duration, max(7, round(duration / GRID) + 1))
     wanted = "a function of time (s) that returns (x, y) in m"
     return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
@@ -213,11 +222,11 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
             rows = _numbers("user_force", Path(user_force), "time, Fx, Fy (s, N, N)")
             return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
         if ".py:" not in str(user_force):
-            raise ValueError(f"user_force = {str(user_force)!r}; allowed: {expected}")
+            raise ValueError(f"user_force = {shown(str(user_force))}; allowed: {expected}")
         user_force = from_file("user_force", str(user_force))
     user_force = _made("user_force", user_force, expected)
     if isinstance(user_force, UserForce):
         return user_force
     if not callable(user_force):
-        raise ValueError(f"user_force = {user_force!r}; allowed: None, {expected}")
+        raise ValueError(f"user_force = {shown(user_force)}; allowed: None, {expected}")
     return PlainHand(user_force)

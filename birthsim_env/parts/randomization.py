@@ -13,6 +13,7 @@ import numpy as np
 from birthsim_env.parts.streams import Streams
 from birthsim_env.physics.lanes import Array, parameter_columns
 from birthsim_env.physics.parameters import Parameters, field_of, least_dead_volume
+from birthsim_env.physics.values import is_finite, shown
 
 Ranges = Mapping[str, tuple[float, float]]
 
@@ -74,17 +75,15 @@ def checked_ranges(ranges: Ranges, nominal: Parameters) -> dict[str, tuple[float
     checked = {}
     for name, bounds in ranges.items():
         if not isinstance(name, str):
-            raise ValueError(f"randomize[{name!r}]; allowed: dotted names of parameters such as 'mechanics.mass'")
+            raise ValueError(f"randomize[{shown(name)}]; allowed: dotted names of parameters such as 'mechanics.mass'")
         if field_of(name).metadata["choices"]:
-            raise ValueError(f"randomize[{name!r}]: allowed: numeric parameters, {name} is a choice")
+            raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
         if name.partition(".")[0] in SHARED or name in SHARED:
-            raise ValueError(f"randomize[{name!r}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes")
-        try:
-            low, high = (float(b) for b in bounds)
-        except (TypeError, ValueError):
-            low, high = math.nan, math.nan
-        if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-            raise ValueError(f"randomize[{name!r}] = {bounds!r}; allowed: (low, high), finite and ordered")
+            raise ValueError(f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes")
+        pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and np.shape(bounds) == (2,) else (math.nan,) * 2
+        if not (is_finite(pair[0]) and is_finite(pair[1]) and pair[0] <= pair[1]):
+            raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: (low, high), finite and ordered")
+        low, high = float(pair[0]), float(pair[1])
         checked[name] = (low, high)
         nominal.replace({name: low})
         nominal.replace({name: high})

@@ -18,6 +18,16 @@ from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import helper, kernel
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.values import checked_number, checked_range, shown
+
+FARTHEST = 10.0
+"""m: coordinates and lengths up to here; rigs are smaller."""
+
+TURNED = 100.0
+"""rad: angles up to here, sixteen turns."""
+
+LONGEST, SHORTEST = 1e6, 1e-3
+"""s: times up to here, and what takes time takes no less."""
 
 
 class Trajectory:
@@ -77,8 +87,14 @@ class Circle(_Planned):
     """A circle at constant speed, starting at its rightmost point; ``period`` < 0 runs it clockwise. Metres and seconds."""
 
     def __init__(self, centre: tuple[float, float] = (0.5, 0.0), radius: Range = 0.05, period: Range = 4.0) -> None:
-        if period == 0:
-            raise ValueError("period = 0; allowed: a number other than zero (s)")
+        if not (isinstance(centre, tuple) and len(centre) == 2):
+            raise ValueError(f"centre = {shown(centre)}; allowed: (x, y) (m)")
+        for coordinate in centre:
+            checked_number("centre", coordinate, "m", least=-FARTHEST, most=FARTHEST)
+        checked_range("radius", radius, "m", least=0.0, most=FARTHEST)
+        checked_range("period", period, "s", least=-LONGEST, most=LONGEST)
+        if np.min(period) < SHORTEST and np.max(period) > -SHORTEST:
+            raise ValueError(f"period = {shown(period)}; allowed: other than zero, {SHORTEST:g} s or more either way")
         self.centre, self.radius, self.period = centre, radius, period
 
     def prepare(self, num_envs: int) -> None:
@@ -164,12 +180,17 @@ class Path(_Planned):
         begins: float = 0.0,
         ends: float = 1.0,
     ) -> None:
-        if not ends > begins:
-            raise ValueError(f"ends = {ends!r}; allowed: later than begins = {begins!r} (s)")
-        if not np.min(length) >= 0:
-            raise ValueError(f"length = {length!r}; allowed: >= 0 (m)")
-        if not np.min(radius) > 0:
-            raise ValueError(f"radius = {radius!r}; allowed: > 0 (m)")
+        if not (isinstance(start, tuple) and len(start) == 2):
+            raise ValueError(f"start = {shown(start)}; allowed: (x, y), numbers or ranges (low, high) (m)")
+        for name, coordinate in zip(("start x", "start y"), start, strict=True):
+            checked_range(name, coordinate, "m", least=-FARTHEST, most=FARTHEST)
+        checked_range("heading", heading, "rad", least=-TURNED, most=TURNED)
+        checked_range("length", length, "m", least=0.0, most=FARTHEST)
+        checked_range("radius", radius, "m", least=1e-3, most=FARTHEST)
+        checked_range("angle", angle, "rad", least=-TURNED, most=TURNED)
+        checked_number("begins", begins, "s", least=0.0, most=LONGEST)
+        if not checked_number("ends", ends, "s", least=0.0, most=LONGEST) >= begins + SHORTEST:
+            raise ValueError(f"ends = {ends!r}; allowed: {SHORTEST:g} s or more after begins = {begins!r}")
         self.start, self.heading, self.length, self.radius, self.angle = start, heading, length, radius, angle
         self.begins, self.ends = begins, ends
 
@@ -196,4 +217,6 @@ class Hold(Path):
     """Stay at a point (x, y), m."""
 
     def __init__(self, position: tuple[Range, Range] = (0.5, 0.0)) -> None:
+        if not (isinstance(position, tuple) and len(position) == 2):
+            raise ValueError(f"position = {shown(position)}; allowed: (x, y), numbers or ranges (low, high) (m)")
         super().__init__(start=position)

@@ -5,11 +5,12 @@ Episode ``e`` of a lane seeded ``s`` depends on s and e alone, never on what hap
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
+
+from birthsim_env.physics.values import checked_range, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -23,16 +24,18 @@ def stream(lane_seed: int, episode: int, name: str) -> np.random.Generator:
 
 def lane_seeds(seed: int | list[int | None] | None, num_envs: int, generator: np.random.Generator) -> list[int]:
     """One seed per lane: ``seed + i`` for an integer, the given ones for a list; missing ones come from ``generator``."""
-    if isinstance(seed, (int, np.integer)):
+    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
+        if seed < 0:
+            raise ValueError(f"seed = {shown(seed)}; allowed: None or a whole number >= 0")
         return [int(seed) + i for i in range(num_envs)]
     if seed is not None and (isinstance(seed, str) or not isinstance(seed, (Sequence, np.ndarray))):
-        raise ValueError(f"seed = {seed!r}; allowed: None, an integer, or one entry for each of {num_envs} lanes")
+        raise ValueError(f"seed = {shown(seed)}; allowed: None, an integer, or one entry for each of {num_envs} lanes")
     given: list[int | None] = [None] * num_envs if seed is None else list(seed)
     if len(given) != num_envs:
         raise ValueError(f"seed has {len(given)} entries; allowed: None, an integer, or one entry for each of {num_envs} lanes")
     for lane, s in enumerate(given):
-        if not (s is None or (isinstance(s, (int, np.integer)) and s >= 0)):
-            raise ValueError(f"seed[{lane}] = {s!r}; allowed: None or an integer >= 0")
+        if not (s is None or (isinstance(s, (int, np.integer)) and not isinstance(s, bool) and s >= 0)):
+            raise ValueError(f"seed[{lane}] = {shown(s)}; allowed: None or an integer >= 0")
     return [int(generator.integers(2**63)) if s is None else int(s) for s in given]
 
 
@@ -43,13 +46,8 @@ Range = float | tuple[float, float]
 def draw(value: Range, rng: np.random.Generator) -> float:
     """The number itself, or one drawn from its range."""
     if isinstance(value, tuple):
-        try:
-            low, high = (float(bound) for bound in value)
-        except (TypeError, ValueError):
-            low, high = math.nan, math.nan
-        if not -math.inf < low <= high < math.inf:
-            raise ValueError(f"range {value!r}; allowed: a number or (low, high), finite and ordered")
-        return rng.uniform(low, high)
+        low, high = checked_range("range", value, "SI")
+        return rng.uniform(float(low), float(high))
     return float(value)
 
 

@@ -12,10 +12,14 @@ import numpy as np
 
 from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, numbers, table3
-from birthsim_env.parts.references import minimum_jerk
+from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
 from birthsim_env.parts.seeding import Range, draw, put, vectorised
 from birthsim_env.physics.compilation import kernel
 from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.values import checked_number, checked_range, shown
+
+SOFTEST, STIFFEST = 1e-3, 1e7
+"""N/m: setpoints that can be asked for; steel rods of this size are as stiff."""
 
 
 class StiffnessSchedule:
@@ -40,17 +44,26 @@ class StiffnessSchedule:
         closed_loop_xy: Sequence[Range] | None = None,
         transition: float = 0.5,
     ) -> None:
+        for name, column in (
+            ("times", times), ("closed_loop", closed_loop), ("pneumatic1", pneumatic1), ("pneumatic2", pneumatic2),
+            ("closed_loop_y", closed_loop_y), ("closed_loop_xy", closed_loop_xy),
+        ):  # fmt: skip
+            optional = name in ("closed_loop_y", "closed_loop_xy")
+            if not (isinstance(column, (tuple, list)) or (optional and column is None)):
+                raise ValueError(f"{name} = {shown(column)}; allowed: a tuple with an entry per phase")
+        for instant in times:
+            checked_number("times", instant, "s", least=0.0, most=LONGEST)
         columns = [closed_loop, pneumatic1, pneumatic2] + ([closed_loop_y] if closed_loop_y is not None else [])
         coupled = [] if closed_loop_xy is None else [closed_loop_xy]
         if len(times) == 0 or times[0] != 0 or any(len(column) != len(times) for column in columns + coupled):
-            raise ValueError(f"times = {times!r}; allowed: starting at 0, with as many setpoints as times")
+            raise ValueError(f"times = {shown(times)}; allowed: starting at 0, with as many setpoints as times")
         if not all(sooner < later for sooner, later in pairwise(times)):
-            raise ValueError(f"times = {times!r}; allowed: increasing (s)")
+            raise ValueError(f"times = {shown(times)}; allowed: increasing (s)")
         for setpoint in (number for column in columns for number in column):
-            if not np.min(setpoint) > 0:
-                raise ValueError(f"stiffness setpoint {setpoint!r}; allowed: more than 0 (N/m)")
-        if not transition > 0:
-            raise ValueError(f"transition = {transition!r}; allowed: more than 0 (s)")
+            checked_range("stiffness setpoint", setpoint, "N/m", least=SOFTEST, most=STIFFEST)
+        for across in closed_loop_xy or ():
+            checked_range("closed_loop_xy", across, "N/m", least=-STIFFEST, most=STIFFEST)
+        checked_number("transition", transition, "s", least=SHORTEST, most=LONGEST)
         self.times, self.transition = times, transition
         self.closed_loop, self.closed_loop_y, self.closed_loop_xy = closed_loop, closed_loop_y, closed_loop_xy
         for across, x, y in zip(closed_loop_xy or (), closed_loop, closed_loop_y or closed_loop, strict=False):

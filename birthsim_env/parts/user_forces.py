@@ -13,11 +13,19 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import FORCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
+from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.parts.seeding import Range, draw, put, served, vectorised
 from birthsim_env.physics import exact
 from birthsim_env.physics.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import checked
+from birthsim_env.physics.values import checked_count, checked_number, checked_range, shown
+
+STRONGEST = 1000.0
+"""N: five times what clinicians pull; more breaks end stops within a policy step."""
+
+MOST = 100
+"""Pushes, pulls or contractions of an episode."""
 
 
 class UserForce:
@@ -103,14 +111,14 @@ def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
         columns = np.empty((len(knots), 3, lanes))
         for rows, knot in zip(columns, knots, strict=True):
             put(rows, slice(None), knot)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         columns = np.empty((0, 3, lanes))
     late = columns[1:, 0] < columns[:-1, 0]
     if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
         if lanes > 1:
             wrong = late.any(axis=0) | ~np.isfinite(columns).all(axis=(0, 1))
             knots = [tuple(knot) for knot in columns[:, :, int(wrong.argmax())].tolist()]
-        raise ValueError(f"{name} = {knots!r}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
+        raise ValueError(f"{name} = {shown(knots)}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
     return columns
 
 
@@ -118,6 +126,8 @@ class ForceProfile(UserForce):
     """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
 
     def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
+        if not (knots is None or isinstance(knots, (list, tuple))):
+            raise ValueError(f"knots = {shown(knots)}; allowed: a list of (time, Fx, Fy)")
         self._fixed = knots or [(0.0, 0.0, 0.0)]
         _checked_knots("knots", self._fixed)
 
@@ -163,6 +173,10 @@ class AlternatingSteps(ForceProfile):
 
     def __init__(self, amplitude: Range = 30.0, ramp: float = 0.1, repeat: float = 8.0, repeats: int = 2) -> None:
         super().__init__()
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_number("ramp", ramp, "s", least=0.0, most=0.3)
+        checked_number("repeat", repeat, "s", least=8.0, most=LONGEST)
+        checked_count("repeats", repeats, 0, MOST)
         self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
 
     @vectorised
@@ -187,7 +201,11 @@ class Ramp(ForceProfile):
     def __init__(self, amplitude: Range = 20.0, angle: Range | str = 0.0, begins: float = 1.0, rise: float = 1.0) -> None:
         super().__init__()
         if isinstance(angle, str) and angle != "axes":
-            raise ValueError(f"angle = {angle!r}; allowed: a number or (low, high) in rad, or 'axes'")
+            raise ValueError(f"angle = {shown(angle)}; allowed: a number or (low, high) in rad, or 'axes'")
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_range("angle", 0.0 if isinstance(angle, str) else angle, "rad", least=-TURNED, most=TURNED)
+        checked_number("begins", begins, "s", least=0.0, most=LONGEST)
+        checked_number("rise", rise, "s", least=0.0, most=LONGEST)
         self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
 
     @vectorised
@@ -214,8 +232,14 @@ class Pulls(ForceProfile):
         pause: float = 1.2,
     ) -> None:
         super().__init__()
-        if not np.min(rate) > 0:
-            raise ValueError(f"rate = {rate!r}; allowed: > 0 (N/s)")
+        if not isinstance(sizes, (tuple, list)) or len(sizes) > MOST:
+            raise ValueError(f"sizes = {shown(sizes)}; allowed: a tuple of at most {MOST} pulls (N)")
+        for size in sizes:
+            checked_range("sizes", size, "N", least=0.0, most=STRONGEST)
+        checked_range("rate", rate, "N/s", least=1.0, most=1e6)
+        checked_range("angle", angle, "rad", least=-TURNED, most=TURNED)
+        for name, value in (("begins", begins), ("hold", hold), ("release", release), ("pause", pause)):
+            checked_number(name, value, "s", least=0.0, most=LONGEST)
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 
@@ -276,9 +300,14 @@ class Contractions(ForceProfile):
         super().__init__()
         self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
         self.heading = heading
-        for name, value in (("amplitude", amplitude), ("push", push), ("heading", heading)):
-            if not isinstance(value, tuple) and not math.isfinite(value):
-                raise ValueError(f"{name} = {value!r}; allowed: a finite number, or (low, high) where it is drawn")
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_count("count", count, 1, MOST)
+        checked_number("lasts", lasts, "s", least=2 * self.GRID, most=3600.0)
+        if not (isinstance(pushes, tuple) and len(pushes) == 2):
+            raise ValueError(f"pushes = {shown(pushes)}; allowed: the least and the most pushes of a contraction")
+        checked_count("pushes, the most", pushes[1], checked_count("pushes, the least", pushes[0], 0, MOST), MOST)
+        checked_range("push", push, "1", least=0.0, most=1.0)
+        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
 
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         table = self._table(1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,8 @@ from typing import Any
 import tomli_w
 
 from birthsim_env.physics.quantities import Part, quantity
+from birthsim_env.physics.reading import read_toml
+from birthsim_env.physics.values import is_finite, shown
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
@@ -24,22 +25,22 @@ FASTEST_RATE = 7000.0
 class Geometry(Part):
     """Planar linkage of the paper's Fig. 1 and Table II; frame 0 at the pivot of cylinder 2, x forward, y up."""
 
-    d3: float = quantity(0.35, "m", "assumed", above=0)
-    d6: float = quantity(0.25, "m", "assumed", above=0)
+    d3: float = quantity(0.35, "m", "assumed", least=1e-3, most=10)
+    d6: float = quantity(0.25, "m", "assumed", least=1e-3, most=10)
     gamma3: float = quantity(math.pi / 2, "rad", "assumed", least=-math.pi, most=math.pi)
-    k1: float = quantity(0.430, "m", "assumed; r4 = y1 + k1 (2)", above=0)
-    k2: float = quantity(0.500, "m", "assumed; r2 = y2 + k2 (2)", above=0)
+    k1: float = quantity(0.430, "m", "assumed; r4 = y1 + k1 (2)", least=1e-3, most=10)
+    k2: float = quantity(0.500, "m", "assumed; r2 = y2 + k2 (2)", least=1e-3, most=10)
 
 
 @dataclass(frozen=True)
 class Cylinder(Part):
     """One double-acting, single-rod pneumatic cylinder."""
 
-    piston_diameter: float = quantity(0.025, "m", "Table I", above=0)
+    piston_diameter: float = quantity(0.025, "m", "Table I", least=1e-3, most=1)
     rod_diameter: float = quantity(0.010, "m", "Table I, from its 295 and 247 N", least=0)
-    stroke: float = quantity(0.200, "m", "Table I", above=0)
-    coulomb_friction: float = quantity(12.0, "N", "assumed, 4-5 % of the rated force", least=0, randomized=(6, 25))
-    viscous_friction: float = quantity(35.0, "N s/m", "assumed", least=0, randomized=(10, 60))
+    stroke: float = quantity(0.200, "m", "Table I", least=1e-3, most=10)
+    coulomb_friction: float = quantity(12.0, "N", "assumed, 4-5 % of the rated force", least=0, most=1e5, randomized=(6, 25))
+    viscous_friction: float = quantity(35.0, "N s/m", "assumed", least=0, most=1e5, randomized=(10, 60))
 
     def _check_together(self) -> None:
         if self.rod_diameter >= self.piston_diameter:
@@ -63,11 +64,11 @@ class Cylinder(Part):
 class Mechanics(Part):
     """The point mass at the end effector and the end stops of the cylinders."""
 
-    mass: float = quantity(3.0, "kg", "assumed", above=0, randomized=(2, 5))
-    gravity: float = quantity(9.81, "m/s2", "standard", least=0)
+    mass: float = quantity(3.0, "kg", "assumed", above=0, most=1e20, randomized=(2, 5))
+    gravity: float = quantity(9.81, "m/s2", "standard", least=0, most=100)
     stop_stiffness: float = quantity(5e6, "N/m", "assumed, rigid end caps", above=0, most=1e7)
     stop_damping: float = quantity(1.0, "s/m", "assumed; force k p (1 + c dp/dt), Hunt and Crossley 1975", least=0, most=2)
-    impact_speed: float = quantity(0.1, "m/s", "assumed; a faster collision with an end stop is reported", above=0)
+    impact_speed: float = quantity(0.1, "m/s", "assumed; a faster collision with an end stop is reported", above=0, most=100)
 
 
 @dataclass(frozen=True)
@@ -80,9 +81,9 @@ class Friction(Part):
         "LuGre (Canudas de Wit 1995), the paper's (4), or elasto-plastic without presliding drift (Dupont 2002)",
         choices=("lugre", "coulomb", "elasto_plastic"),
     )
-    static_ratio: float = quantity(1.33, "-", "assumed; Fs/Fc", least=1)
-    stribeck_speed: float = quantity(0.015, "m/s", "assumed", above=0)
-    bristle_stiffness: float = quantity(5e4, "N/m", "assumed; s0", above=0, most=5e5)
+    static_ratio: float = quantity(1.33, "-", "assumed; Fs/Fc", least=1, most=10)
+    stribeck_speed: float = quantity(0.015, "m/s", "assumed", least=1e-6, most=10)
+    bristle_stiffness: float = quantity(5e4, "N/m", "assumed; s0", least=1, most=5e5)
     bristle_damping: float = quantity(150.0, "N s/m", "assumed; s1", least=0, most=2000)
     breakaway_ratio: float = quantity(
         0.7,
@@ -91,14 +92,14 @@ class Friction(Part):
         above=0,
         most=0.9,
     )
-    sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001)
+    sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001, most=10)
 
 
 @dataclass(frozen=True)
 class Chambers(Part):
     """What all four chambers share: dead volume and heat exchange (the paper's section V)."""
 
-    dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", above=0, randomized=(5e-6, 25e-6))
+    dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", above=0, most=1000, randomized=(5e-6, 25e-6))
     wall_heat_transfer: float = quantity(
         50.0, "W/(m2 K)", "assumed; h, cools in 0.2-1 s", least=0, most=1e4, randomized=(20, 100)
     )
@@ -109,10 +110,10 @@ class Chambers(Part):
 class Valves(Part):
     """Proportional servovalve: ISO 6358 orifices behind a spool with a first-order lag."""
 
-    sonic_conductance: float = quantity(3.9e-9, "m3/(s Pa)", "from 100 l/min nominal, 6 to 5 bar; C", above=0, most=2e-8)
+    sonic_conductance: float = quantity(3.9e-9, "m3/(s Pa)", "from 100 l/min nominal, 6 to 5 bar; C", least=1e-12, most=2e-8)
     critical_ratio: float = quantity(0.30, "-", "from 100 l/min nominal, 6 to 5 bar; b", least=0, most=0.9)
     leakage_ratio: float = quantity(0.005, "-", "assumed; Cl/C", least=0, most=0.5)
-    time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, randomized=(0.0015, 0.008))
+    time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, most=10, randomized=(0.0015, 0.008))
 
 
 @dataclass(frozen=True)
@@ -120,13 +121,13 @@ class Air(Part):
     """Supply, surroundings and the gas itself; absolute pressures."""
 
     supply_pressure: float = quantity(7.0e5, "Pa", "Table I quotes 6 bar gauge", above=0, most=15e5)
-    atmospheric_pressure: float = quantity(1.013e5, "Pa", "standard", above=0, most=2e5)
+    atmospheric_pressure: float = quantity(1.013e5, "Pa", "standard", least=1e4, most=2e5)
     temperature: float = quantity(293.15, "K", "standard; supply, surroundings and walls", least=230, most=370)
-    gas_constant: float = quantity(287.05, "J/(kg K)", "standard; r of dry air", above=0)
-    heat_capacity_ratio: float = quantity(1.4, "-", "standard; gamma", above=1)
-    polytropic_index: float = quantity(1.2, "-", "assumed; k of the control model (6)", least=1)
-    reference_density: float = quantity(1.185, "kg/m3", "ISO 6358; rho0", above=0)
-    reference_temperature: float = quantity(293.15, "K", "ISO 6358; T0", above=0)
+    gas_constant: float = quantity(287.05, "J/(kg K)", "standard; r of dry air", least=10, most=1e4)
+    heat_capacity_ratio: float = quantity(1.4, "-", "standard; gamma", least=1.01, most=2)
+    polytropic_index: float = quantity(1.2, "-", "assumed; k of the control model (6)", least=1, most=2)
+    reference_density: float = quantity(1.185, "kg/m3", "ISO 6358; rho0", least=0.01, most=100)
+    reference_temperature: float = quantity(293.15, "K", "ISO 6358; T0", least=100, most=1000)
 
     def _check_together(self) -> None:
         if self.supply_pressure <= self.atmospheric_pressure:
@@ -141,10 +142,10 @@ class Electronics(Part):
     """Control board and the sensors of a laboratory (sensor model ``lab``)."""
 
     control_period: float = quantity(0.001, "s", "assumed", least=0.00025, most=0.01)
-    position_rate: float = quantity(240.0, "Hz", "trakSTAR, assumed", above=0, most=4000)
-    position_noise: float = quantity(1e-4, "m", "assumed; standard deviation per axis", least=0)
+    position_rate: float = quantity(240.0, "Hz", "trakSTAR, assumed", least=0.1, most=4000)
+    position_noise: float = quantity(1e-4, "m", "assumed; standard deviation per axis", least=0, most=1)
     position_latency: float = quantity(0.004, "s", "assumed", least=0, most=0.05)
-    pressure_noise: float = quantity(500.0, "Pa", "assumed; standard deviation per chamber", least=0)
+    pressure_noise: float = quantity(500.0, "Pa", "assumed; standard deviation per chamber", least=0, most=1e6)
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,9 @@ class Parameters:
         for field in _parts(type(self)):
             expected = type(field.default)
             if not isinstance(getattr(self, field.name), expected):
-                raise ValueError(f"{field.name} = {getattr(self, field.name)!r}; allowed: an instance of {expected.__name__}")
+                raise ValueError(
+                    f"{field.name} = {shown(getattr(self, field.name))}; allowed: an instance of {expected.__name__}"
+                )
         self._check_linkage()
         self._check_dead_volume()
         self._check_stability()
@@ -238,7 +241,9 @@ class Parameters:
         changes = {}
         for section, values in sections.items():
             if not isinstance(values, dict):
-                raise ValueError(f"{section} = {values!r}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}")
+                raise ValueError(
+                    f"{section[:80]} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
+                )
             if section != RANDOMIZE:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
         return dataclasses.replace(cls().replace(changes), ranges=_own_ranges(sections.get(RANDOMIZE, {})))
@@ -250,12 +255,10 @@ class Parameters:
     @classmethod
     def from_toml(cls, path: str | Path) -> Parameters:
         """Read a TOML file; raises ``ValueError`` naming the file and what is wrong in it."""
+        tables = read_toml("parameters", path)
         try:
-            with open(path, "rb") as file:
-                return cls.from_dict(tomllib.load(file))
-        except OSError as error:
-            raise ValueError(f"parameters = {str(path)!r} cannot be read: {error.strerror}") from error
-        except (ValueError, tomllib.TOMLDecodeError) as error:
+            return cls.from_dict(tables)
+        except ValueError as error:
             raise ValueError(f"parameters = {str(path)!r}: {error}") from error
 
 
@@ -267,12 +270,11 @@ def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
     """The table ``[randomize]`` of a file; names and limits are checked where they are drawn from."""
     found = []
     for name, bounds in table.items():
-        try:
-            low, high = (float(bound) for bound in bounds)
-        except (TypeError, ValueError):
-            raise ValueError(f'[{RANDOMIZE}] {name} = {bounds!r}; allowed: "section.field" = [low, high]') from None
+        if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
+            words = f"[{RANDOMIZE}] {name[:80]} = {shown(bounds)}"
+            raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
         field_of(name)
-        found.append((name, low, high))
+        found.append((name, float(bounds[0]), float(bounds[1])))
     return tuple(sorted(found))
 
 
@@ -315,10 +317,10 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
     """The field behind a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
     section, _, name = dotted.partition(".")
     if section not in _SECTIONS:
-        raise ValueError(f"unknown parameter section {section!r}; allowed: {', '.join(_SECTIONS)}")
+        raise ValueError(f"unknown parameter section {shown(section)}; allowed: {', '.join(_SECTIONS)}")
     fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
     if name not in fields:
-        raise ValueError(f"unknown parameter {dotted!r}; allowed in {section}: {', '.join(fields)}")
+        raise ValueError(f"unknown parameter {shown(dotted)}; allowed in {section}: {', '.join(fields)}")
     return fields[name]
 
 
@@ -330,4 +332,4 @@ def load_parameters(parameters: Parameters | str | Path | None) -> Parameters:
         return parameters
     if isinstance(parameters, (str, Path)):
         return Parameters.from_toml(parameters)
-    raise ValueError(f"parameters = {parameters!r}; allowed: None, a Parameters or the path of a TOML file")
+    raise ValueError(f"parameters = {shown(parameters)}; allowed: None, a Parameters or the path of a TOML file")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +12,21 @@ from birthsim_env.physics import dynamics, geometry
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.values import checked_count, is_within, shown
+
+MOST_LANES = 2**20
+"""Lanes side by side; a million take some gigabytes."""
+
+LONGEST = 3600.0
+"""s that ``Plant.advance`` integrates in one call."""
 
 
 def checked(name: str, value: ArrayLike, shape: tuple[int, ...], unit: str) -> Array:
     """``value`` as a contiguous float64 array of ``shape``, or a ``ValueError`` that names what is wrong with it."""
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} = {value!r}; allowed: numbers of shape {shape} ({unit})") from error
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+        raise ValueError(f"{name} = {shown(value)}; allowed: numbers of shape {shape} ({unit})") from error
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; allowed: {shape} ({unit})")
     if not np.isfinite(array).all():
@@ -39,8 +44,7 @@ class Plant:
     """
 
     def __init__(self, parameters: Parameters | str | Path | Sequence[Parameters] | None = None, num_envs: int = 1) -> None:
-        if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-            raise ValueError(f"num_envs = {num_envs!r}; allowed: a whole number >= 1")
+        checked_count("num_envs", num_envs, 1, MOST_LANES)
         several = isinstance(parameters, Sequence) and not isinstance(parameters, str)
         rigs = parameters if several else load_parameters(parameters)  # type: ignore[arg-type]
         self.num_envs = int(num_envs)
@@ -71,8 +75,8 @@ class Plant:
         (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal fraction of the duration.
         Raises ``ValueError`` for wrong shapes, values that are not finite or not allowed, and a duration that is not positive.
         """
-        if not (isinstance(duration, Real) and math.isfinite(duration) and duration > 0):
-            raise ValueError(f"duration = {duration!r}; allowed: a positive number (s)")
+        if not is_within(duration, above=0.0, most=LONGEST):
+            raise ValueError(f"duration = {shown(duration)}; allowed: a positive number, at most {LONGEST:g} (s)")
         command, forces = self._openings(opening_command), self._force_samples(user_force)
         self.advance_unchecked(command, forces, float(duration))
         return self.state

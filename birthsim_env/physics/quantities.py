@@ -6,6 +6,8 @@ import dataclasses
 import math
 from typing import Any
 
+from birthsim_env.physics.values import is_within, limits, shown
+
 
 def quantity(
     default: Any,
@@ -35,25 +37,17 @@ def _allowed(field: dataclasses.Field[Any]) -> str:
     m = field.metadata
     if m["choices"]:
         return "one of " + ", ".join(repr(choice) for choice in m["choices"])
-    limits = []
-    if m["above"] > -math.inf:
-        limits.append(f"> {m['above']:g}")
-    if m["least"] > -math.inf:
-        limits.append(f">= {m['least']:g}")
-    if m["most"] < math.inf:
-        limits.append(f"<= {m['most']:g}")
-    return "a finite number" + (" " + " and ".join(limits) if limits else "") + f" ({m['unit']})"
+    return f"a finite number{limits(m['above'], m['least'], m['most'])} ({m['unit']})"
 
 
 def _check_field(owner: str, field: dataclasses.Field[Any], value: Any) -> None:
     m = field.metadata
     if m["choices"]:
-        valid = value in m["choices"]
+        valid = isinstance(value, str) and value in m["choices"]
     else:
-        valid = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        valid = valid and value > m["above"] and m["least"] <= value <= m["most"]
+        valid = isinstance(value, (int, float)) and is_within(value, m["above"], m["least"], m["most"])
     if not valid:
-        raise ValueError(f"{owner}.{field.name} = {value!r} is impossible; allowed: {_allowed(field)}")
+        raise ValueError(f"{owner}.{field.name} = {shown(value)} is impossible; allowed: {_allowed(field)}")
 
 
 class Part:

@@ -9,6 +9,7 @@ import socket
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from birthsim_env.physics.values import shown
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ def add_address(parser: argparse.ArgumentParser, port: int) -> None:
 
 def port_number(text: str) -> int:
     """A port, for argparse."""
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r}; allowed: a whole number from 0 to 65535")
+    if not (text.isascii() and text.isdecimal() and len(text) <= 5 and int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f"{shown(text)}; allowed: a whole number from 0 to 65535")
     return int(text)
 
 

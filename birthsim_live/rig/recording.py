@@ -30,7 +30,7 @@ FORMAT = "birthsim-recording-2"
 
 SUFFIX = ".rec"
 
-LARGEST = 2**30
+LARGEST = 2**27
 """Bytes, unpacked, that a file may hold."""
 
 EVENTS = ("settings", "path", "lost")
@@ -90,9 +90,9 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
                 raise ValueError(f"the chunk at byte {begin - _HEAD.size} has another checksum")
             return
         unpack = zlib.decompressobj()
-        raw = unpack.decompress(chunk, LARGEST - claimed)
+        raw = unpack.decompress(chunk, LARGEST - claimed + 1)
         claimed += len(raw)
-        if unpack.unconsumed_tail:
+        if claimed > LARGEST:
             raise ValueError(f"it holds more than {LARGEST} bytes; allowed: up to {LARGEST}")
         said, _, rows = raw.partition(b"\n")
         yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64).reshape(-1, COLUMNS)

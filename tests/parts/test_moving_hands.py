@@ -43,7 +43,7 @@ def test_noise_has_its_size_and_nothing_outside_its_band():
 
 @pytest.mark.parametrize("band", [(0.0, 1.0), (2.0, 1.0)])
 def test_a_band_is_a_band(band):
-    with pytest.raises(ValueError, match=r"band = .*; allowed: 0 < low < high"):
+    with pytest.raises(ValueError, match=r"band = .*; allowed: .*> 0"):
         Noise(15.0, band)
 
 

@@ -126,7 +126,7 @@ number = 3
 """
 
 MISTAKES = [
-    ("reference", "nowhere.csv", r"reference '.*nowhere\.csv' cannot be read: .*; allowed: a CSV file"),
+    ("reference", "nowhere.csv", r"reference = '.*nowhere\.csv' cannot be read: .*; allowed: a file"),
     ("reference", "own.py:missing", r"has no 'missing'; allowed: a name that it defines: birthsim_env, along, "),
     (
         "reference",
@@ -136,7 +136,7 @@ MISTAKES = [
     ("reference", "own.py:number", r"reference = 3; allowed: None, a birthsim_env\.Trajectory, a function of time"),
     ("reference", "broken.py:x", r"reference file '.*broken\.py': SyntaxError: .* line 1"),
     ("reference", "plain", r"reference = '.*plain'; allowed: a birthsim_env\.Trajectory"),
-    ("reference", "bad.csv", r"reference '.*bad\.csv', line 3: '0,0\.5,0'; allowed: lines of time, x, y .*increasing times"),
+    ("reference", "bad.csv", r"reference = '.*bad\.csv', line 3: '0,0\.5,0'; allowed: lines of time, x, y .*increasing times"),
     ("reference", "words.csv", r"words\.csv', line 2: 'a,b,c'; allowed"),
     ("reference", "short.csv", r"short\.csv' has 1 lines of numbers; allowed: .*, at least 2"),
     ("user_force", "own.py:Needs", r"user_force: Needs\(\) fails \(TypeError: .*'size'\); allowed: a birthsim_env\.UserForce"),

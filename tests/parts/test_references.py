@@ -231,8 +231,8 @@ def test_a_trajectory_without_sample_says_what_is_missing():
         ({"begins": 2.0, "ends": 1.0}, ("ends = 1.0", "begins = 2.0")),
         ({"length": -0.05}, ("length = -0.05", ">= 0")),
         ({"length": (-0.05, 0.1)}, ("length = (-0.05, 0.1)", ">= 0")),
-        ({"radius": 0.0, "angle": 1.0}, ("radius = 0.0", "> 0")),
-        ({"radius": (-0.1, 0.1)}, ("radius = (-0.1, 0.1)", "> 0")),
+        ({"radius": 0.0, "angle": 1.0}, ("radius = 0.0", ">= 0.001")),
+        ({"radius": (-0.1, 0.1)}, ("radius = (-0.1, 0.1)", ">= 0.001")),
         ({"radius": (0.08, 0.06)}, ("(0.08, 0.06)", "ordered")),
     ],
 )

@@ -235,7 +235,7 @@ def test_bad_seeds_are_refused_by_name(seed):
 
 @pytest.mark.parametrize("bad", [(2.0, 1.0), (1.0, 2.0, 3.0), (0.0, float("nan")), ("a", "b")])
 def test_a_drawn_number_needs_an_ordered_pair(bad):
-    with pytest.raises(ValueError, match=r"range .* allowed: a number or \(low, high\)"):
+    with pytest.raises(ValueError, match=r"range .* allowed: a finite number or \(low, high\) of such"):
         draw(bad, np.random.default_rng(0))
     assert draw(3, np.random.default_rng(0)) == 3.0
     assert 1.0 <= draw((1.0, 2.0), np.random.default_rng(0)) <= 2.0

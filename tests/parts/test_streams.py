@@ -15,7 +15,7 @@ from birthsim_env.parts import courses
 from birthsim_env.parts.moving_hands import HANDS
 from birthsim_env.parts.randomization import draw_columns, draw_parameters
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.seeding import STREAMS, draw, stream
+from birthsim_env.parts.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.sensors import SENSORS, LabSensors
 from birthsim_env.parts.streams import Streams
 from birthsim_env.parts.user_forces import Contractions, ForceProfile, Ramp
@@ -248,10 +248,15 @@ def test_a_users_own_sensors_are_begun_lane_by_lane(monkeypatch):
 
 
 def test_knots_of_many_lanes_are_refused_by_the_first_that_is_wrong():
-    hand = Ramp(amplitude=(1.0, 2.0), rise=-0.5)
+    class Back(Ramp):
+        @vectorised
+        def knots(self, rng):
+            return [(1.0, 0.0, 0.0), (0.5, draw(self.amplitude, rng), 0.0)]
+
+    hand = Back(amplitude=(1.0, 2.0))
     hand.prepare(3)
     size = stream(11, 0, "user_force").uniform(1.0, 2.0)
-    with pytest.raises(ValueError, match=rf"Ramp\.knots\(rng\) = \[.*\(0\.5, {size!r}, 0\.0\)\]; allowed: finite"):
+    with pytest.raises(ValueError, match=rf"Back\.knots\(rng\) = \[.*\(0\.5, {size!r}, 0\.0\)\]; allowed: finite"):
         begin(hand, *new())
 
 

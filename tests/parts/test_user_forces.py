@@ -166,12 +166,12 @@ class Wrong(ForceProfile):
         (lambda: ForceProfile([(0, 1)]), ("knots = [(0, 1)]", "(time, Fx, Fy)")),
         (lambda: ForceProfile([(0, "a", 0)]), ("knots", "'a'", "(time, Fx, Fy)")),
         (Wrong, ("Wrong.knots(rng) = [(0.0, 1.0)]", "(time, Fx, Fy)")),
-        (lambda: Pulls((100.0,), rate=0.0), ("rate = 0.0", "> 0")),
-        (lambda: Pulls((100.0,), rate=(-10.0, 50.0)), ("rate = (-10.0, 50.0)", "> 0")),
+        (lambda: Pulls((100.0,), rate=0.0), ("rate = 0.0", ">= 1")),
+        (lambda: Pulls((100.0,), rate=(-10.0, 50.0)), ("rate = (-10.0, 50.0)", ">= 1")),
         (lambda: Ramp(angle="along x"), ("angle = 'along x'", "'axes'")),
-        (lambda: Ramp(rise=-0.5), ("Ramp.knots(rng)", "increasing times")),
-        (lambda: AlternatingSteps(ramp=1.5), ("AlternatingSteps.knots(rng)", "increasing times")),
-        (lambda: Ramp(amplitude=(40.0, 5.0)), ("range (40.0, 5.0)", "ordered")),
+        (lambda: Ramp(rise=-0.5), ("rise = -0.5", ">= 0")),
+        (lambda: AlternatingSteps(ramp=1.5), ("ramp = 1.5", "<= 0.3")),
+        (lambda: Ramp(amplitude=(40.0, 5.0)), ("amplitude = (40.0, 5.0)", "ordered")),
     ],
 )
 def test_impossible_profiles_are_refused_by_name(make, words):

@@ -81,8 +81,8 @@ def test_what_is_no_number_is_refused_by_the_name_of_every_field(value: Any) -> 
 
 
 IMPOSSIBLE = [
-    ("mechanics.mass", 0, "Mechanics.mass = 0 is impossible; allowed: a finite number > 0 (kg)"),
-    ("mechanics.gravity", -9.81, "Mechanics.gravity = -9.81 is impossible; allowed: a finite number >= 0 (m/s2)"),
+    ("mechanics.mass", 0, "Mechanics.mass = 0 is impossible; allowed: a finite number > 0 and <= 1e+20 (kg)"),
+    ("mechanics.gravity", -9.81, "Mechanics.gravity = -9.81 is impossible; allowed: a finite number >= 0 and <= 100 (m/s2)"),
     ("cylinder1.stroke", -0.2, "Cylinder.stroke = -0.2"),
     ("cylinder2.rod_diameter", 0.025, "Cylinder.rod_diameter = 0.025 is impossible; allowed: less than piston_diameter"),
     ("friction.law", "viscous", "Friction.law = 'viscous' is impossible; allowed: one of 'lugre', 'coulomb', 'elasto_plastic'"),

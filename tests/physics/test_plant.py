@@ -86,7 +86,7 @@ REFUSALS: dict[str, tuple[Any, Any, Any, str]] = {
     "force of no samples": (OK, np.zeros((0, 2, 2)), 0.01, r"user_force has shape \(0, 2, 2\); allowed: \(2, 2\)"),
     "force of four axes": (OK, np.zeros((2, 3, 2, 2)), 0.01, r"user_force has shape \(2, 3, 2, 2\); allowed: \(2, 2\)"),
     "force ragged": (OK, [[1, 2], [3]], 0.01, r"user_force = \[\[1, 2\], \[3\]\]; allowed: numbers of shape \(2, 2\)"),
-    "duration nan": (OK, NONE, math.nan, r"duration = nan; allowed: a positive number \(s\)"),
+    "duration nan": (OK, NONE, math.nan, r"duration = nan; allowed: a positive number, at most 3600 \(s\)"),
     "duration zero": (OK, NONE, 0, r"duration = 0; allowed: a positive number"),
     "duration negative": (OK, NONE, -0.01, r"duration = -0\.01; allowed: a positive number"),
     "duration text": (OK, NONE, "long", r"duration = 'long'; allowed: a positive number"),

@@ -1,4 +1,4 @@
-"""``python -m baselines.bench.pools [--cluster ray:ADDRESS]``: what it costs to have pieces computed by other processes."""
+"""``python -m baselines.commands.pools [--cluster ray:ADDRESS]``: what it costs to have pieces computed by other processes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def seconds(jobs: int, cluster: str | None, lasts: float, pieces: int = PIECES) 
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(prog="python -m baselines.bench.pools", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m baselines.commands.pools", description=__doc__)
     parser.add_argument("--cluster", type=cluster_name, metavar="ray[:ADDRESS]", help="measured beside joblib's processes")
     run(parser, _measure)
 

@@ -1,0 +1,79 @@
+"""Values that a user gives: their words in errors, and the checks that many arguments share."""
+
+from __future__ import annotations
+
+import math
+import sys
+from numbers import Integral, Real
+from typing import Any
+
+LONGEST = 80
+"""Characters of a value in an error; a longer one is cut."""
+
+HUGE = 10**LONGEST
+"""A whole number from here on is told by its digits: Python refuses to write the longest."""
+
+
+def shown(value: Any) -> str:
+    """``value`` as Python writes it, in one line of at most ``LONGEST`` characters, whatever it is."""
+    if isinstance(value, int) and not -HUGE < value < HUGE:
+        return f"a whole number of {round(value.bit_length() * math.log10(2))} digits"
+    try:
+        text = repr(value)
+    except Exception as error:
+        return f"{type(value).__name__} ({type(error).__name__})"
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
+
+
+def problem(error: BaseException) -> str:
+    """What an error of a user's own code says: its type and its words, in one line of at most 200 characters."""
+    try:
+        words = " ".join(str(error).split())
+    except Exception:
+        words = "without words"
+    text = f"{type(error).__name__}: {words}"
+    return text if len(text) <= 200 else f"{text[:196]} ..."
+
+
+def is_finite(value: Any) -> bool:
+    """Whether ``value`` is a real number that a float can hold."""
+    # Comparisons of whole numbers and floats are exact; a conversion of a long one would be an OverflowError.
+    real = isinstance(value, Real) and not isinstance(value, bool)
+    return real and bool(-sys.float_info.max <= value <= sys.float_info.max)
+
+
+def limits(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> str:
+    """Limits in words, with a space before them: `` > 0 and <= 5``."""
+    words = [f"> {above:g}"] if above > -math.inf else []
+    words += [f">= {least:g}"] if least > -math.inf else []
+    words += [f"<= {most:g}"] if most < math.inf else []
+    return " " + " and ".join(words) if words else ""
+
+
+def is_within(value: Any, above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> bool:
+    """Whether ``value`` is a finite number within limits."""
+    return is_finite(value) and value > above and least <= value <= most
+
+
+def checked_number(name: str, value: Any, unit: str, **bounds: float) -> Any:
+    """``value`` if it is a finite number within ``bounds`` (``above``, ``least``, ``most``), else ``ValueError``."""
+    if not is_within(value, **bounds):
+        raise ValueError(f"{name} = {shown(value)}; allowed: a finite number{limits(**bounds)} ({unit})")
+    return value
+
+
+def checked_range(name: str, value: Any, unit: str, **bounds: float) -> Any:
+    """``value`` if it is a finite number or (low, high), ordered, within ``bounds``, else ``ValueError``."""
+    pair = value if isinstance(value, tuple) else (value, value)
+    if not (len(pair) == 2 and all(is_within(bound, **bounds) for bound in pair) and pair[0] <= pair[1]):
+        words = f"a finite number{limits(**bounds)} or (low, high) of such, ordered"
+        raise ValueError(f"{name} = {shown(value)}; allowed: {words} ({unit})")
+    return value
+
+
+def checked_count(name: str, value: Any, least: int, most: int) -> int:
+    """``value`` if it is a whole number within limits, else ``ValueError``."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise ValueError(f"{name} = {shown(value)}; allowed: a whole number >= {least} and <= {most}")
+    return int(value)

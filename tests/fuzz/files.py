@@ -1,0 +1,290 @@
+"""Kinds of files: each is written by the project, altered or damaged, and read again."""
+
+from __future__ import annotations
+
+import json
+import struct
+import tomllib
+import zlib
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from tests.fuzz.harness import Case, Kind
+from tests.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, toml_bytes
+
+STEPS = 12
+
+
+def written(case: Case, path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    case.names, case.shown = (path.name,), repr(content[:600])
+    return path
+
+
+def run_a_little(rig: Any, rng: Rng, **arguments: Any) -> None:
+    """A few steps of a rig that was accepted: no state is anything but finite behind an observation that is."""
+    env: Any = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, parameters=rig, **arguments)
+    env.reset(seed=int(rng.integers(2**31)))
+    for _ in range(STEPS):
+        observation, reward, terminated, *_ = env.step(rng.uniform(-1, 1, (2, 4)))
+        if not (np.isfinite(observation).all() and np.isfinite(reward).all()):
+            raise FloatingPointError("an observation or reward is not finite")
+        if not np.isfinite(env.unwrapped.simulation.plant.state[:, ~terminated]).all():
+            raise FloatingPointError("a state is not finite")
+        if terminated.any():
+            break
+
+
+def _rig_files(_: Path) -> list[dict[str, Any]]:
+    from birthsim_env.physics.parameters import Parameters
+    from tests.odd_rigs import odd_rig
+
+    rig = Parameters()
+    run_a_little(rig, np.random.default_rng(0), randomize="plant", policy_period=0.01)
+    for law in ("coulomb", "elasto_plastic"):
+        run_a_little(rig.replace({"friction.law": law}), np.random.default_rng(0))
+    ranges = {"randomize": {"mechanics.mass": [2.0, 5.0], "cylinder1.coulomb_friction": [6.0, 25.0]}}
+    return [rig.to_dict(), {"mechanics": {"mass": 9.0}, "cylinder1": {"stroke": 0.3}, **ranges}, *map(odd_rig, range(4))]
+
+
+def _rig(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Case) -> None:
+    from birthsim_env.physics.parameters import Parameters
+
+    path = written(case, folder / "our_rig.toml", toml_bytes(rng, files[rng.integers(len(files))]))
+    rig = Parameters.from_toml(path)
+    case.names = ()
+    period = rig.electronics.control_period
+    run_a_little(rig, rng, policy_period=period * max(1, round(0.01 / period)), randomize=bool(rng.integers(2)) and "plant")
+
+
+def _configurations(_: Path) -> list[dict[str, Any]]:
+    from agents.training.configuration import FOLDER, load_configuration
+
+    load_configuration("circle")
+    return [tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.toml"))]
+
+
+def _configuration(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Case) -> None:
+    from agents.training.configuration import load_configuration
+
+    load_configuration(written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
+
+
+def _policies(_: Path) -> Path:
+    import agents
+    from agents.policy.seeds import SHIPPED, policy_folders
+
+    assert agents
+    folder = policy_folders(SHIPPED / "circle")[0]
+    _policy(folder, np.random.default_rng(0), folder.parent, Case(), unharmed=True)
+    return folder
+
+
+def _resealed(rng: Rng, content: bytes) -> bytes:
+    """A safetensors file with another header, in half of all cases of the length that it says."""
+    size = int.from_bytes(content[:8], "little")
+    tree = json.loads(content[8 : 8 + size])
+    if "__metadata__" in tree and rng.random() < 0.5:
+        # Metadata are texts, which may be JSON by themselves.
+        texts = tree["__metadata__"]
+        name = sorted(texts)[rng.integers(len(texts))]
+        texts[name] = json_bytes(rng, json.loads(texts[name])).decode("utf-8", "replace") if texts[name][:1] in '{["' else "x"
+        header = json.dumps(tree).encode()
+    else:
+        header = json_bytes(rng, tree)
+    length = len(header) if rng.random() < 0.8 else (0, 1, 2**63, 2**64 - 1, len(header) + 1)[rng.integers(5)]
+    return length.to_bytes(8, "little") + header + content[8 + size :]
+
+
+def _policy(valid: Path, rng: Rng, folder: Path, case: Case, unharmed: bool = False) -> None:
+    import hashlib
+
+    from agents.policy.files import load_policy
+
+    if unharmed:
+        load_policy(valid)
+        return
+    place = folder / "our_policy"
+    place.mkdir()
+    for file in valid.iterdir():
+        (place / file.name).write_bytes(file.read_bytes())
+    weights, configuration = place / "policy.safetensors", place / "policy.json"
+    chosen = configuration if configuration.is_file() and rng.random() < 0.5 else weights
+    content = chosen.read_bytes()
+    if chosen == configuration:
+        changed = json_bytes(rng, json.loads(content))
+    else:
+        changed = _resealed(rng, content) if rng.random() < 0.6 else damaged(rng, content)
+    written(case, chosen, changed)
+    if configuration.is_file() and chosen == weights and rng.random() < 0.7:
+        said = json.loads(configuration.read_text(encoding="utf-8"))
+        configuration.write_text(json.dumps({**said, "sha256": hashlib.sha256(changed).hexdigest()}), encoding="utf-8")
+    case.names = ("our_policy", "policy")
+    network = load_policy(place).network
+    assert np.isfinite(network.mean).all()
+
+
+def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarray[Any, Any], bytes]:
+    from birthsim_env.physics.parameters import Parameters
+    from birthsim_live.rig.frames import FIELDS
+    from birthsim_live.rig.recorder import EVERY, Recorder
+    from birthsim_live.rig.recording import FORMAT, load_recording
+    from birthsim_live.rig.session import Session
+
+    session, path = Session(Parameters()), folder / "one.rec"
+    session.recorder = Recorder(session, path)
+    session.advance(40 * EVERY)
+    session.recorder.finish()
+    whole = load_recording(path)
+    header = {"format": FORMAT, "birthsim": "0", "rig": whole.rig.to_dict(), "columns": list(FIELDS), "interval": 0.004}
+    return header, {"events": whole.events}, whole.rows, path.read_bytes()
+
+
+def _rows(rng: Rng, rows: np.ndarray[Any, Any]) -> bytes:
+    match int(rng.integers(6)):
+        case 0:
+            return rows[: int(rng.integers(3))].tobytes()
+        case 1:
+            return rows.astype(rng.choice(["f4", ">f8", "i8", "c16", "U8"])).tobytes()
+        case 2:
+            return rows[:, : int(rng.integers(5))].tobytes()
+        case 3:
+            damage = rows.copy()
+            damage.flat[rng.integers(damage.size, size=9)] = rng.choice([np.nan, np.inf, -1e308, 1e30, 0.0], size=9)
+            return damage.tobytes()
+        case _:
+            return rows.tobytes()
+
+
+def _said(rng: Rng, said: dict[str, Any]) -> bytes:
+    return json_bytes(rng, said) if rng.random() < 0.6 else json.dumps(said).encode()
+
+
+def _chunk(content: bytes, digest: int = 0) -> bytes:
+    content = zlib.compress(content)
+    return struct.pack("<II", len(content), zlib.crc32(content) ^ digest) + content
+
+
+def _recording(valid: tuple[Any, Any, Any, bytes], rng: Rng, folder: Path, case: Case) -> None:
+    from birthsim_live.rig.player import Player
+    from birthsim_live.rig.recording import load_recording
+
+    header, events, rows, content = valid
+    if rng.random() < 0.35:
+        content = damaged(rng, content)
+    else:
+        chunks = [_chunk(_said(rng, header) + b"\n"), _chunk(_said(rng, events) + b"\n" + _rows(rng, rows))]
+        match int(rng.integers(10)):
+            case 0:
+                chunks.append(_chunk(bytes(200 * 2**20)))
+            case 1:
+                chunks[int(rng.integers(2))] = _chunk(b"{}\n", digest=1)
+            case 2:
+                chunks.reverse()
+            case 3:
+                chunks.append(struct.pack("<II", 2**32 - 1, 0))
+        content = b"".join(chunks)
+    player = Player(load_recording(written(case, folder / "ours.rec", content)))
+    case.names = ()
+    for _ in range(3):
+        json.dumps(player.frame())
+        player.seek(float(rng.uniform(0, player.recording.duration)))
+        player.event("settings"), player.event("path")
+
+
+def loaded(_: Path) -> None:
+    """What the readers of small files need, before memory is limited."""
+    import baselines.bench.tasks
+    import baselines.commands.tune
+    from baselines.registry import make_controller
+    from birthsim_env.parts.own_parts import trajectory_of
+    from birthsim_env.physics.parameters import Parameters
+
+    make_controller("pid", Parameters())
+    trajectory_of(lambda time: (0.5, 0.0), 1.0).sample(np.zeros(2))
+    baselines.bench.tasks.code_stamp()
+
+
+def _tasks(folder: Path) -> dict[str, Any]:
+    """A complete piece as it is written."""
+    loaded(folder)
+    _run(folder)
+    (path,) = folder.glob("piece-*.json")
+    piece: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return {"file": path.name, "piece": piece}
+
+
+def _run(folder: Path) -> None:
+    from baselines.bench.tasks import Task, run_tasks
+
+    results, failures = run_tasks([Task("piece", "pieces", _worked, {"seed": 1})], folder, 1, "pieces")
+    assert not failures
+    assert results == {"piece": {"mean": 1.0, "values": [1.0]}}
+
+
+def _task(valid: dict[str, Any], rng: Rng, folder: Path, case: Case) -> None:
+    written(case, folder / valid["file"], json_bytes(rng, valid["piece"]))
+    _run(folder)
+
+
+def _worked(seed: int) -> dict[str, Any]:
+    return {"mean": 1.0, "values": [float(seed)]}
+
+
+def _gains(_: Any, rng: Rng, folder: Path, case: Case) -> None:
+    from baselines.commands.tune import start_of
+
+    content = {"gains": {"bandwidth": 60.0, "friction_fraction": 0.5}, "cost": 1.0, "parts": {}}
+    bounds = {"bandwidth": (10.0, 90.0), "friction_fraction": (0.0, 1.0)}
+    start = start_of(written(case, folder / "gains.json", json_bytes(rng, content)), bounds)
+    assert all(np.isfinite(value) for value in start.values())
+
+
+def _journals(folder: Path) -> bytes:
+    from baselines.commands.tune import open_study
+
+    (folder / "study").mkdir()
+    study = open_study(folder / "study", {"seed": 1})
+    for value in (2.0, 1.0):
+        trial = study.ask()
+        trial.suggest_float("bandwidth", 1.0, 9.0)
+        trial.set_user_attr("parts", {"circle, ideal": value})
+        study.tell(trial, value)
+    return (folder / "study" / "trials.journal").read_bytes()
+
+
+def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
+    from baselines.commands.tune import listed, open_study
+
+    lines = valid.splitlines(keepends=True)
+    whole = set(lines)
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(lines)))
+        match int(rng.integers(5)):
+            case 0:
+                del lines[at]
+            case 1:
+                lines.insert(at, lines[rng.integers(len(lines))])
+            case 2:
+                lines[at] = damaged(rng, lines[at])
+            case _:
+                tree = altered(rng, json.loads(lines[at])) if lines[at] in whole else NUMBERS[0]
+                lines[at] = json.dumps(tree, default=str).encode() + b"\n"
+        lines = lines or [b"\n"]
+    (folder / "study").mkdir()
+    written(case, folder / "study" / "trials.journal", b"".join(lines))
+    listed(open_study(folder / "study", {"seed": 1}))
+
+
+FILES: dict[str, Kind] = {
+    "rig": Kind(_rig_files, _rig),
+    "configuration": Kind(_configurations, _configuration),
+    "policy": Kind(_policies, _policy),
+    "recording": Kind(_recordings, _recording),
+    "task": Kind(_tasks, _task),
+    "gains": Kind(loaded, _gains),
+    "journal": Kind(_journals, _journal),
+}

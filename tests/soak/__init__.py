@@ -1,0 +1,1 @@
+"""A long run through all scenarios, laws and corners of the ranges."""

@@ -1,0 +1,141 @@
+"""A soak: 10^8 policy steps over all scenarios, laws, sensors and corners of the ranges.
+
+    python -m tests.soak --steps 100000000
+
+Every lap is written as it ends; interrupted (Ctrl-C), the same command carries on. It exits with 1 where an observation,
+reward or state was not finite or outside its space, or where memory grew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+
+import numpy as np
+from tqdm import tqdm
+
+from baselines.bench.tasks import code_stamp
+from baselines.files import make_folder, write_json, write_text
+from tests.soak.laps import LANES, STEPS, run
+
+GROWTH = 30.0
+"""MB by which the second half of a soak may need more than the second tenth; what is loaded once is loaded by then."""
+
+Laps = list[dict[str, Any]]
+
+
+def stored(path: Path, setting: dict[str, Any]) -> Laps:
+    """The laps of an interrupted soak; ``ValueError`` where the file is of another."""
+    if not path.is_file():
+        path.write_text(json.dumps(setting) + "\n", encoding="utf-8")
+        return []
+    head, *lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    if json.loads(head) != setting:
+        raise ValueError(f"{path} is of other code or another seed; allowed: another --out")
+    # A kill leaves half a line at the end.
+    whole = [line for line in lines if line.endswith("\n")]
+    if len(whole) < len(lines):
+        write_text(path, head + "".join(whole))
+    return [json.loads(line) for line in whole]
+
+
+def growth(laps: Laps) -> float:
+    """MB between the second tenth of the laps and their second half, medians; 0 where they are few."""
+    memory = [lap["rss"] for lap in laps]
+    count = len(memory)
+    return float(np.median(memory[count // 2 :]) - np.median(memory[count // 10 : count // 5])) if count >= 20 else 0.0
+
+
+def table(laps: Laps) -> str:
+    """Markdown: steps, episodes and faults by scenario and by what controls."""
+    lines = ["| | policy steps | episodes ended by the rig | by the clock | faults |", "|---|---|---|---|---|"]
+    for key in ("scenario", "control"):
+        groups: dict[str, Laps] = defaultdict(list)
+        for lap in laps:
+            groups[lap[key]].append(lap)
+        for name, own in sorted(groups.items()):
+            sums = [sum(lap[column] for lap in own) for column in ("steps", "terminated", "truncated")]
+            lines.append(
+                f"| {name} | {' | '.join(f'{number:,}' for number in sums)} | {sum(len(lap['faults']) for lap in own)} |"
+            )
+    return "\n".join(lines)
+
+
+def report(laps: Laps, setting: dict[str, Any]) -> str:
+    """What a soak has found, Markdown."""
+    steps, seconds = sum(lap["steps"] for lap in laps), sum(lap["seconds"] for lap in laps)
+    memory = [lap["rss"] for lap in laps]
+    tenths = ", ".join(f"{np.median(part):.0f}" for part in np.array_split(memory, min(10, len(memory))))
+    return "\n".join(
+        [
+            "# Soak",
+            "",
+            f"`make soak`: {steps:,} policy steps in {len(laps)} laps of {LANES} lanes, {seconds / 3600:.1f} h on one thread "
+            f"({steps / seconds:,.0f} steps/s), {platform.machine()}. Each lap is a world of its own: a corner of the ranges "
+            "of domain randomisation or rigs drawn from them, one of three friction laws, either kind of sensors, one of the "
+            "hands; random openings or flows, residuals with random actions on every law, or a rival.",
+            "",
+            "Checked at every step: observations finite and inside their space, rewards finite and from 0 to 1, states and "
+            "`info` finite.",
+            "",
+            table(laps),
+            "",
+            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Memory, median MB of each tenth: {tenths}; growth from the "
+            f"second tenth to the second half {growth(laps):.1f} MB.",
+            "",
+            f"Seed {setting['seed']}, BirthSIM {setting['code']['version']}, sources {setting['code']['sources'][:12]}.",
+            "",
+        ]
+    )
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=10**8, help="policy steps (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder for laps.jsonl, soak.md and soak.json")
+    arguments = parser.parse_args()
+    setting = {"seed": arguments.seed, "lanes": LANES, "steps": STEPS, "code": code_stamp()}
+    journal = make_folder(arguments.out) / "laps.jsonl"
+    try:
+        laps = stored(journal, setting)
+    except ValueError as error:
+        parser.error(str(error))
+    wanted = -(-arguments.steps // (LANES * STEPS))
+    done = sum(lap["steps"] for lap in laps)
+    try:
+        with (
+            tqdm(total=wanted * LANES * STEPS, initial=done, unit=" steps", unit_scale=True) as bar,
+            journal.open("a", encoding="utf-8") as file,
+        ):
+            for number in range(len(laps), wanted):
+                lap = run(number, arguments.seed, progress=bar.update).to_dict()
+                file.write(json.dumps(lap) + "\n")
+                file.flush()
+                laps.append(lap)
+                bar.n = sum(one["steps"] for one in laps)
+                for fault in lap["faults"]:
+                    bar.write(f"lap {number}, {lap['scenario']}, {lap['control']}: {fault}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print(f"interrupted: {len(laps)} of {wanted} laps are kept; the same command carries on", file=sys.stderr)
+    if not laps:
+        return
+    text = report(laps, setting)
+    write_text(arguments.out / "soak.md", text)
+    write_json(arguments.out / "soak.json", {**setting, "laps": laps})
+    print(text)
+    if growth(laps) > GROWTH or any(lap["faults"] for lap in laps):
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
