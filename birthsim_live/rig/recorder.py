@@ -46,6 +46,7 @@ class Recorder:
         self._paths, self._periods, self._count, self._length = -1, 0, 0, 0
         self._notes, self._disk = threading.Lock(), threading.Lock()
         self._file: FileIO | None = None
+        self._first = b""
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._write_on, name="birthsim-live recorder", daemon=True)
         self.take(session)
@@ -79,7 +80,10 @@ class Recorder:
             self._events.append({"row": self._count, kind: value})
 
     def open(self) -> None:
-        """Make the file, with the first rows in it, and go on writing; ``OSError`` where that fails or the name is taken."""
+        """Make the file, with the first rows in it, and go on writing; ``OSError`` where that fails.
+
+        ``FileExistsError`` says that the name is taken; with another ``path`` it may be tried again.
+        """
         with self._disk:
             if self._file is not None:
                 return
@@ -90,10 +94,10 @@ class Recorder:
                 "columns": list(FIELDS),
                 "interval": self._interval,
             }
-            first = packed(header) + self._chunk()
+            self._first = self._first or packed(header) + self._chunk()
             with whole_file(self.path, new=True) as file:
-                file.write(first)
-            self._length = len(first)
+                file.write(self._first)
+            self._length = len(self._first)
             self._file = FileIO(self.path, "ab")
             self._thread.start()
 

@@ -159,7 +159,12 @@ class LiveHub(Hub):
         if recorder is None:
             return
         try:
-            await asyncio.to_thread(recorder.open)
+            while True:
+                try:
+                    await asyncio.to_thread(recorder.open)
+                    break
+                except FileExistsError:  # another server has the name since a moment
+                    recorder.path = await asyncio.to_thread(_new_file, self.folder)
         except OSError:
             await self.ask(self._take_recorder)
             raise

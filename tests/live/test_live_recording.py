@@ -240,6 +240,18 @@ def test_a_recording_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["taken.rec"]
 
 
+def test_a_name_that_is_taken_costs_no_row(tmp_path: Path) -> None:
+    session = Session(RIG)
+    (tmp_path / "taken.rec").write_bytes(b"another's")
+    session.recorder = running = Recorder(session, tmp_path / "taken.rec")
+    with pytest.raises(FileExistsError):
+        running.open()
+    session.advance(4 * EVERY)
+    running.path = tmp_path / "free.rec"
+    running.finish()
+    assert len(load_recording(running.path).rows) == 5
+
+
 def test_a_recording_is_a_value() -> None:
     rows = np.zeros((3, COLUMNS))
     assert Recording(RIG, rows, 0.004, []).duration == pytest.approx(0.008)
