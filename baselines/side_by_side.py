@@ -6,10 +6,13 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from multiprocessing import resource_tracker as pythons_tracker
 from typing import Any, Protocol, TypeVar
 
+from joblib.externals.loky.backend import resource_tracker as joblibs_tracker
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor
 from tqdm import tqdm
 
@@ -108,16 +111,17 @@ class Processes:
 
     def __init__(self, jobs: int) -> None:
         self.width = jobs
-        self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
+        for tracker in (joblibs_tracker, pythons_tracker):
+            # Beginning one takes the mask away: both have begun before any worker does.
+            with _masked():
+                tracker.ensure_running()
+        with _masked():
+            self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
         self._begun: list[Any] = []
 
     def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
-        # A worker begins with the signals masked: what it imports takes seconds, in which Ctrl-C would make it complain.
-        masked = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS)
-        try:
+        with _masked():
             self._begun.append(self._executor.submit(work, *piece))
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
         return self._begun[-1]
 
     def done(self, begun: list[Any]) -> list[Any]:
@@ -132,6 +136,19 @@ class Processes:
         while any(not one.running() and not one.done() for one in self._begun):
             time.sleep(0.01)
         self._executor.shutdown(wait=True, kill_workers=bool(self._begun))
+
+
+@contextmanager
+def _masked() -> Iterator[None]:
+    """Processes that begin here begin without hearing ``_PARENTS``.
+
+    A worker imports for seconds, in which Ctrl-C would make it complain; joblib's tracker of semaphores would die of SIGHUP.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker(parent: int) -> None:
