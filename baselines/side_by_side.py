@@ -112,7 +112,7 @@ class Processes:
     def __init__(self, jobs: int) -> None:
         self.width = jobs
         for tracker in (joblibs_tracker, pythons_tracker):
-            # Beginning one takes the mask away: both have begun before any worker does.
+            # Beginning Python's takes the mask away: both have begun before any worker does.
             with _masked():
                 tracker.ensure_running()
         with _masked():
