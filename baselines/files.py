@@ -75,8 +75,9 @@ def whole_file(path: Path, new: bool = False) -> Iterator[BinaryIO]:
             os.fsync(file.fileno())
         _link(partial, path) if new else partial.replace(path)
     except OSError as error:
-        # A full disk does not say which file it had no room for.
-        error.filename = error.filename or str(path)
+        if error.errno is not None:
+            # A full disk does not say which file it had no room for, and others say the hidden name.
+            error.filename = str(path)
         raise
     finally:
         partial.unlink(missing_ok=True)

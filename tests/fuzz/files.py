@@ -73,60 +73,6 @@ def _configuration(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Ca
     load_configuration(written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
 
 
-def _policies(_: Path) -> Path:
-    import agents
-    from agents.policy.seeds import SHIPPED, policy_folders
-
-    assert agents
-    folder = policy_folders(SHIPPED / "circle")[0]
-    _policy(folder, np.random.default_rng(0), folder.parent, Case(), unharmed=True)
-    return folder
-
-
-def _resealed(rng: Rng, content: bytes) -> bytes:
-    """A safetensors file with another header, in half of all cases of the length that it says."""
-    size = int.from_bytes(content[:8], "little")
-    tree = json.loads(content[8 : 8 + size])
-    if "__metadata__" in tree and rng.random() < 0.5:
-        # Metadata are texts, which may be JSON by themselves.
-        texts = tree["__metadata__"]
-        name = sorted(texts)[rng.integers(len(texts))]
-        texts[name] = json_bytes(rng, json.loads(texts[name])).decode("utf-8", "replace") if texts[name][:1] in '{["' else "x"
-        header = json.dumps(tree).encode()
-    else:
-        header = json_bytes(rng, tree)
-    length = len(header) if rng.random() < 0.8 else (0, 1, 2**63, 2**64 - 1, len(header) + 1)[rng.integers(5)]
-    return length.to_bytes(8, "little") + header + content[8 + size :]
-
-
-def _policy(valid: Path, rng: Rng, folder: Path, case: Case, unharmed: bool = False) -> None:
-    import hashlib
-
-    from agents.policy.files import load_policy
-
-    if unharmed:
-        load_policy(valid)
-        return
-    place = folder / "our_policy"
-    place.mkdir()
-    for file in valid.iterdir():
-        (place / file.name).write_bytes(file.read_bytes())
-    weights, configuration = place / "policy.safetensors", place / "policy.json"
-    chosen = configuration if configuration.is_file() and rng.random() < 0.5 else weights
-    content = chosen.read_bytes()
-    if chosen == configuration:
-        changed = json_bytes(rng, json.loads(content))
-    else:
-        changed = _resealed(rng, content) if rng.random() < 0.6 else damaged(rng, content)
-    written(case, chosen, changed)
-    if configuration.is_file() and chosen == weights and rng.random() < 0.7:
-        said = json.loads(configuration.read_text(encoding="utf-8"))
-        configuration.write_text(json.dumps({**said, "sha256": hashlib.sha256(changed).hexdigest()}), encoding="utf-8")
-    case.names = ("our_policy", "policy")
-    network = load_policy(place).network
-    assert np.isfinite(network.mean).all()
-
-
 def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarray[Any, Any], bytes]:
     from birthsim_env.physics.parameters import Parameters
     from birthsim_live.rig.frames import FIELDS
@@ -282,7 +228,6 @@ def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
 FILES: dict[str, Kind] = {
     "rig": Kind(_rig_files, _rig),
     "configuration": Kind(_configurations, _configuration),
-    "policy": Kind(_policies, _policy),
     "recording": Kind(_recordings, _recording),
     "task": Kind(_tasks, _task),
     "gains": Kind(loaded, _gains),

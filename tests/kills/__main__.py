@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.kills.processes import hear_signals
+from tests.kills.processes import end_all, hear_signals
 from tests.kills.recording import RECORD, RecordingCourse
 from tests.kills.report import read_outcomes, summary, write_outcomes, write_page
 from tests.kills.targets import ROOT, TARGETS
@@ -45,6 +45,7 @@ def main() -> None:
                 if arguments.out is not None:
                     write_outcomes(arguments.out, outcomes, arguments.seed)
         finally:
+            end_all()
             shutil.rmtree(work, ignore_errors=True)
     if arguments.page is not None and arguments.out is not None:
         write_page(arguments.page, read_outcomes(arguments.out))

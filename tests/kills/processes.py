@@ -27,9 +27,12 @@ class Hangs(Exception):
 
 
 def hear_signals() -> None:
-    """Children hear Ctrl-C and a closed terminal even where this process was begun in the background or by nohup."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    """Children hear Ctrl-C and a closed terminal even where this process was begun in the background or by nohup.
+
+    Whatever ends this process is raised, so that nothing is left running or mounted.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
 
 
 class Running:
@@ -46,6 +49,7 @@ class Running:
                 line, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=out, stderr=complaints, start_new_session=True
             )
         self.begun = time.monotonic()
+        _begun.append(self)
 
     def ended(self) -> bool:
         """Whether the command itself has ended."""
@@ -90,6 +94,16 @@ class Running:
     def stderr(self) -> str:
         """What it has complained about."""
         return self._said[1].read_text(encoding="utf-8", errors="replace")
+
+
+def end_all() -> None:
+    """Kill what this process has begun and what still runs."""
+    for running in _begun:
+        if not running.ended():
+            running.sweep()
+
+
+_begun: list[Running] = []
 
 
 def members(session: int) -> list[int]:
