@@ -11,6 +11,7 @@ import pytest
 
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import policy_folders
+from baselines.commands import start
 from baselines.files import write_json
 from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
 
@@ -18,8 +19,8 @@ from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
 def test_the_scripts_of_the_package_are_these_commands():
     scripts = {point.name: point for point in entry_points(group="console_scripts") if point.name.startswith("birthsim-")}
     for command, module in COMMANDS.items():
-        above = module.startswith("agents.")
-        assert scripts[f"birthsim-{command}"].value == ("birthsim_env.learned:command" if above else f"{module}:main")
+        assert scripts[f"birthsim-{command}"].value == "baselines.commands.start:command"
+        assert start._module(command).__name__ == module
     assert all(callable(point.load()) for point in scripts.values())
 
 
