@@ -41,7 +41,10 @@ def package(tmp_path):
     for name in (
         "physics/compilation",
         "loop/signals",
-        *(f"physics/{part}" for part in ("lanes", "parameters", "quantities", "reading", "values", "exact", "valves")),
+        *(
+            f"physics/{part}"
+            for part in ("lanes", "parameters", "electronics", "quantities", "reading", "values", "exact", "valves")
+        ),
     ):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)

@@ -53,7 +53,8 @@ def test_every_field_has_unit_basis_and_a_line_in_the_docstring() -> None:
 
 def test_ranges_of_randomisation_are_those_of_the_design_and_possible() -> None:
     ranges = {f"{s}.{f.name}": f.metadata["randomized"] for s, f in FIELDS if f.metadata["randomized"]}
-    assert ranges == DESIGN_RANGES
+    # Those of sensors stand on a page, which the tests of ``honest`` compare.
+    assert {name: ends for name, ends in ranges.items() if not name.startswith("electronics.")} == DESIGN_RANGES
     for name, ends in ranges.items():
         for end in ends:
             section, field = name.split(".")

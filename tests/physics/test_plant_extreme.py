@@ -24,7 +24,7 @@ RANGES: dict[str, tuple[float, float]] = {
     f"{section.name}.{field.name}": field.metadata["randomized"]
     for section in dataclasses.fields(Parameters)[:-1]
     for field in dataclasses.fields(type(section.default))
-    if field.metadata["randomized"]
+    if field.metadata["randomized"] and section.name != "electronics"
 }
 BORE, RING = math.pi * 0.025**2 / 4, math.pi * (0.025**2 - 0.010**2) / 4
 POLICY_PERIOD = 0.01

@@ -24,7 +24,7 @@ RANGES = {
     f"{section.name}.{field.name}": field.metadata["randomized"]
     for section in dataclasses.fields(Parameters)[:-1]
     for field in dataclasses.fields(type(section.default))
-    if field.metadata["randomized"]
+    if field.metadata["randomized"] and section.name != "electronics"
 }
 
 
