@@ -8,14 +8,14 @@ remains is judged.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from baselines.bench.pieces import file_stem
 from baselines.bench.probes import Window, board_limit
-from baselines.bench.rig_port import RigPort
+from baselines.bench.rig_port import Port, RigPort
 from baselines.bench.tasks import Result, Task
 from baselines.controller import Controller
 from baselines.registry import make_controller
@@ -147,35 +147,42 @@ class Verdict:
 
 
 def judge(
-    cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0, damping_factor: Array | None = None
-) -> Verdict:
-    """Hold, push and release every lane, a case each. ``damping_factor`` (N,) as in ``RigPort``."""
+    cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0, damping_factor: Array | None = None,
+    force_sensor: bool = True,
+) -> Verdict:  # fmt: skip
+    """Hold, push and release every lane, a case each. ``damping_factor`` (N,) and ``force_sensor`` as in ``RigPort``."""
     rigs, lanes = cases.rigs, len(cases.hand)
     rows = np.zeros((REFERENCES, lanes))
     rows[:2], rows[8:10], rows[10:12] = np.transpose([PLACE]), cases.asked, np.transpose([PNEUMATIC])
-    reference, held = Reference(rows), rows[:2].copy()
     damping, mass = (np.zeros(lanes) if given is None else given for given in (cases.damping, cases.mass))
-    port, window = RigPort(rigs, reference, controller, sensors, seed, mass, damping_factor), Window(lanes)
+    port = RigPort(rigs, Reference(rows), controller, sensors, seed, mass, damping_factor, force_sensor)
+    verdict = push_and_release(port, rows[:2].copy(), cases.hand, damping)
+    lost = verdict.lost | (port.impacts > board_limit(rigs))
+    return replace(verdict, stable=verdict.stable & ~lost, lost=lost)
+
+
+def push_and_release(port: Port, held: Array, stiffness: Array, damping: Array) -> Verdict:
+    """What remains at a port of the push, where hands of a stiffness (N,), N/m, and a damping (N,), N s/m, hold it at
+    positions ``held`` (2, N), m."""
 
     def hand(now: float, position: Array, velocity: Array) -> Array:
         push = np.transpose([PUSH]) * float(PUSHED <= now < RELEASED)
-        return np.asarray(push - cases.hand * (position - held) - damping * velocity)
+        return np.asarray(push - stiffness * (position - held) - damping * velocity)
 
-    low, high, most = np.full((2, lanes), np.inf), np.full((2, lanes), -np.inf), np.zeros(lanes)
+    motion, force, most = Window(port.lanes), Window(port.lanes), np.zeros(port.lanes)
     for period in range(round(END / port.period)):
-        now = period * port.period
-        judged = now >= JUDGED
+        judged = period * port.period >= JUDGED
         if judged:
-            window.add(port.motion()[:2])
+            motion.add(port.motion()[:2])
         port.advance(hand)
         np.maximum(most, port.energy, out=most)
         if judged:
-            low, high = np.minimum(low, port.force), np.maximum(high, port.force)
-    span = window.span().max(axis=0)
-    lost = ~np.isfinite(span) | (port.impacts > board_limit(rigs))
+            force.add(port.force)
+    span = motion.span().max(axis=0)
+    lost = ~np.isfinite(span)
     with np.errstate(divide="ignore"):
-        stable = ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / cases.hand))
-    return Verdict(span, stable, lost, (high - low).max(axis=0), most)
+        stable = ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / stiffness))
+    return Verdict(span, stable, lost, force.span().max(axis=0), most)
 
 
 def variants_of(controller: str) -> dict[str, dict[str, float]]:
