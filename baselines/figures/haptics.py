@@ -53,13 +53,14 @@ def bode_figure(runs: Runs, folder: Path) -> list[Path]:
             for colour, run in zip(COLOURS, _of(runs, law), strict=False):
                 piece, frequency, felt = _felt(run["impedance"])
                 _band(above, frequency, np.abs(felt), colour, run["sensors"])
-                _band(below, frequency, np.degrees(np.angle(felt)), colour, run["sensors"])
+                _band(below, frequency, _phase(piece, felt), colour, run["sensors"])
             if piece["declared"] is not None:
                 declared = _complex(piece["declared"])
                 above.plot(frequency, np.median(np.abs(declared), axis=1), color=ACCENT, ls="--", lw=2, label="declared")
                 below.plot(frequency, np.median(np.degrees(np.angle(declared)), axis=1), color=ACCENT, ls="--", lw=2)
             above.set(xscale="log", yscale="log", ylim=(300, 3e5))
-            below.set(xscale="log", xlabel="frequency (Hz)", ylim=(-100, 190), yticks=range(-90, 181, 45))
+            below.set(xscale="log", xlabel="frequency (Hz)", ylim=(-60, 330), yticks=range(0, 271, 90))
+            log_ticks(above.xaxis)
             log_ticks(below.xaxis)
             above.set_title(label_of(law), loc="left")
         panels[0, 0].set_ylabel("force over displacement (N/m)")
@@ -87,7 +88,7 @@ def energy_figure(runs: Runs, folder: Path) -> list[Path]:
             above.axhline(0, color="grey", lw=0.8)
             below.axhline(0, color="grey", lw=0.8)
             above.set(xlabel="time (s)")
-            below.set(xscale="log", xlabel="frequency (Hz)", yscale="symlog")
+            below.set(xscale="log", xlabel="frequency (Hz)")
             below.set_yscale("symlog", linthresh=30)
             log_ticks(below.xaxis)
             above.set_title(label_of(law), loc="left")
@@ -147,7 +148,7 @@ def z_width_figure(runs: Runs, folder: Path) -> list[Path]:
                 axes.plot(piece["factors"], limits, label=label_of(law), ms=6, **look(k))
             axes.set(xlabel="damping, times the law's own", ylim=(-0.5, 1e-3 * max(coupled.ASKED) + 1))
             axes.set_title(f"{sensors} sensors", loc="left")
-        panels[0, 0].set_ylabel("stable up to (kN/m); 0: nowhere")
+        panels[0, 0].set_ylabel("stable up to (kN/m); 0: nowhere, 20: all")
         figure.suptitle(f"Z-width: stiffness that is stable against each of {len(coupled.HANDS)} hands", fontsize=10)
         return _finished(figure, panels[0], folder, "haptics_z_width")
 
@@ -189,6 +190,12 @@ def _felt(pieces: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], Array, Any]
     """The piece at ``SHOWN``, or else the last; its frequencies (F,) and the impedance of its lanes at ``PEAK``, (F, N)."""
     piece = next((one for one in pieces if one["stiffness"] == SHOWN), pieces[-1])
     return piece, np.array(piece["frequency"]), _complex(piece["felt"])[:, _kept(piece)]
+
+
+def _phase(piece: dict[str, Any], felt: Any) -> Array:
+    """Degrees, (F, N): within half a turn of what is declared, or of 90 degrees where nothing is."""
+    about = 90.0 if piece["declared"] is None else np.degrees(np.angle(_complex(piece["declared"])[:, _kept(piece)]))
+    return np.asarray((np.degrees(np.angle(felt)) - about + 180) % 360 - 180 + about)
 
 
 def _band(axes: Axes, x: Array, y: Array, colour: str, label: str) -> None:

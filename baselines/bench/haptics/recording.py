@@ -12,8 +12,8 @@ from birthsim_env.physics.lanes import Array
 
 @dataclass(frozen=True)
 class Recording:
-    """``time`` (T,), s; ``position`` (T, 2, N), m, ``velocity`` (T, 2, N), m/s, and ``force`` of the hand (T, 2, N), N, at these
-    times; ``energy`` (T, N), J, that the port had given to the hand by then."""
+    """``time`` (T,), s; ``position`` (T, 2, N), m, ``velocity`` (T, 2, N), m/s, and ``force`` of the hand (T, 2, N), N, then;
+    ``energy`` (T, N), J, that the port had given to the hand by then."""
 
     time: Array
     position: Array
@@ -37,4 +37,4 @@ def record(port: Port, hand: Hand, seconds: float) -> Recording:
         motion[k], energy[k] = port.motion(), port.energy
         port.advance(hand)
         force[k] = port.force
-    return Recording(np.arange(count) * port.period, motion[:, :2], motion[:, 2:], force, energy)
+    return Recording(np.arange(count, dtype=np.float64) * port.period, motion[:, :2], motion[:, 2:], force, energy)

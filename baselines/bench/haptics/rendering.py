@@ -53,6 +53,7 @@ def measure_rendering(stiffness: float, **settings: Any) -> Result:
     port = condition.port(law, rigs, reference)
     recording = record(port, multisine_hand(direction, peak, condition.seed), SECONDS)
     felt, lost = impedance_felt(recording, direction), lost_lanes(port, rigs)
+    shown = recording.energy[::SHOWN_EVERY]
     begin, end = SETTLING / FUNDAMENTAL, SECONDS
     spring = error_size(recording, reference, pure_spring_offset(reference, recording.force), begin, end)
     found: Result = {
@@ -60,7 +61,7 @@ def measure_rendering(stiffness: float, **settings: Any) -> Result:
         "felt": [felt.real, felt.imag], "port_damping": port_damping(felt, FREQUENCIES),
         "shortage": passivity_shortage(felt, FREQUENCIES), "error_spring_mm": 1e3 * spring,
         "motion_mm": 1e3 * np.ptp(measured_part(recording).position, axis=0).max(axis=0),
-        "energy": recording.energy.max(axis=0), "energy_over_time": [recording.energy[::SHOWN_EVERY, peak == one].max(axis=1) for one in PEAKS],
+        "energy": recording.energy.max(axis=0), "energy_over_time": [shown[:, peak == one].max(axis=1) for one in PEAKS],
         "energy_period": SHOWN_EVERY * port.period, "air": 60e3 * port.air / NORMAL_DENSITY / SECONDS,
         "saturation": 100 * port.saturated * port.period / SECONDS, "declared": None,
     }  # fmt: skip

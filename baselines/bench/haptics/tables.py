@@ -30,7 +30,7 @@ def heading(runs: Runs) -> str:
     first = runs[0]
     drawn = f"{first['rigs']} rigs drawn, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
     rigs = drawn if first["rigs"] else "the rig as the laws believe it"
-    return f"Impedance, release and backdriving: {rigs}. Maps of hands and Z-width: the rig as the laws believe it."
+    return f"{rigs[0].upper()}{rigs[1:]}. Two figures in a cell are the median and the worst over poses, directions and rigs."
 
 
 def rendering_table(runs: Runs) -> str:
