@@ -19,7 +19,7 @@ from birthsim_env.physics.parameters import load_parameters
 LAWS = ("backstepping", "backstepping-cartesian", "admittance-backstepping", "pid")
 """What is measured where no controller is named: the paper's law, its Cartesian form, the best law and a rival."""
 
-SEED, RIGS = 910_000, 4
+SEED, RIGS = 4_100_000, 4
 """First seed, of worlds on which nothing was tuned or decided, and number of rigs drawn."""
 
 
