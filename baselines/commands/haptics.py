@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
-from baselines.bench.haptics.tables import report
+from baselines.bench.haptics.tables import page_with, report
 from baselines.bench.pieces import controller_settings
 from baselines.bench.tasks import run_tasks
 from baselines.commands.parts import add_set, with_options
@@ -40,6 +40,7 @@ def main() -> None:
     parser.add_argument("--no-force-sensor", action="store_true", help="show the laws a hand's force of zero")
     parser.add_argument("--seed", type=seed_number, default=SEED, help="of the first rig and sensors (default: %(default)s)")
     parser.add_argument("--parameters", help="TOML file of the rig as the laws believe it (default: the paper's)")
+    parser.add_argument("--page", type=Path, help="Markdown page whose marked tables are replaced, such as docs/haptics.md")
     add_set(parser)
     add_processes(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for haptics.json, haptics.md and the figures")
@@ -56,6 +57,9 @@ def _haptics(arguments: argparse.Namespace) -> None:
         Key(controller_settings(name, rig), kind, arguments.seed, rigs, not arguments.no_force_sensor)
         for name in names for kind in sensors
     ]  # fmt: skip
+    page = arguments.page and arguments.page.read_text(encoding="utf-8")
+    if page is not None:
+        page_with(page, "")  # says at once what is wrong with it
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures.haptics import haptic_figures
 
@@ -71,6 +75,8 @@ def _haptics(arguments: argparse.Namespace) -> None:
         write_json(place / "haptics.json", finite({"arguments": shown_arguments(arguments), "runs": runs}))
         write_text(place / "haptics.md", text)
         drawn = haptic_figures(runs, place)
+    if page is not None:
+        write_text(arguments.page, page_with(page, text))
     print(text)
     pictures = ", ".join(path.name for path in drawn if path.suffix == ".png")
     print(f"written to {folder}/: haptics.json, haptics.md, {pictures} (each picture as .svg too)")
