@@ -1,5 +1,6 @@
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
+# make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
 # make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
 # make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
@@ -35,7 +36,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -96,6 +97,9 @@ verify-slow: $(READY)
 	$(BIN)/python -m tests.verification mutation $(OUT)/verify/mutation.json
 	$(BIN)/python -m tests.verification coverage
 	$(MAKE) verify
+
+kills: $(READY)
+	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci

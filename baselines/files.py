@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import shutil
+import signal
 import socket
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -15,6 +18,10 @@ from typing import Any, BinaryIO
 from filelock import FileLock, Timeout
 
 _PARTIAL = ".partial"
+LEFTOVERS = f".*{_PARTIAL}"
+"""Pattern of the names of what is not complete."""
+
+_ENDING = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
 _HOST = socket.gethostname().replace("-", "_")
 
 
@@ -26,10 +33,15 @@ def make_folder(path: Path) -> Path:
         raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
     except OSError as error:
         raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
-    for leftover in path.rglob(f".*{_PARTIAL}"):
+    remove_leftovers(path.rglob(LEFTOVERS))
+    return path
+
+
+def remove_leftovers(found: Iterable[Path]) -> None:
+    """Remove hidden files and folders that killed processes left; those of a process that may still run stay."""
+    for leftover in found:
         if not _is_written(leftover):
             shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
-    return path
 
 
 @contextmanager
@@ -49,10 +61,11 @@ def own_folder(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[BinaryIO]:
+def whole_file(path: Path, new: bool = False) -> Iterator[BinaryIO]:
     """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
 
     It is on the disk before it has its name. A process that is killed leaves a hidden file, which ``make_folder`` removes.
+    A ``new`` file replaces none: ``FileExistsError`` where there is one.
     """
     partial = _partial(path)
     try:
@@ -60,10 +73,11 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        partial.replace(path)
+        _link(partial, path) if new else partial.replace(path)
     except OSError as error:
-        # A full disk does not say which file it had no room for.
-        error.filename = error.filename or str(path)
+        if error.errno is not None:
+            # A full disk does not say which file it had no room for, and others say the hidden name.
+            error.filename = str(path)
         raise
     finally:
         partial.unlink(missing_ok=True)
@@ -79,10 +93,28 @@ def whole_results(folder: Path) -> Iterator[Path]:
     place.mkdir()
     try:
         yield place
-        for path in sorted(place.iterdir()):
-            path.replace(folder / path.name)
+        with later_signals():
+            for path in sorted(place.iterdir()):
+                path.replace(folder / path.name)
     finally:
         shutil.rmtree(place, ignore_errors=True)
+
+
+@contextmanager
+def later_signals() -> Iterator[None]:
+    """What happens here is not torn by a signal that asks the process to end: that comes after it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {ending: signal.signal(ending, lambda number, _: came.append(number)) for ending in _ENDING}
+    try:
+        yield
+    finally:
+        for ending, handler in before.items():
+            signal.signal(ending, handler)
+        for one in came:
+            signal.raise_signal(one)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -127,6 +159,18 @@ def _partial(path: Path) -> Path:
     """The hidden name of what this process writes and ``path`` will be."""
     host, process = this_process()
     return path.with_name(f".{path.name}.{host}-{process}{_PARTIAL}")
+
+
+def _link(partial: Path, path: Path) -> None:
+    """Give a file the name ``path``; ``FileExistsError`` where another one has it."""
+    try:
+        os.link(partial, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without hard links
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+        partial.replace(path)
 
 
 def _is_written(partial: Path) -> bool:

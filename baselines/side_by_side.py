@@ -6,10 +6,13 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from multiprocessing import resource_tracker as pythons_tracker
 from typing import Any, Protocol, TypeVar
 
+from joblib.externals.loky.backend import resource_tracker as joblibs_tracker
 from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor
 from tqdm import tqdm
 
@@ -23,6 +26,9 @@ ONE_THREAD = {
 LISTENING = 0.5
 """s between two looks at what is complete: a signal waits no longer."""
 
+
+_PARENTS = (signal.SIGINT, signal.SIGHUP)
+"""Signals that reach a whole process group, and that the parent answers for its workers."""
 
 _END: tuple[Any, ...] = ("no more pieces",)
 
@@ -105,11 +111,17 @@ class Processes:
 
     def __init__(self, jobs: int) -> None:
         self.width = jobs
-        self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
+        for tracker in (joblibs_tracker, pythons_tracker):
+            # Beginning Python's takes the mask away: both have begun before any worker does.
+            with _masked():
+                tracker.ensure_running()
+        with _masked():
+            self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
         self._begun: list[Any] = []
 
     def submit(self, work: Callable[..., Any], piece: tuple[Any, ...]) -> Any:
-        self._begun.append(self._executor.submit(work, *piece))
+        with _masked():
+            self._begun.append(self._executor.submit(work, *piece))
         return self._begun[-1]
 
     def done(self, begun: list[Any]) -> list[Any]:
@@ -126,9 +138,22 @@ class Processes:
         self._executor.shutdown(wait=True, kill_workers=bool(self._begun))
 
 
+@contextmanager
+def _masked() -> Iterator[None]:
+    """Processes that begin here begin without hearing ``_PARENTS``.
+
+    A worker imports for seconds, in which Ctrl-C would make it complain; joblib's tracker of semaphores would die of SIGHUP.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin_worker(parent: int) -> None:
     """Ctrl-C reaches the whole process group: the parent ends its workers, and a worker ends itself once the parent is gone."""
-    for ending in (signal.SIGINT, signal.SIGHUP):
+    for ending in _PARENTS:
         signal.signal(ending, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     tqdm.set_lock(threading.RLock())  # instead of a semaphore of the system's

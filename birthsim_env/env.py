@@ -68,8 +68,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     Between 0 and 1 per 10 ms, so that ending early never pays, whatever the discount: the sum of five terms that are also in
     `info`, `reward_survive` = 1 and four that cost a fraction of c = 8.75:
     `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm)/c and `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s)/c, e and w
-    position and speed relative to the compliant target, except that what a jump of the force or of a stiffness setpoint moves
-    it by is asked for little by little (time constant 60 ms); `reward_effort` = -0.04 mean(a^2)/c; `reward_action_change` =
+    position and speed relative to the compliant target. After a jump of the force or of a stiffness setpoint this target moves
+    with a time constant of 60 ms. `reward_effort` = -0.04 mean(a^2)/c; `reward_action_change` =
     -0.2 mean(|a - last a|)/c. An episode that terminates pays nothing more.
 
     ## Start and end of an episode

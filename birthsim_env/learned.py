@@ -5,9 +5,7 @@ Other distributions (``openai-agents``) and folders of users have packages of th
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 
@@ -32,14 +30,3 @@ def residual_env(**arguments: Any) -> Any:
 def residual_vector_env(**arguments: Any) -> Any:
     """Entry point of the vectorised ids with a law inside."""
     return from_agents("residual.env").ResidualVectorEnv(**arguments)
-
-
-def command() -> None:
-    """Entry point of the commands of ``agents``: birthsim-train, -evaluate, -scores, -explain and -export."""
-    name = Path(sys.argv[0]).stem
-    try:
-        module = from_agents(f"commands.{name.removeprefix('birthsim-')}")
-    except ImportError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    module.main()

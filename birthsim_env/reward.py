@@ -3,9 +3,9 @@
 Every 10 ms pay one, less its costs as a fraction of the largest ones. So no step pays less than nothing, and an episode
 that ends early, after which nothing is paid, is never worth more than one that goes on, whatever the discount.
 
-Nothing can follow a jump of the hand. What a jump moves the compliant target by is therefore asked for little by little, and
-the way there is paid as everything else is: a reward that is blind for a while after a jump teaches haste, and rigs near their
-limit do not come back from an overshoot.
+Nothing can follow a jump of the hand. After a jump the target of the reward therefore moves to the compliant target with a time
+constant of 60 ms, and the error against it counts as at any other time. A reward that ignored the errors after a jump taught
+haste, and rigs near their limit do not return from an overshoot.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from agents.policy.network import PolicyNetwork
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from baselines.files import finite, whole_file
+from birthsim_env.physics.values import problem
 
 FORMAT = "birthsim-residual-3"
 WEIGHTS = "policy.safetensors"
@@ -68,7 +69,7 @@ def load_policy(folder: str | Path) -> Policy:
         settings = ResidualSettings(**about["settings"])
         return Policy(network, str(about["environment"]), settings, dict(about["training"]))
     except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"policy = {str(folder)!r} is damaged ({error}); {allowed}") from error
+        raise ValueError(f"policy = {str(folder)!r} is damaged ({problem(error)}); {allowed}") from error
 
 
 def _truth(value: Any) -> bool:

@@ -3,8 +3,8 @@
 An action in [-1, 1] passes a first-order low-pass at the control rate, z' = (a - z)/T. Its first two entries, times the
 authority in N, are added to what the law believes acts on the pistons; the law knows their rate too. Where the impedance is
 variable, the next two raise the stiffness to K' = K 4^z that the law works with, about a target moved so that a hand at rest
-still feels K; the last raises the damping. Less than zero says nothing: a policy that had learned to soften an axis kept to
-it, though its errors were larger. Forces and stiffness yield where pistons oscillate. Zero actions are exactly the law. Without
+still feels K; the last raises the damping. Negative stiffness actions are ignored, because policies that
+softened an axis never recovered. Forces and stiffness yield where pistons oscillate. Zero actions are exactly the law. Without
 a law the actions are the openings.
 """
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.sweep.plan import Point, Search, Sweep
+from baselines.bench.journal import open_journal
 from baselines.bench.statistics import penalize_lost, summarize
 from baselines.bench.tasks import Result
 
@@ -30,8 +31,6 @@ def search_points(sweep: Sweep, evaluated: Evaluated, folder: Path) -> tuple[lis
     try:
         import optuna
         from optuna.distributions import BaseDistribution, FloatDistribution
-        from optuna.storages import JournalStorage
-        from optuna.storages.journal import JournalFileBackend
         from optuna.trial import TrialState
     except ImportError as error:
         raise ValueError(f"{error}; a search needs the extra: pip install 'birthsim[tune]'") from error
@@ -43,8 +42,7 @@ def search_points(sweep: Sweep, evaluated: Evaluated, folder: Path) -> tuple[lis
     study = optuna.create_study()
     with warnings.catch_warnings(action="ignore"):
         journal = optuna.create_study(
-            storage=JournalStorage(JournalFileBackend(str(folder / "trials.journal"))), study_name="birthsim-sweep",
-            load_if_exists=True,
+            storage=open_journal(folder / "trials.journal"), study_name="birthsim-sweep", load_if_exists=True
         )  # fmt: skip
     known = sum(trial.state is TrialState.COMPLETE for trial in journal.get_trials(deepcopy=False))
     points: list[Point] = []

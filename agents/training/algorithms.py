@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
+from torch.distributions import Distribution
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from agents.policy.network import PolicyNetwork
@@ -67,6 +69,19 @@ def _make_model(settings: TrainingSettings, env: VecNormalize, tensorboard: str 
     _begin_at_zero(model.policy.actor.mu)
     _begin_at_zero(model.policy.actor.log_std, settings.log_std)
     return model
+
+
+@contextmanager
+def unchecked_distributions() -> Iterator[None]:
+    """Within it PyTorch does not check every number that a distribution gets and gives, which takes as long as computing it.
+
+    An action that is not finite is refused by the environments.
+    """
+    Distribution.set_default_validate_args(False)
+    try:
+        yield
+    finally:
+        Distribution.set_default_validate_args(__debug__)  # as PyTorch begins
 
 
 def network_of(policy: Any, env: VecNormalize) -> PolicyNetwork:

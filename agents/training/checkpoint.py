@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.training.sb3_adapter import SB3VecEnv
 from baselines.files import whole_file
+from birthsim_env.physics.values import problem
 
 NAME = "checkpoint.safetensors"
 FORMAT = "birthsim-checkpoint-1"
@@ -73,7 +74,7 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
     try:
         return _restore(_nested(about["content"], arrays), model, env)
     except (LookupError, TypeError, ValueError, AttributeError, RuntimeError) as error:
-        raise ValueError(f"{str(path)!r} does not fit this version ({error}); {allowed}") from error
+        raise ValueError(f"{str(path)!r} does not fit this version ({problem(error)}); {allowed}") from error
 
 
 def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str, Any]:

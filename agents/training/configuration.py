@@ -10,7 +10,7 @@ from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
 from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.reading import read_toml
-from birthsim_env.physics.values import checked_count, checked_number, shown
+from birthsim_env.physics.values import checked_count, checked_number, in_line, shown
 
 ALGORITHMS = ("ppo", "sac", "tqc")
 
@@ -124,5 +124,5 @@ def override(settings: S, **values: Any) -> S:
     known = [field.name for field in fields(settings)]
     for name in values:
         if name not in known:
-            raise ValueError(f"{name[:80]} = {shown(values[name])} is unknown; allowed: {', '.join(known)}")
+            raise ValueError(f"{in_line(name)} = {shown(values[name])} is unknown; allowed: {', '.join(known)}")
     return replace(settings, **values)

@@ -33,7 +33,7 @@ class ShiftedReward(VecEnvWrapper):
     def step_wait(self) -> Any:
         """As ``venv``, with shifted rewards."""
         observations, rewards, ended, infos = self.venv.step_wait()
-        terminated = np.array(
-            [end and not info.get("TimeLimit.truncated", False) for end, info in zip(ended, infos, strict=True)]
-        )
+        terminated = np.array(ended)
+        for lane in np.flatnonzero(ended):
+            terminated[lane] = not infos[lane].get("TimeLimit.truncated", False)
         return observations, (rewards - self._by - self._ended * terminated).astype(np.float32), ended, infos

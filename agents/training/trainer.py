@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
-from agents.training.algorithms import make_model
+from agents.training.algorithms import make_model, unchecked_distributions
 from agents.training.checkpoint import NAME as CHECKPOINT
 from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
@@ -67,7 +67,7 @@ def train(
     callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
     try:
         if done < settings.steps and not callback.enough:
-            with events_in(folder / EVENTS):
+            with events_in(folder / EVENTS), unchecked_distributions():
                 model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
     except KeyboardInterrupt:
         if (folder / CHECKPOINT).exists():

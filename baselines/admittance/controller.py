@@ -27,8 +27,8 @@ from birthsim_env.physics import exact
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 
-LEAST_SHARE = 0.35
-"""Of the gain, however long the loop oscillates: below it friction wins."""
+LEAST_FRACTION = 0.35
+"""Lower bound of the gain reduction. With less gain friction holds the piston."""
 
 
 class AdmittanceBackstepping(StagedController):
@@ -112,7 +112,7 @@ class AdmittanceBackstepping(StagedController):
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_SHARE, **g},
+            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_FRACTION, **g},
         }
         fresh = np.zeros(at.PISTONS + rows)
         fresh[[at.ADMITTANCE + 4, at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0

@@ -33,7 +33,7 @@ MEMORY_NAMES = (
 error of this half wave (m/s), the time (s) since it began and the size of the last one; how far the reference was moving of
 late."""
 MEMORY = len(MEMORY_NAMES)
-WATCH_T, WATCH_N, MOTION_SHARE = 0, 4, 8
+WATCH_T, WATCH_N, MOTION_FRACTION = 0, 4, 8
 GAIN_SHARES = [WATCH_T, WATCH_N]
 
 GAIN_NAMES = (
@@ -145,8 +145,8 @@ def command(
 
         fraction_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
         fraction_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
-        memory[MOTION_SHARE, i] = max(moving[i], memory[MOTION_SHARE, i] * exact.exp(-period / MOTION_TIME))
-        c = rest_gain + (gain - rest_gain) * memory[MOTION_SHARE, i]
+        memory[MOTION_FRACTION, i] = max(moving[i], memory[MOTION_FRACTION, i] * exact.exp(-period / MOTION_TIME))
+        c = rest_gain + (gain - rest_gain) * memory[MOTION_FRACTION, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)
         en = (1.0 + (rest_push - 1.0) * rest[1, i]) * beyond(en, rest[1, i] * dead_zone)
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))

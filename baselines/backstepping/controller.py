@@ -37,7 +37,7 @@ from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.lanes import PARAMETERS, Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.values import is_within, limits, shown
+from birthsim_env.physics.values import is_finite, is_within, limits, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -114,9 +114,9 @@ class BacksteppingController(StagedController):
             fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
             valves drain, no force is left to come back, and the episode is lost.
 
-    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. A
-    damping factor is the damping in units of the least there is; up to 1.01 it is that, and where a ``damping_ratio`` is given
-    it says nothing.
+    The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
+    damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
+    ``damping_ratio`` is given.
     Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
     """
 
@@ -137,6 +137,10 @@ class BacksteppingController(StagedController):
                 raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
         if not isinstance(valves, str) or valves not in VALVE_LAYOUTS:
             raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
+        flags = {"weight_compensation": weight_compensation, "frozen_friction": frozen_friction, "force_first": force_first}
+        for name, flag in flags.items():
+            if not (isinstance(flag, (bool, np.bool_)) or (is_finite(flag) and flag in (0, 1))):
+                raise ValueError(f"{name} = {shown(flag)}; allowed: True or False")
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         super().__init__(parameters)

@@ -38,11 +38,10 @@ GAINS, INTENTS = 6, 6
 dK/dt of both (N/(m s)), F* of both (N)."""
 
 TOLD = 5
-"""Rows of what a law is told: forces that it is to believe in along cylinders 1 and 2 (N), their rates (N/s), and the damping
-in units of that of equal gains."""
+"""Rows of feedforward: known forces along cylinders 1 and 2 (N), their rates (N/s), and the damping relative to equal gains."""
 
 LEAST_FACTOR = 1.01
-"""Less damping than so many times that of equal gains is theirs: between the two no positive gains are sure to exist."""
+"""Damping relative to equal gains. Below this ratio equal gains are used, since other positive gains may not exist."""
 
 CLEARANCE = 0.002
 """m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no

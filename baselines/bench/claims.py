@@ -45,10 +45,10 @@ class Claims:
         self.tidy(path)
         try:
             with claim.open("x", encoding="ascii") as file:
+                self._held.add(path)
                 file.write("{} {}".format(*this_process()))
         except FileExistsError:
             return False
-        self._held.add(path)
         return True
 
     def give_up(self, path: Path) -> None:

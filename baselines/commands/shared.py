@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import gymnasium
 
+from baselines.commands.start import endings
 from birthsim_env.physics.values import shown
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
@@ -26,23 +27,20 @@ class Ended(KeyboardInterrupt):
         self.number = number
 
 
-ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the terminal is gone"}
-"""Signal -> what a command says last; the second one ends it at once."""
-
-
 def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], None]) -> None:
-    """Parse, act, and turn what a user can mend into one line and exit status 2; a signal of ``ENDINGS`` into 128 + its number.
+    """Parse, act, and turn what a user can mend into one line and exit status 2; a signal of ``endings`` into 128 + its number.
 
     SIGTERM and SIGHUP end a command as Ctrl-C does: what is complete is kept, and no process or half a file stays behind.
     """
     arguments = parser.parse_args()
-    words = {signal.Signals[name].value: said for name, said in ENDINGS.items() if name in signal.Signals.__members__}
     came: list[int] = []
+    words, said = endings(), False
 
     def end(number: int, _: object) -> None:
         came.append(number)
         if len(came) > 1:
-            os.write(2, f"{parser.prog}: {words[number]}\n".encode())
+            if not said:
+                os.write(2, f"{parser.prog}: {words[number]}\n".encode())
             os._exit(128 + number)
         raise Ended(number)
 
@@ -57,11 +55,13 @@ def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], 
     except MemoryError:
         _say(parser, "error: out of memory; allowed: fewer lanes, episodes or jobs", 2)
     except KeyboardInterrupt as error:
-        number = error.number if isinstance(error, Ended) else int(signal.SIGINT)
+        number, said = error.number if isinstance(error, Ended) else int(signal.SIGINT), True
         _say(parser, words[number], 128 + number)
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        # After a signal the process ends, and another one ends it at once.
+        if not came:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:

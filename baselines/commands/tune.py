@@ -24,6 +24,7 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
+from baselines.bench.journal import open_journal
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
@@ -134,15 +135,13 @@ def check_optuna() -> None:
 def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     """The search that a folder holds, or a new one there; ``ValueError`` where it holds another one or something else."""
     import optuna
-    from optuna.storages import JournalStorage
-    from optuna.storages.journal import JournalFileBackend
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     path = folder / "trials.journal"
     try:
-        storage = JournalStorage(JournalFileBackend(str(path)))
-        study = optuna.create_study(storage=storage, study_name="birthsim-tune", load_if_exists=True)
-        known = study.user_attrs or setting
+        study = optuna.create_study(storage=open_journal(path), study_name="birthsim-tune", load_if_exists=True)
+        # The first run may have been killed before it came to all of them.
+        known = {**({} if complete(study) else setting), **study.user_attrs}
         if all(known.get(key) == value for key, value in setting.items()):
             for key, value in setting.items():
                 study.set_user_attr(key, value)
@@ -184,12 +183,13 @@ def search(
     """Run the trials that the study lacks of ``count``, one by one."""
     from optuna.distributions import BaseDistribution, FloatDistribution
     from optuna.samplers import TPESampler
+    from optuna.trial import TrialState
 
     ranges: dict[str, BaseDistribution] = {
         gain: FloatDistribution(low, high, log=low > 0) for gain, (low, high) in bounds.items()
     }
     while (done := len(complete(study))) < count:
-        if done == 0:
+        if done == 0 and not study.get_trials(deepcopy=False, states=(TrialState.WAITING,)):
             study.enqueue_trial(start)
         # A sampler of its own for each trial: what it proposes depends on the seed and the complete trials alone, so that an
         # interrupted search goes on as if it had not been interrupted.
@@ -242,14 +242,16 @@ def _tune(arguments: argparse.Namespace) -> None:
         study = open_study(folder, setting)
         kept = len(complete(study)[: arguments.trials])
         bar = tqdm(total=arguments.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
+        interrupt: KeyboardInterrupt | None = None
         try:
             numbers = (arguments.lanes, arguments.seed, arguments.trials)
             for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
                 bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
                 bar.update()
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
             if not (kept := len(complete(study))):
                 raise
+            interrupt = error
             print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
         finally:
             bar.close()
@@ -268,6 +270,8 @@ def _tune(arguments: argparse.Namespace) -> None:
     for gain, value in best["gains"].items():
         print(f"{gain:28}{start[gain]:12.4g}{value:12.4g}{bounds[gain][0]:12.4g}{bounds[gain][1]:12.4g}")
     print(f"\nwritten to {arguments.out}/: gains.json, trials.json")
+    if interrupt is not None:
+        raise interrupt
 
 
 if __name__ == "__main__":

@@ -38,19 +38,20 @@ REST_SPEED = 6e-3
 """m/s: a slower piston may come to rest."""
 
 REST_TIME = 0.1
-"""s: time constant at which it does."""
+"""s: time constant with which a slow piston comes to count as resting."""
 
 RELUCTANCE = 5.0
-"""By so many times itself a full rest that ends by itself makes that time longer: what moves unasked has little friction."""
+"""Relative growth of ``REST_TIME`` after a rest that ends without a command. A piston that starts to move without a command has
+little friction, so the next rest is assumed later."""
 
 TRUST_TIME = 20.0
-"""s: time constant at which that is forgotten."""
+"""s: time constant with which the growth of ``REST_TIME`` decays."""
 
-INNOVATION_SHARE = 0.3
-"""Of a new innovation in the low-passed one."""
+INNOVATION_FRACTION = 0.3
+"""Weight of a new innovation in the low-passed one."""
 
 STIR = 1.9
-"""Low-passed innovation, in standard deviations of the position noise, that ends a rest: 4.5 of its own."""
+"""Low-passed innovation that ends a rest, in standard deviations of the position noise: 4.5 of the low-passed noise."""
 
 
 ESTIMATE, REST, INNOVATION, RELUCTANT, FRESH, LAST, SLOT, HISTORY = 0, 6, 8, 10, 12, 13, 14, 15
@@ -136,7 +137,7 @@ def observe(
                 newer = history[2 * ((slot - back) % depth) + cylinder, i]
                 older = history[2 * ((slot - back - 1) % depth) + cylinder, i]
                 innovation = joints[cylinder, 0] - (newer + part * (older - newer))
-                innovations[cylinder, i] += INNOVATION_SHARE * (innovation - innovations[cylinder, i])
+                innovations[cylinder, i] += INNOVATION_FRACTION * (innovation - innovations[cylinder, i])
                 explained = STIR * noise / (kappa if cylinder == 0 else 1.0)
                 resting = rest[cylinder, i]
                 if abs(innovations[cylinder, i]) > explained:

@@ -12,7 +12,7 @@ import tomli_w
 
 from birthsim_env.physics.quantities import Part, quantity
 from birthsim_env.physics.reading import read_toml
-from birthsim_env.physics.values import is_finite, shown
+from birthsim_env.physics.values import in_line, is_finite, shown
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
@@ -242,7 +242,7 @@ class Parameters:
         for section, values in sections.items():
             if not isinstance(values, dict):
                 raise ValueError(
-                    f"{section[:80]} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
+                    f"{in_line(section)} = {shown(values)}; allowed: a section, one of {', '.join(_SECTIONS)}, {RANDOMIZE}"
                 )
             if section != RANDOMIZE:
                 changes.update({f"{section}.{name}": value for name, value in values.items()})
@@ -271,7 +271,7 @@ def _own_ranges(table: dict[str, Any]) -> tuple[tuple[str, float, float], ...]:
     found = []
     for name, bounds in table.items():
         if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(is_finite, bounds))):
-            words = f"[{RANDOMIZE}] {name[:80]} = {shown(bounds)}"
+            words = f"[{RANDOMIZE}] {in_line(name)} = {shown(bounds)}"
             raise ValueError(f'{words}; allowed: "section.field" = [low, high], finite')
         field_of(name)
         found.append((name, float(bounds[0]), float(bounds[1])))

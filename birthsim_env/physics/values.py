@@ -22,6 +22,11 @@ def shown(value: Any) -> str:
         text = repr(value)
     except Exception as error:
         return f"{type(value).__name__} ({type(error).__name__})"
+    return in_line(text)
+
+
+def in_line(text: str) -> str:
+    """``text`` in one line of at most ``LONGEST`` characters."""
     text = " ".join(text.split())
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 

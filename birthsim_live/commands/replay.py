@@ -18,7 +18,7 @@ def main() -> None:
         prog="birthsim-replay",
         description="Play a recording of birthsim-live in the page that it was made with: pause, seek, slow motion.",
     )
-    parser.add_argument("file", type=Path, help="what birthsim-live wrote, .npz")
+    parser.add_argument("file", type=Path, help="what birthsim-live wrote, .rec")
     add_address(parser, 8001)
     run(parser, _replay)
 

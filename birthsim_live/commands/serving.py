@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import signal
 import socket
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
+from baselines.commands.start import endings
 from birthsim_env.physics.values import shown
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
 
@@ -47,7 +51,7 @@ def need_server() -> None:
 
 
 def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
-    """Serve a hub on a socket of ``listen``, by the name ``host``, until an interrupt; after ``need_server``."""
+    """Serve a hub on a socket of ``listen``, by the name ``host``, until a signal asks it to end; after ``need_server``."""
     import uvicorn
 
     from birthsim_live.server.app import create_app
@@ -66,9 +70,23 @@ def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings:
         app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
     )  # fmt: skip
+
+    class Server(uvicorn.Server):
+        """Closes the hub at the first signal, and ends at once at the second, when recordings lack half a second at most."""
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            if self.should_exit:
+                os.write(2, f"{title.split()[0]}: {endings()[sig]}\n".encode())
+                os._exit(128 + sig)
+            super().handle_exit(sig, frame)
+
+    server = Server(options)
+    if hasattr(signal, "SIGHUP"):
+        # As the server does with SIGTERM: the hub is closed before the command ends.
+        signal.signal(signal.SIGHUP, lambda _, frame: server.handle_exit(signal.SIGTERM, frame))
     try:
         with contextlib.suppress(KeyboardInterrupt):
-            uvicorn.Server(options).run(sockets=[listening])
+            server.run(sockets=[listening])
     finally:
-        # After a second interrupt the server leaves without closing the hub.
+        # An exception too leaves no recording unfinished.
         hub.finish()

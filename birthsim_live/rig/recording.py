@@ -1,93 +1,41 @@
-"""A recording: rows of numbers and what was set, in one NumPy file without pickles.
+"""A recording: rows of numbers and what was set, in one file of chunks, each readable without those that follow.
 
-rows     (T, COLUMNS), float64: ``frames.FIELDS`` every ``EVERY`` control periods
-header   JSON: format, version, rig, columns, s between rows, and events: {"row", "settings" | "path" | "lost"}
+A chunk is its length and the CRC-32 of its content, four bytes each, little-endian, and then its content, compressed by zlib:
+a line of JSON, and rows (T, COLUMNS) of float64 to the end. ``frames.FIELDS`` names the columns.
+
+first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, s between rows; no rows
+others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost"}, the row counted from the file's first
+
+A process that is killed leaves whole chunks, and perhaps a part of one at the end, which readers leave out.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import zipfile
+import struct
+import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-import birthsim_env
-from baselines.files import whole_file
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
 from birthsim_live.rig.frames import COLUMNS, FIELDS
 
-if TYPE_CHECKING:
-    from birthsim_live.rig.session import Session
+FORMAT = "birthsim-recording-2"
 
-FORMAT = "birthsim-recording-1"
-
-EVERY = 4
-"""Control periods between rows."""
-
-LONGEST = 600.0
-"""s, assumed: a recording ends by itself; it fills 40 MB of memory then."""
+SUFFIX = ".rec"
 
 LARGEST = 2**27
-"""Bytes, unpacked, that a file may claim to hold."""
+"""Bytes, unpacked, that a file may hold."""
 
 EVENTS = ("settings", "path", "lost")
 
-
-class Recorder:
-    """Takes a session down, from now on, into memory; ``path`` is where ``save`` writes it."""
-
-    def __init__(self, session: Session, path: Path) -> None:
-        self.path = path
-        self._rig, self._interval = session.rig, EVERY * session.period
-        self._rows: list[Array] = []
-        self._events: list[dict[str, Any]] = []
-        self._known: dict[str, Any] = {}
-        self._paths, self._periods = -1, 0
-        self.take(session)
-
-    @property
-    def seconds(self) -> float:
-        """s recorded."""
-        return len(self._rows) * self._interval
-
-    @property
-    def full(self) -> bool:
-        """True at ``LONGEST``: it takes no more."""
-        return self.seconds >= LONGEST
-
-    def take(self, session: Session) -> None:
-        """Take note of the present control period."""
-        if self._periods % EVERY == 0 and not self.full:
-            self._note("settings", session.shown_settings())
-            if self._paths != session.paths:
-                self._paths = session.paths
-                self._note("path", session.path())
-            self._note("lost", session.lost)
-            self._rows.append(session.row())
-        self._periods += 1
-
-    def _note(self, kind: str, value: Any) -> None:
-        if kind not in self._known or self._known[kind] != value:
-            self._known[kind] = value
-            self._events.append({"row": len(self._rows), kind: value})
-
-    def save(self) -> None:
-        """Write the file, as a whole or not at all."""
-        header = {
-            "format": FORMAT,
-            "birthsim": birthsim_env.__version__,
-            "rig": self._rig.to_dict(),
-            "columns": list(FIELDS),
-            "interval": self._interval,
-            "events": self._events,
-        }
-        with whole_file(self.path) as file:
-            np.savez_compressed(file, rows=np.array(self._rows), header=np.array(json.dumps(header)))
+_HEAD = struct.Struct("<II")
 
 
 @dataclass(frozen=True)
@@ -105,39 +53,63 @@ class Recording:
         return (len(self.rows) - 1) * self.interval
 
 
+def packed(said: dict[str, Any], rows: Array | None = None) -> bytes:
+    """A chunk that says ``said`` and holds ``rows`` (T, COLUMNS)."""
+    content = json.dumps(said).encode() + b"\n" + (b"" if rows is None else rows.astype("<f8").tobytes())
+    content = zlib.compress(content, 1)
+    return _HEAD.pack(len(content), zlib.crc32(content)) + content
+
+
 def load_recording(path: str | Path) -> Recording:
     """Read a file; raises ``ValueError`` naming it and what is missing, damaged or foreign."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            claimed = sum(entry.file_size for entry in archive.infolist())
-        if claimed > LARGEST:
-            raise ValueError(f"it claims {claimed} bytes; allowed: up to {LARGEST}")
-        with np.load(path, allow_pickle=False) as content:
-            if set(content.files) != {"rows", "header"}:
-                raise ValueError(f"it holds {', '.join(content.files)}; allowed: rows and header")
-            rows, header = content["rows"], json.loads(str(content["header"]))
-        return _checked(rows, header)
+        chunks = list(_unpacked(Path(path).read_bytes()))
+        if not chunks:
+            raise ValueError("no chunk is whole")
+        header = chunks[0][0]
+        events = [event for said, _ in chunks[1:] for event in said["events"]]
+        return _checked(np.concatenate([rows for _, rows in chunks]), header, events)
     except OSError as error:
         raise ValueError(f"recording = {str(path)!r} cannot be read: {error.strerror or error}") from error
     except Exception as error:
-        # Damage trips NumPy and zipfile in a dozen ways, tokenizer and decompressor among them.
+        # Damage trips struct, zlib, json and NumPy in a dozen ways.
         raise ValueError(
             f"recording = {str(path)!r} is damaged or foreign ({error}); allowed: what birthsim-live wrote"
         ) from error
 
 
-def _checked(rows: Any, header: Any) -> Recording:
+def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
+    """What the chunks say, and their rows; the last one is left out where it is not whole."""
+    place, claimed = 0, 0
+    while place + _HEAD.size <= len(content):
+        length, digest = _HEAD.unpack_from(content, place)
+        begin, place = place + _HEAD.size, place + _HEAD.size + length
+        chunk = content[begin:place]
+        if len(chunk) < length or zlib.crc32(chunk) != digest:
+            if place < len(content):
+                raise ValueError(f"the chunk at byte {begin - _HEAD.size} has another checksum")
+            return
+        unpack = zlib.decompressobj()
+        raw = unpack.decompress(chunk, LARGEST - claimed + 1)
+        claimed += len(raw)
+        if claimed > LARGEST:
+            raise ValueError(f"it holds more than {LARGEST} bytes; allowed: up to {LARGEST}")
+        said, _, rows = raw.partition(b"\n")
+        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64).reshape(-1, COLUMNS)
+
+
+def _checked(rows: Array, header: Any, events: list[Any]) -> Recording:
     if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("columns") != list(FIELDS):
         found = header.get("format") if isinstance(header, dict) else header
         raise ValueError(f"format {found!r}; allowed: {FORMAT!r}")
-    if rows.dtype != np.float64 or rows.ndim != 2 or rows.shape[1] != COLUMNS or len(rows) == 0:
-        raise ValueError(f"rows {rows.dtype} {rows.shape}; allowed: float64 (T, {COLUMNS}), T > 0")
+    if len(rows) == 0:
+        raise ValueError("no rows; allowed: at least one")
     interval = header["interval"]
     if not (isinstance(interval, float) and math.isfinite(interval) and 0 < interval <= 1):
         raise ValueError(f"interval {interval!r}; allowed: more than 0 and up to 1 s")
     if not isinstance(header["rig"], dict):
         raise ValueError(f"rig {header['rig']!r}; allowed: its sections")
-    events, last = header["events"], 0
+    last = 0
     for event in events:
         kinds = [kind for kind in EVENTS if kind in event]
         if len(event) != 2 or len(kinds) != 1 or not last <= event["row"] < len(rows) or not _fits(kinds[0], event[kinds[0]]):

@@ -21,7 +21,7 @@ from birthsim_live.rig.bridge import Course
 from birthsim_live.rig.controllers import as_action, build_controller, has_damping, openings
 from birthsim_live.rig.frames import frame_of, row_of
 from birthsim_live.rig.hand import Hands
-from birthsim_live.rig.recording import Recorder
+from birthsim_live.rig.recorder import Recorder
 from birthsim_live.rig.sensing import ExchangeableSensors
 from birthsim_live.rig.setpoints import Setpoints
 from birthsim_live.rig.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig

@@ -99,7 +99,7 @@ def create_app(hub: Hub, hosts: Collection[str] = LOOPBACK, recordings: Path | N
 
     @app.get("/recordings/{name}")
     async def recording(name: str) -> FileResponse:
-        if recordings is None or not re.fullmatch(r"[\w-]+\.npz", name) or not (recordings / name).is_file():
+        if recordings is None or not re.fullmatch(r"[\w-]+\.rec", name) or not (recordings / name).is_file():
             raise HTTPException(404, "no such recording")
         return FileResponse(recordings / name, media_type="application/octet-stream", filename=name)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from baselines.files import LEFTOVERS, remove_leftovers
 from birthsim_live.rig.clock import LOG
 from birthsim_live.rig.controllers import build_controller
 from birthsim_live.rig.hand import Hold
-from birthsim_live.rig.recording import Recorder
+from birthsim_live.rig.recorder import Recorder
+from birthsim_live.rig.recording import SUFFIX
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import combined
 from birthsim_live.server import protocol
@@ -56,8 +59,12 @@ class LiveHub(Hub):
         super().finish()
         recorder = self._take_recorder()
         if recorder is not None:
-            recorder.save()
-            print(f"recording finished: {recorder.path}", flush=True)
+            try:
+                recorder.finish()
+            except OSError as error:
+                print(_ends_early(recorder, error), file=sys.stderr)
+            else:
+                print(f"recording finished: {recorder.path}", flush=True)
 
     def leave(self, client: Client) -> None:
         super().leave(client)
@@ -79,7 +86,7 @@ class LiveHub(Hub):
             case protocol.Record(on=True):
                 await self._idle.wait()
                 path = await asyncio.to_thread(_new_file, self.folder)
-                await self.ask(lambda: self._begin_recording(path))
+                await self._begin_recording(path)
             case protocol.Record(on=False):
                 await self._end_recording()
             case _:
@@ -147,30 +154,51 @@ class LiveHub(Hub):
             controller = await asyncio.to_thread(build_controller, name, session.rig)
         await self.ask(lambda: session.change(changes, controller))
 
-    def _begin_recording(self, path: Path) -> None:
-        if self._session.recorder is None:
-            self._session.recorder = Recorder(self._session, path)
+    async def _begin_recording(self, path: Path) -> None:
+        recorder = await self.ask(lambda: self._put_recorder(path))
+        if recorder is None:
+            return
+        try:
+            while True:
+                try:
+                    await asyncio.to_thread(recorder.open)
+                    break
+                except FileExistsError:  # another server has the name since a moment
+                    recorder.path = await asyncio.to_thread(_new_file, self.folder)
+        except OSError:
+            await self.ask(self._take_recorder)
+            raise
+
+    def _put_recorder(self, path: Path) -> Recorder | None:
+        if self._session.recorder is not None:
+            return None
+        self._session.recorder = Recorder(self._session, path)
+        return self._session.recorder
 
     async def _end_recording(self) -> None:
         recorder = await self.ask(self._take_recorder)
         if recorder is None:
             return
         try:
-            await asyncio.to_thread(recorder.save)
+            await asyncio.to_thread(recorder.finish)
         except OSError as error:
-            self.announce(protocol.error(f"recording {recorder.path} is lost: {error.strerror or error}"))
-        else:
-            self._last = recorder.path.name
+            self.announce(protocol.error(_ends_early(recorder, error)))
+        self._last = recorder.path.name
 
     def _take_recorder(self) -> Recorder | None:
         recorder, self._session.recorder = self._session.recorder, None
         return recorder
 
 
+def _ends_early(recorder: Recorder, error: OSError) -> str:
+    return f"recording {recorder.path} ends early: {error.strerror or error}; what came before is kept"
+
+
 def _new_file(folder: Path) -> Path:
     """A name in ``folder`` that no file has; the folder is made if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(folder.glob(LEFTOVERS))
     stem, k = time.strftime("birthsim-%Y%m%d-%H%M%S"), 1
-    while (path := folder / f"{stem}{'' if k == 1 else f'-{k}'}.npz").exists():
+    while (path := folder / f"{stem}{'' if k == 1 else f'-{k}'}{SUFFIX}").exists():
         k += 1
     return path

@@ -101,7 +101,7 @@ def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_cost
     tried.clear()
     limit[0] = 27
     status, printed, _ = call("tune", monkeypatch, capsys, *options, "--out", tmp_path / "parts")
-    assert status == 0
+    assert status == 130
     assert "interrupted: 27 of 40 trials are kept; the same command carries on" in printed
     assert read(tmp_path / "parts" / "gains.json")["trials"] == 27
     assert call("tune", monkeypatch, capsys, *options, "--out", tmp_path / "parts")[0] == 0

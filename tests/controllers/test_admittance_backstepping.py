@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance import law as admittance_law
-from baselines.admittance.controller import LEAST_SHARE, AdmittanceBackstepping
+from baselines.admittance.controller import LEAST_FRACTION, AdmittanceBackstepping
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
@@ -61,7 +61,7 @@ class Law:
             np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
             np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
             np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
-            np.array([30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_SHARE]),
+            np.array([30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_FRACTION]),
             np.zeros((4, lanes)) if told is None else told,
             remembered(lanes) if memory is None else memory, openings,
         )  # fmt: skip
@@ -280,9 +280,9 @@ def test_the_gain_fraction_is_that_of_the_direction() -> None:
         clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
         place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
         law.command(Measurement(clock, place, clock, speed, pressures, nothing, sampled=False), wanted)
-    assert np.array_equal(law.gain_fraction, [[LEAST_SHARE, 1, LEAST_SHARE, 1], [1, LEAST_SHARE, LEAST_SHARE, 1]])
+    assert np.array_equal(law.gain_fraction, [[LEAST_FRACTION, 1, LEAST_FRACTION, 1], [1, LEAST_FRACTION, LEAST_FRACTION, 1]])
     law.reset(np.array([True, False, False, False]))
-    assert np.array_equal(law.gain_fraction[:, :2], [[1, 1], [1, LEAST_SHARE]])
+    assert np.array_equal(law.gain_fraction[:, :2], [[1, 1], [1, LEAST_FRACTION]])
 
 
 def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, Array]:

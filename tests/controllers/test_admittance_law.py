@@ -74,7 +74,7 @@ def test_the_gain_of_motion_fades_with_a_tenth_of_a_second() -> None:
     Law(rig).command(now, motion, nothing, nothing, moving=1.0, memory=memory)
     for _ in range(100):
         Law(rig).command(now, motion, nothing, nothing, moving=0.0, memory=memory)
-    assert memory[law.MOTION_SHARE, 0] == pytest.approx(math.exp(-1.0), rel=1e-6)
+    assert memory[law.MOTION_FRACTION, 0] == pytest.approx(math.exp(-1.0), rel=1e-6)
 
 
 def test_position_errors_count_up_to_six_millimetres() -> None:

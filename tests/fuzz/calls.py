@@ -151,7 +151,7 @@ def _constructors(folder: Path) -> dict[str, tuple[Callable[..., Any], bool]]:
     from birthsim_env.physics.parameters import Parameters
 
     for name, (_, takes_rig) in makers.items():
-        if takes_rig and hasattr(makers[name][0], "TUNABLE"):
+        if takes_rig:
             _use(makers[name][0](Parameters()), np.random.default_rng(0))
     makers["ResidualEnv"][0]("probe").reset(seed=0)
     return makers

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
+import struct
 import tomllib
-import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -73,116 +73,67 @@ def _configuration(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Ca
     load_configuration(written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
 
 
-def _policies(_: Path) -> Path:
-    import agents
-    from agents.policy.seeds import SHIPPED, policy_folders
-
-    assert agents
-    folder = policy_folders(SHIPPED / "circle")[0]
-    _policy(folder, np.random.default_rng(0), folder.parent, Case(), unharmed=True)
-    return folder
-
-
-def _resealed(rng: Rng, content: bytes) -> bytes:
-    """A safetensors file with another header, in half of all cases of the length that it says."""
-    size = int.from_bytes(content[:8], "little")
-    tree = json.loads(content[8 : 8 + size])
-    if "__metadata__" in tree and rng.random() < 0.5:
-        # Metadata are texts, which may be JSON by themselves.
-        texts = tree["__metadata__"]
-        name = sorted(texts)[rng.integers(len(texts))]
-        texts[name] = json_bytes(rng, json.loads(texts[name])).decode("utf-8", "replace") if texts[name][:1] in '{["' else "x"
-        header = json.dumps(tree).encode()
-    else:
-        header = json_bytes(rng, tree)
-    length = len(header) if rng.random() < 0.8 else (0, 1, 2**63, 2**64 - 1, len(header) + 1)[rng.integers(5)]
-    return length.to_bytes(8, "little") + header + content[8 + size :]
-
-
-def _policy(valid: Path, rng: Rng, folder: Path, case: Case, unharmed: bool = False) -> None:
-    import hashlib
-
-    from agents.policy.files import load_policy
-
-    if unharmed:
-        load_policy(valid)
-        return
-    place = folder / "our_policy"
-    place.mkdir()
-    for file in valid.iterdir():
-        (place / file.name).write_bytes(file.read_bytes())
-    weights, configuration = place / "policy.safetensors", place / "policy.json"
-    chosen = configuration if configuration.is_file() and rng.random() < 0.5 else weights
-    content = chosen.read_bytes()
-    if chosen == configuration:
-        changed = json_bytes(rng, json.loads(content))
-    else:
-        changed = _resealed(rng, content) if rng.random() < 0.6 else damaged(rng, content)
-    written(case, chosen, changed)
-    if configuration.is_file() and chosen == weights and rng.random() < 0.7:
-        said = json.loads(configuration.read_text(encoding="utf-8"))
-        configuration.write_text(json.dumps({**said, "sha256": hashlib.sha256(changed).hexdigest()}), encoding="utf-8")
-    case.names = ("our_policy", "policy")
-    network = load_policy(place).network
-    assert np.isfinite(network.mean).all()
-
-
-def _recordings(folder: Path) -> tuple[dict[str, Any], np.ndarray[Any, Any], bytes]:
+def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarray[Any, Any], bytes]:
     from birthsim_env.physics.parameters import Parameters
-    from birthsim_live.rig.recording import EVERY, Recorder, load_recording
+    from birthsim_live.rig.frames import FIELDS
+    from birthsim_live.rig.recorder import EVERY, Recorder
+    from birthsim_live.rig.recording import FORMAT, load_recording
     from birthsim_live.rig.session import Session
 
-    session = Session(Parameters())
-    session.recorder = Recorder(session, folder / "one.npz")
+    session, path = Session(Parameters()), folder / "one.rec"
+    session.recorder = Recorder(session, path)
     session.advance(40 * EVERY)
-    session.recorder.save()
-    load_recording(folder / "one.npz")
-    with np.load(folder / "one.npz") as content:
-        return json.loads(str(content["header"])), content["rows"], (folder / "one.npz").read_bytes()
+    session.recorder.finish()
+    whole = load_recording(path)
+    header = {"format": FORMAT, "birthsim": "0", "rig": whole.rig.to_dict(), "columns": list(FIELDS), "interval": 0.004}
+    return header, {"events": whole.events}, whole.rows, path.read_bytes()
 
 
-def _rows(rng: Rng, rows: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    match int(rng.integers(8)):
+def _rows(rng: Rng, rows: np.ndarray[Any, Any]) -> bytes:
+    match int(rng.integers(6)):
         case 0:
-            return rows[: int(rng.integers(3))]
+            return rows[: int(rng.integers(3))].tobytes()
         case 1:
-            return rows.astype(rng.choice(["f4", ">f8", "i8", "c16", "U8"]))
+            return rows.astype(rng.choice(["f4", ">f8", "i8", "c16", "U8"])).tobytes()
         case 2:
-            return np.array([{"x": print}], dtype=object)
+            return rows[:, : int(rng.integers(5))].tobytes()
         case 3:
-            return rows[:, : int(rng.integers(5))]
-        case 4:
-            return np.array(0.0)
-        case 5:
             damage = rows.copy()
             damage.flat[rng.integers(damage.size, size=9)] = rng.choice([np.nan, np.inf, -1e308, 1e30, 0.0], size=9)
-            return damage
+            return damage.tobytes()
         case _:
-            return rows
+            return rows.tobytes()
 
 
-def _recording(valid: tuple[Any, Any, bytes], rng: Rng, folder: Path, case: Case) -> None:
+def _said(rng: Rng, said: dict[str, Any]) -> bytes:
+    return json_bytes(rng, said) if rng.random() < 0.6 else json.dumps(said).encode()
+
+
+def _chunk(content: bytes, digest: int = 0) -> bytes:
+    content = zlib.compress(content)
+    return struct.pack("<II", len(content), zlib.crc32(content) ^ digest) + content
+
+
+def _recording(valid: tuple[Any, Any, Any, bytes], rng: Rng, folder: Path, case: Case) -> None:
     from birthsim_live.rig.player import Player
     from birthsim_live.rig.recording import load_recording
 
-    header, rows, content = valid
+    header, events, rows, content = valid
     if rng.random() < 0.35:
         content = damaged(rng, content)
     else:
-        file = io.BytesIO()
-        text = json_bytes(rng, header).decode("utf-8", "replace") if rng.random() < 0.6 else json.dumps(header)
-        if rng.random() < 0.1:
-            with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-                size = int(rng.choice([2**20, 50 * 2**20]))
-                archive.writestr(
-                    "rows.npy",
-                    b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (90000000, 9), }" + bytes(size),
-                )
-                archive.writestr("header.npy", bytes(99))
-        else:
-            np.savez_compressed(file, rows=_rows(rng, rows), header=np.array(text))
-        content = file.getvalue()
-    player = Player(load_recording(written(case, folder / "ours.npz", content)))
+        chunks = [_chunk(_said(rng, header) + b"\n"), _chunk(_said(rng, events) + b"\n" + _rows(rng, rows))]
+        match int(rng.integers(10)):
+            case 0:
+                chunks.append(_chunk(bytes(200 * 2**20)))
+            case 1:
+                chunks[int(rng.integers(2))] = _chunk(b"{}\n", digest=1)
+            case 2:
+                chunks.reverse()
+            case 3:
+                chunks.append(struct.pack("<II", 2**32 - 1, 0))
+        content = b"".join(chunks)
+    player = Player(load_recording(written(case, folder / "ours.rec", content)))
     case.names = ()
     for _ in range(3):
         json.dumps(player.frame())
@@ -277,7 +228,6 @@ def _journal(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
 FILES: dict[str, Kind] = {
     "rig": Kind(_rig_files, _rig),
     "configuration": Kind(_configurations, _configuration),
-    "policy": Kind(_policies, _policy),
     "recording": Kind(_recordings, _recording),
     "task": Kind(_tasks, _task),
     "gains": Kind(loaded, _gains),

@@ -19,17 +19,8 @@ from tests.fuzz.mutations import nested
 
 
 def assert_no_failures(tmp_path, cases, seed):
-    line = [
-        sys.executable,
-        "-m",
-        "tests.fuzz",
-        "--cases",
-        str(cases),
-        "--seed",
-        str(seed),
-        "--out",
-        str(tmp_path / "fuzz.json"),
-    ]
+    line = [sys.executable, "-m", "tests.fuzz", "--kind", *KINDS, "--cases", str(cases), "--seed", str(seed)]
+    line += ["--out", str(tmp_path / "fuzz.json")]
     ended = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout
     figures = json.loads((tmp_path / "fuzz.json").read_text(encoding="utf-8"))["kinds"]
@@ -80,20 +71,18 @@ def test_the_harness_sees_every_misbehaviour(monkeypatch):
     assert 0 < figures.valid < 30
     assert 0 < figures.refused < 30
     assert {"names neither argument nor file", "does not say what is allowed", "KeyError", "the process ends with -11"} <= found
-    assert {"_ArrayMemoryError", "TooSlowError", "does os.system"} <= found
+    assert {"MemoryError", "TooSlowError", "does os.system"} <= found
     assert any(one.startswith("does writing to") for one in found)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [10**320, 16**5000, -(10**320), nested(3000), "x" * 5000, "a\nb", np.zeros((9, 9)), type("Odd", (), {"__repr__": None})()],
-)  # fmt: skip
-def test_any_value_is_shown_in_a_short_line(value):
+def test_any_value_is_shown_in_a_short_line():
     from birthsim_env.physics.values import LONGEST, shown
 
-    text = shown(value)
-    assert 0 < len(text) <= LONGEST
-    assert "\n" not in text
+    silent = type("Odd", (), {"__repr__": None})()
+    for value in (10**320, 16**5000, -(10**320), nested(3000), "x" * 5000, "a\nb", np.zeros((9, 9)), silent):
+        text = shown(value)
+        assert 0 < len(text) <= LONGEST
+        assert "\n" not in text
 
 
 def test_a_case_is_its_kind_seed_and_number():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.bench import stability
-from baselines.bench.haptics import coupled
+from baselines.bench.haptics import backdriving, coupled, rendering
 from baselines.bench.haptics.coupled import measure_hands, measure_z_width, stable_up_to
 from baselines.bench.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
 from baselines.figures import haptics as figures
@@ -116,6 +116,8 @@ def test_bad_input_is_one_plain_line(
 @pytest.mark.slow
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
+    monkeypatch.setattr(rendering, "STIFFNESSES", (2000.0,))
+    monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))
     own = tmp_path / "own.py"
     own.write_text(OWN)
     page = tmp_path / "page.md"
@@ -127,10 +129,10 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     best, still = strict(out / "haptics.json")["runs"]
     assert best["uses_force"]
     assert not still["uses_force"]
-    middle = best["impedance"][1]
+    (middle,) = best["impedance"]
     assert middle["stiffness"] == 2000.0
     assert np.median(np.array(middle["bandwidth"])[np.array(middle["peak"]) == 10.0]) > 3.0
-    assert still["impedance"][1]["declared"] is None
+    assert still["impedance"][0]["declared"] is None
     assert still["backdriving"][-1]["refused"] is None
     assert best["backdriving"][-1]["refused"].startswith("stiffness setpoint")
     for name in ("haptics_impedance", "haptics_energy", "haptics_release", "stability_hand_mass_held_ideal", "haptics_z_width"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,14 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.parameters import Parameters
-from birthsim_live.rig import recording
+from birthsim_live.rig import recorder, recording
 from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES
 from birthsim_live.rig.hand import Hold
 from birthsim_live.rig.player import Player
-from birthsim_live.rig.recording import EVERY, Recorder, Recording, load_recording
+from birthsim_live.rig.recorder import EVERY, Recorder
+from birthsim_live.rig.recording import Recording, load_recording, packed
 from birthsim_live.rig.session import Session
+from tests.bench.test_side_by_side import waited_for
 
 RIG = Parameters().replace({"mechanics.mass": 2.5})
 
@@ -47,15 +48,15 @@ def recorded(path: Path) -> tuple[list[dict[str, Any]], Recorder]:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str, Any]]]:
-    path = tmp_path_factory.mktemp("recordings") / "one.npz"
+    path = tmp_path_factory.mktemp("recordings") / "one.rec"
     frames, recorder = recorded(path)
-    recorder.save()
+    recorder.finish()
     return path, frames
 
 
 def test_what_is_played_is_what_was(file: tuple[Path, list[dict[str, Any]]]) -> None:
     path, frames = file
-    assert [place.name for place in path.parent.iterdir()] == ["one.npz"]
+    assert [place.name for place in path.parent.iterdir()] == ["one.rec"]
     player = Player(load_recording(path))
     assert player.recording.rig == RIG
     assert player.recording.duration == pytest.approx(35 * EVERY * 0.001)
@@ -94,41 +95,46 @@ def test_playing_goes_on_to_the_end_and_between_rows(file: tuple[Path, list[dict
 def test_a_loss_is_recorded(tmp_path: Path) -> None:
     session = Session(RIG)
     session.state[6] = 3e6
-    session.recorder = Recorder(session, tmp_path / "lost.npz")
+    session.recorder = Recorder(session, tmp_path / "lost.rec")
     session.advance(EVERY)
     session.recorder.take(session)
     for _ in range(EVERY):
         session.recorder.take(session)
-    session.recorder.save()
-    player = Player(load_recording(tmp_path / "lost.npz"))
+    session.recorder.finish()
+    player = Player(load_recording(tmp_path / "lost.rec"))
     player.seek(1.0)
     assert "pressure of chamber P1" in player.frame()["lost"]
 
 
 def test_a_recording_ends_by_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "LONGEST", 0.1)
+    monkeypatch.setattr(recorder, "LONGEST", 0.1)
     session = Session(RIG)
-    session.recorder = Recorder(session, tmp_path / "long.npz")
+    session.recorder = Recorder(session, tmp_path / "long.rec")
     session.advance(200)
     assert session.recorder.full
     assert session.recorder.seconds == pytest.approx(0.1)
 
 
 def rewritten(path: Path, folder: Path, change: Any) -> Path:
-    """A copy of a recording whose rows and header ``change`` has seen."""
-    with np.load(path, allow_pickle=False) as content:
-        rows, header = content["rows"], json.loads(str(content["header"]))
-    arrays = {"rows": rows, "header": header}
-    change(arrays)
-    if isinstance(arrays["header"], dict):
-        arrays["header"] = np.array(json.dumps(arrays["header"]))
-    copy = folder / "changed.npz"
-    np.savez(copy, **arrays)
+    """A copy of a recording, of two chunks, whose header, events and rows ``change`` has seen."""
+    whole = load_recording(path)
+    header = {
+        "format": recording.FORMAT, "birthsim": "0", "rig": whole.rig.to_dict(), "columns": list(FIELDS),
+        "interval": whole.interval,
+    }  # fmt: skip
+    parts = {"header": header, "events": whole.events, "rows": whole.rows}
+    change(parts)
+    copy = folder / "changed.rec"
+    copy.write_bytes(packed(parts["header"]) + packed({"events": parts["events"]}, parts["rows"]))
     return copy
 
 
 def put(**values: Any) -> Any:
-    return lambda arrays: arrays["header"].update(values)
+    return lambda parts: parts["header"].update(values)
+
+
+def events(*listed: Any) -> Any:
+    return lambda parts: parts.update(events=list(listed))
 
 
 DAMAGES = {
@@ -137,56 +143,113 @@ DAMAGES = {
     "an impossible rig": put(rig={"mechanics": {"mass": -1.0}}),
     "a rig that is none": put(rig=3),
     "no interval": put(interval=0.0),
-    "events that are none": put(events=[3]),
-    "an event beyond the end": put(events=[{"row": 10**6, "lost": None}]),
-    "events out of order": put(events=[{"row": 5, "lost": None}, {"row": 4, "lost": None}]),
-    "a path that is none": put(events=[{"row": 0, "path": [[1]]}]),
-    "settings that are none": put(events=[{"row": 0, "settings": {"Kclx": [1]}}]),
-    "an event of another kind": put(events=[{"row": 0, "script": "x"}]),
-    "rows of another size": lambda arrays: arrays.update(rows=np.zeros((3, COLUMNS + 1))),
-    "rows of another kind": lambda arrays: arrays.update(rows=np.zeros((3, COLUMNS), dtype=np.float32)),
-    "no rows": lambda arrays: arrays.update(rows=np.zeros((0, COLUMNS))),
-    "a pickle": lambda arrays: arrays.update(header=np.array([{"format": 1}], dtype=object)),
-    "a header that is no JSON": lambda arrays: arrays.update(header=np.array("{")),
-    "something else too": lambda arrays: arrays.update(more=np.zeros(3)),
+    "events that are none": events(3),
+    "no list of events": lambda parts: parts.update(events=None),
+    "an event beyond the end": events({"row": 10**6, "lost": None}),
+    "events out of order": events({"row": 5, "lost": None}, {"row": 4, "lost": None}),
+    "a path that is none": events({"row": 0, "path": [[1]]}),
+    "settings that are none": events({"row": 0, "settings": {"Kclx": [1]}}),
+    "an event of another kind": events({"row": 0, "script": "x"}),
+    "rows of another size": lambda parts: parts.update(rows=np.zeros((3, COLUMNS + 1))),
+    "no rows": lambda parts: parts.update(rows=np.zeros((0, COLUMNS)), events=[]),
+    "a header that is none": lambda parts: parts.update(header=3),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_what_is_foreign_is_refused_by_name(damage: str, file: tuple[Path, Any], tmp_path: Path) -> None:
     copy = rewritten(file[0], tmp_path, DAMAGES[damage])
-    with pytest.raises(ValueError, match=r"changed.npz' is damaged or foreign .*; allowed: what birthsim-live wrote"):
+    with pytest.raises(ValueError, match=r"changed.rec' is damaged or foreign .*; allowed: what birthsim-live wrote"):
         load_recording(copy)
 
 
 def test_what_is_damaged_is_refused_by_name(file: tuple[Path, Any], tmp_path: Path) -> None:
     whole = file[0].read_bytes()
-    broken = tmp_path / "broken.npz"
-    for content in (b"", b"hello", whole[: len(whole) // 2], whole[:200] + bytes(300) + whole[500:]):
+    broken = tmp_path / "broken.rec"
+    for content in (b"", b"hello", whole[:100], whole[:200] + bytes(300) + whole[500:], whole + whole[:300] + whole):
         broken.write_bytes(content)
-        with pytest.raises(ValueError, match=r"broken.npz' is damaged or foreign"):
+        with pytest.raises(ValueError, match=r"broken.rec' is damaged or foreign"):
             load_recording(broken)
-    with pytest.raises(ValueError, match=r"none.npz' cannot be read: No such file"):
-        load_recording(tmp_path / "none.npz")
+    with pytest.raises(ValueError, match=r"none.rec' cannot be read: No such file"):
+        load_recording(tmp_path / "none.rec")
 
 
-def test_a_file_that_claims_too_much_is_not_unpacked(file: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_holds_too_much_is_not_unpacked(file: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording, "LARGEST", 1000)
     with pytest.raises(ValueError, match="allowed: up to 1000"):
         load_recording(file[0])
 
 
-def test_an_interrupted_save_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_written_is_read_while_the_recording_goes_on(tmp_path: Path) -> None:
     session = Session(RIG)
-    recorder = Recorder(session, tmp_path / "half.npz")
+    running = Recorder(session, tmp_path / "on.rec")
+    session.recorder = running
+    running.open()
+    assert len(load_recording(running.path).rows) == 1
+    session.advance(40 * EVERY)
+    waited_for(lambda: len(load_recording(running.path).rows) == 41)
+    # As a kill may leave it: a part of a chunk.
+    whole = running.path.read_bytes()
+    torn = tmp_path / "torn.rec"
+    for cut in (1, 7, 9, 30):
+        torn.write_bytes(whole + packed({"events": []}, np.ones((9, COLUMNS)))[:cut])
+        assert len(load_recording(torn).rows) == 41
+    running.finish()
+    assert running.path.read_bytes() == whole
 
-    def fail(*_: Any, **__: Any) -> None:
-        raise OSError("no space left")
 
-    monkeypatch.setattr(np, "savez_compressed", fail)
-    with pytest.raises(OSError, match="no space"):
-        recorder.save()
-    assert not (tmp_path / "half.npz").exists()
+def test_a_disk_that_takes_no_more_keeps_what_came_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session(RIG)
+    running = Recorder(session, tmp_path / "full.rec")
+    session.recorder = running
+    running.open()
+    assert running._file is not None
+    real, room = running._file, 100
+
+    class Full:
+        """Takes ``room`` bytes and then none."""
+
+        def write(self, content: bytes) -> int:
+            nonlocal room
+            if not room:
+                raise OSError(28, "No space left on device")
+            done, room = real.write(content[:room]), 0
+            return int(done or 0)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(real, name)
+
+    monkeypatch.setattr(running, "_file", Full())
+    session.advance(10 * EVERY)
+    waited_for(lambda: running.full)
+    session.advance(10 * EVERY)
+    with pytest.raises(OSError, match="No space left"):
+        running.finish()
+    assert [path.name for path in tmp_path.iterdir()] == ["full.rec"]
+    content = running.path.read_bytes()
+    assert len(load_recording(running.path).rows) == 1
+    assert len(content) == running._length
+
+
+def test_a_recording_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
+    session = Session(RIG)
+    (tmp_path / "taken.rec").write_bytes(b"another's")
+    for place in ("taken.rec", "none/one.rec"):
+        with pytest.raises(OSError, match=r"exists|No such file"):
+            Recorder(session, tmp_path / place).open()
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.rec"]
+
+
+def test_a_name_that_is_taken_costs_no_row(tmp_path: Path) -> None:
+    session = Session(RIG)
+    (tmp_path / "taken.rec").write_bytes(b"another's")
+    session.recorder = running = Recorder(session, tmp_path / "taken.rec")
+    with pytest.raises(FileExistsError):
+        running.open()
+    session.advance(4 * EVERY)
+    running.path = tmp_path / "free.rec"
+    running.finish()
+    assert len(load_recording(running.path).rows) == 5
 
 
 def test_a_recording_is_a_value() -> None:

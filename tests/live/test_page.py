@@ -247,7 +247,7 @@ def test_a_recording_is_saved_played_and_searched(chromium, window, tmp_path, pi
     window.wait("birthsim.state.recording === null && birthsim.state.last_recording !== null")
     with page.expect_download() as download:
         page.locator("#download").click()
-    file = tmp_path / "pull.npz"
+    file = tmp_path / "pull.rec"
     download.value.save_as(file)
     recording = load_recording(file)
     pulled = recording.interval * float(np.argmax(recording.rows[:, SLICES["drag_force"]][:, 0]))

@@ -58,3 +58,13 @@ def test_special_values():
     assert (exact.sine(math.pi / 2), exact.cosine(0.0)) == (1.0, 1.0)
     assert all(math.isnan(f(nothing)) for f in (exact.exp, exact.exp2, exact.log, exact.log1p, exact.tanh))
     assert math.isnan(exact.log(-1.0))
+
+
+def test_directions_and_functions_by_name():
+    angles = np.array([0.0, 0.3, -2.0, 7.5])
+    along, across = exact.direction(angles)
+    np.testing.assert_array_equal(along, [exact.cosine(x) for x in angles])
+    np.testing.assert_array_equal(across, [exact.sine(x) for x in angles])
+    assert exact.direction(0.3) == (exact.cosine(0.3), exact.sine(0.3))
+    for name in ("sine", "cosine", "exp", "log2"):
+        assert exact.number(name, 0.7) == getattr(exact, name)(0.7)

@@ -180,3 +180,11 @@ def test_opening_for_active_flow_inverts_one_valve_per_cylinder(
     )
     assert valves.opening_for_active_flow(most + 1e-3, *at) == 1
     assert valves.opening_for_active_flow(least - 1e-3, *at) == -1
+
+
+def test_a_valve_opens_however_small_the_driving_pressure() -> None:
+    """A twentieth of a Pa kg/m3 drives 1e-10 kg/s at an opening of a half; only without any the valve stays shut."""
+    assert valves.opening_for(1e-10, 0.05, 1.0, 3.9e-9) == pytest.approx(1e-10 / (3.9e-9 * 0.05))
+    assert valves.opening_for(-1e-10, 1.0, 0.05, 3.9e-9) == pytest.approx(-1e-10 / (3.9e-9 * 0.05))
+    assert valves.opening_for(1e-10, 0.0, 1.0, 3.9e-9) == 0.0
+    assert valves.opening_for(-1e-10, 1.0, -0.05, 3.9e-9) == 0.0

@@ -11,7 +11,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 MAKE = "import gymnasium, birthsim_env; gymnasium.make{}('BirthSIM/CircleResidual-v1')"
-COMMAND = "import sys; sys.argv = ['/somewhere/birthsim-train', '--help']; from birthsim_env.learned import command; command()"
+COMMAND = (
+    "import sys; sys.argv = ['/somewhere/birthsim-train', '--help']; from baselines.commands.start import command; command()"
+)
 
 
 def run(script, folder):

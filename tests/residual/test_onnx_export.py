@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +17,6 @@ import pytest
 import torch
 
 import agents
-from agents.commands import export
 from agents.policy import onnx_export
 from agents.policy.controller import ResidualController, observation_size
 from agents.policy.files import WEIGHTS, Policy, save_policy
@@ -26,7 +24,6 @@ from agents.policy.network import PolicyNetwork
 from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
 from agents.residual.law import action_names
 from agents.residual.settings import ResidualSettings
-from birthsim_env.learned import command
 from tests.console import call
 
 ROOT = Path(__file__).parent.parent.parent
@@ -245,15 +242,6 @@ def refused(monkeypatch, capsys, *arguments):
     assert complaint.startswith("birthsim-export: error: ")
     assert complaint.count("\n") == 1
     return complaint
-
-
-def test_the_script_is_this_command(monkeypatch, capsys):
-    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
-    assert scripts["birthsim-export"] == "birthsim_env.learned:command"
-    monkeypatch.setattr(sys, "argv", ["/somewhere/birthsim-export"])
-    monkeypatch.setattr(export, "main", lambda: print("export"))
-    command()
-    assert capsys.readouterr().out == "export\n"
 
 
 def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import gymnasium
@@ -13,7 +14,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.residual.settings import ResidualSettings
-from agents.training.algorithms import make_model, network_of
+from agents.training.algorithms import make_model, network_of, unchecked_distributions
 from agents.training.configuration import ALGORITHMS, TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 
@@ -125,3 +126,11 @@ def test_the_average_forgets_over_a_twentieth_of_the_training(algorithm):
     for _ in range(25):
         model.average.update_parameters(model.policy)
     np.testing.assert_allclose(averaged.detach().numpy(), 1 - (1 - 1 / 25) ** 25, rtol=1e-5)
+
+
+def test_distributions_are_checked_again_after_a_training():
+    nothing = torch.tensor([math.nan])
+    with unchecked_distributions():
+        torch.distributions.Normal(nothing, torch.ones(1))
+    with pytest.raises(ValueError, match="parameter loc"):
+        torch.distributions.Normal(nothing, torch.ones(1))

@@ -1,0 +1,77 @@
+"""How commands answer signals: in one line, from the first moment to the last."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines.files import whole_results
+from tests.console import PATIENCE, ROOT
+
+LOADING = """
+import sys, time
+sys.argv[0] = "/somewhere/birthsim-tune"
+from baselines.commands import start
+def load(name):
+    print("loading", name, flush=True)
+    time.sleep(600)
+start._module = load
+start.command()
+"""
+
+LEAVING = """
+import argparse, atexit, signal, sys, time
+from baselines.commands.shared import run
+def leave():
+    print("leaving", flush=True)
+    time.sleep(600)
+atexit.register(leave)
+run(argparse.ArgumentParser("birthsim-x"), lambda arguments: signal.raise_signal(signal.SIGTERM))
+"""
+
+
+@pytest.mark.parametrize(
+    ("ending", "said"), [("SIGINT", "interrupted"), ("SIGTERM", "terminated"), ("SIGHUP", "the terminal is gone")]
+)
+@pytest.mark.parametrize("program", [LOADING, LEAVING], ids=["while it is loaded", "while it leaves"])
+def test_a_signal_ends_a_command_in_one_line(program, ending, said):
+    number = signal.Signals[ending]
+    with subprocess.Popen(
+        [sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() in ("loading tune\n", "leaving\n")
+            process.send_signal(number)
+            complained = process.communicate(timeout=PATIENCE)[1]
+        finally:
+            process.kill()
+    expected = f"birthsim-tune: {said}\n" if program == LOADING else "birthsim-x: terminated\n"
+    assert (process.returncode, complained) == (128 + number, expected)
+
+
+def test_signals_wait_while_results_replace_others(tmp_path, monkeypatch):
+    """The signal comes with the first rename; all files are there before it counts."""
+    for name in "abc":
+        (tmp_path / name).write_text("old")
+    replace = Path.replace
+
+    def renamed(self, target):
+        signal.raise_signal(signal.SIGINT)
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", renamed)
+
+    def write():
+        with whole_results(tmp_path) as place:
+            for name in "abc":
+                (place / name).write_text("new")
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys("abc", "new")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -1,0 +1,55 @@
+"""Kills commands at random moments and says what that leaves: ``python -m tests.kills --target evaluate --kills 10``."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from tests.kills.processes import end_all, hear_signals
+from tests.kills.recording import RECORD, RecordingCourse
+from tests.kills.report import read_outcomes, summary, write_outcomes, write_page
+from tests.kills.targets import ROOT, TARGETS
+from tests.kills.tries import SCENARIOS, Course
+
+PAGE = ROOT / "docs" / "kills.md"
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="python -m tests.kills", description=__doc__)
+    names = (*TARGETS, RECORD)
+    parser.add_argument("--target", action="append", choices=names, help="may be repeated (default: all)")
+    parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="may be repeated (default: all)")
+    parser.add_argument("--kills", type=int, default=50, help="per target, over all scenarios (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the moments (default: %(default)s)")
+    parser.add_argument("--out", type=Path, help="JSON file to write; what it holds of other targets stays")
+    parser.add_argument("--page", nargs="?", type=Path, const=PAGE, help="write the table from --out (default: docs/kills.md)")
+    arguments = parser.parse_args()
+    hear_signals()
+    scenarios, outcomes = arguments.scenario or tuple(SCENARIOS), []
+    for name in arguments.target or names:
+        rng = np.random.default_rng([arguments.seed, names.index(name)])
+        work = Path(tempfile.mkdtemp(prefix=f"kills-{name}-"))
+        try:
+            course = RecordingCourse(work, rng) if name == RECORD else Course(TARGETS[name], work, rng)
+            done = dict.fromkeys(scenarios, 0)
+            while sum(done.values()) < arguments.kills:
+                scenario = min(done, key=lambda name: done[name] / SCENARIOS[name])
+                outcomes.append(course.attempt(scenario))
+                done[scenario] += outcomes[-1].count
+                print(summary(outcomes[-1]), flush=True)
+                if arguments.out is not None:
+                    write_outcomes(arguments.out, outcomes, arguments.seed)
+        finally:
+            end_all()
+            shutil.rmtree(work, ignore_errors=True)
+    if arguments.page is not None and arguments.out is not None:
+        write_page(arguments.page, read_outcomes(arguments.out))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""What is killed: commands with arguments that take seconds, and which files may differ from run to run."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+INPUTS = Path(__file__).resolve().parent / "inputs"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A command as a user runs it.
+
+    ``arguments`` hold ``{out}``, where it writes: a folder, or ``file`` in one; and ``{inputs}``, the folder of TOML files.
+    ``older`` are arguments that take the place of ``first``, as those of an earlier run in the same folder. ``differ`` has
+    patterns of files, and ``costs`` keys of JSON files in subfolders, that differ from run to run. With ``alone`` one process
+    has the folder to itself: a second one says so and ends. With ``partway`` an interrupted run writes results of what is
+    complete.
+    """
+
+    name: str
+    command: str
+    arguments: tuple[str, ...]
+    first: tuple[str, ...] = ()
+    older: tuple[str, ...] = ()
+    file: str = ""
+    differ: tuple[str, ...] = ()
+    costs: tuple[str, ...] = ()
+    alone: bool = False
+    partway: bool = False
+
+    def line(self, folder: Path, older: bool = False) -> list[str]:
+        """The words after the command's name."""
+        words = (*(self.older if older else self.first), *self.arguments)
+        return [word.format(out=folder / self.file, inputs=INPUTS) for word in words]
+
+
+TARGETS = {
+    target.name: target
+    for target in (
+        Target(
+            "evaluate", "birthsim-evaluate",
+            ("--env", "BirthSIM/Probe-v1", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
+            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+        ),
+        Target(
+            "compare", "birthsim-evaluate",
+            (
+                *("--all", "--no-studies", "--env", "BirthSIM/Probe-v1", "--sensors", "ideal"),
+                *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
+            ),
+            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+        ),
+        Target(
+            "stability", "birthsim-stability",
+            ("--controller", "backstepping", "--map", "rig", "--points", "2", "--out", "{out}"),
+            older=("--seed", "7", "--sensors", "lab"),
+        ),
+        Target(
+            "tune", "birthsim-tune",
+            ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
+            differ=("trials.journal",), alone=True, partway=True,
+        ),
+        Target(
+            "train", "birthsim-train",
+            ("--config", "{inputs}/train.toml", "--steps", "2048", "--seeds", "2", "--jobs", "2", "--out", "{out}"),
+            differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
+        ),
+        Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
+        Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),
+        Target(
+            "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
+            costs=("cost", "sha256"),
+        ),
+        Target(
+            "search", "birthsim-sweep", ("{inputs}/search.toml", "--out", "{out}"), differ=("trials.journal",),
+            costs=("cost", "sha256"), alone=True,
+        ),
+        Target(
+            "animate", "birthsim-animate",
+            ("--begin", "0.5", "--end", "1.5", "--rate", "10", "--out", "{out}"), older=("--seed", "7"), file="pair.webp",
+        ),
+    )
+}  # fmt: skip
+"""Without the recording, which is no command that ends by itself: ``recording.py``."""
+
+
+def program(command: str) -> str:
+    """Python source that runs a command by the entry point that ``pyproject.toml`` gives it."""
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    module, _, function = scripts[command].partition(":")
+    return f"import sys; sys.argv[0] = {command!r}; from {module} import {function}; {function}()"

@@ -1,0 +1,73 @@
+"""The harness itself: it ends what it begins, and sees what is torn."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from tests.kills import checks
+from tests.kills.report import write_outcomes, write_page
+from tests.kills.targets import TARGETS, Target
+from tests.kills.tries import Course, Outcome
+
+
+@pytest.mark.slow
+def test_a_killed_export_goes_on(tmp_path):
+    """One kill and one termination; a full disk would need root."""
+    course = Course(TARGETS["export"], tmp_path, np.random.default_rng(0))
+    for scenario in ("SIGKILL", "SIGTERM", "two at once"):
+        outcome = course.attempt(scenario)
+        assert outcome.equal, outcome
+        faults = outcome.broken, outcome.leftovers, outcome.tracebacks, outcome.talk, outcome.alive, outcome.trouble
+        assert not any(faults), outcome
+
+
+def test_files_that_are_torn_are_seen_and_hidden_ones_are_leftovers(tmp_path):
+    (tmp_path / "whole.json").write_text("{}")
+    (tmp_path / "torn.json").write_text('{"a": 1')
+    (tmp_path / "torn.svg").write_text("<svg><g>")
+    (tmp_path / "torn.png").write_bytes(b"\x89PNG")
+    (tmp_path / "torn.md").write_text("| a |")
+    (tmp_path / "trials.journal").write_text('{"a": 1}\n{"a"')
+    (tmp_path / ".whole.json.host-1.partial").write_text("{")
+    (tmp_path / "piece.claim").write_text("")
+    assert [line.partition(":")[0] for line in checks.broken(tmp_path)] == ["torn.json", "torn.md", "torn.png", "torn.svg"]
+    assert checks.leftovers(tmp_path) == [".whole.json.host-1.partial", "piece.claim"]
+
+
+def test_results_are_equal_but_for_what_may_differ(tmp_path):
+    target = Target("one", "birthsim-one", (), differ=("times.json",), costs=("cost",))
+    one, other = tmp_path / "one", tmp_path / "other"
+    (one / "pieces").mkdir(parents=True)
+    (one / "pieces" / "a.json").write_text('{"result": [{"cost": 1, "error": 2}]}')
+    (one / "all.json").write_text('{"cost": 1}')
+    (one / "times.json").write_text("{}")
+    shutil.copytree(one, other)
+    (other / "times.json").write_text("[]")
+    (other / "pieces" / "a.json").write_text('{"result": [{"cost": 3, "error": 2}]}')
+    assert checks.results(target, one) == checks.results(target, other)
+    (other / "all.json").write_text('{"cost": 3}')
+    found, others = checks.results(target, one), checks.results(target, other)
+    assert [name for name in found if found[name] != others[name]] == ["all.json"]
+
+
+def test_progress_bars_are_no_complaints():
+    said = (
+        "BirthSIM: compiling numerical kernels\nepisodes:  50%|##   | 1/2 [00:18<00:18, 18.28s/piece]\rbirthsim-x: terminated\n"
+    )
+    assert checks.said(said) == ["birthsim-x: terminated"]
+
+
+def test_the_page_counts_and_names_what_fell_short(tmp_path):
+    outcomes = [
+        Outcome("tune", "SIGKILL", "1 s", 1, [-9, 0], equal=True),
+        Outcome("tune", "SIGKILL", "2 s", 3, [-9, -9, -9, 0], leftovers=["a.claim"], trouble=["differs: a"]),
+    ]
+    write_outcomes(tmp_path / "kills.json", outcomes[:1], 0)
+    write_page(tmp_path / "kills.md", write_outcomes(tmp_path / "kills.json", outcomes, 0))
+    page = (tmp_path / "kills.md").read_text()
+    assert "| tune | SIGKILL | 4 | 2 | 1 | 0 | 0 | 1 | 0 | 0 | 0 | 1 |" in page
+    assert "- tune, SIGKILL, 2 s: left: a.claim" in page
+    assert "- tune, SIGKILL, 2 s: differs: a" in page
