@@ -415,5 +415,5 @@ def test_a_training_ends_once_it_is_far_enough_below_the_papers_law(tmp_path, sh
         assert (reached["curve"][-1]["steps"] < settings.steps) == enough
     again = train(easy, residual, tmp_path / "True", Parameters().replace({"mechanics.mass": 3.0}))
     assert again["curve"][-1]["steps"] < easy.steps, "once more, it is still good enough"
-    with pytest.raises(ValueError, match=r"until = 0\.0; allowed: above 0 and up to 100 \(%\)"):
+    with pytest.raises(ValueError, match=r"until = 0\.0; allowed: a finite number > 0 and <= 100 \(%\)"):
         replace(easy, until=0.0)
