@@ -10,7 +10,7 @@
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
-# make moving compares the laws under hands that move
+# make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -36,7 +36,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -182,6 +182,10 @@ scratch: $(READY)
 moving: $(READY)
 	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
 	cp $(OUT)/moving/comparison.md docs/moving.md
+
+haptics: $(READY)
+	$(BIN)/birthsim-haptics --out $(OUT)/haptics --page docs/haptics.md
+	cp $(OUT)/haptics/*.png docs/
 
 fuzz: $(READY)
 	mkdir -p $(OUT)

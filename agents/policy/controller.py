@@ -12,6 +12,7 @@ from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy
 from agents.residual.law import ResidualLaw, observation_names
 from agents.residual.settings import ResidualSettings
+from baselines.impedance import Impedance
 from birthsim_env import observation
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
@@ -61,6 +62,10 @@ class ResidualController:
         elif self._action.shape[1]:
             self._action[:, lanes] = 0.0
             self._law.reset(lanes)
+
+    def declared_impedance(self, reference: Reference) -> Impedance | None:
+        """What the law underneath means to render, over N lanes; None without a law."""
+        return self._law.declared_impedance(reference)
 
     def command(self, measurement: Measurement, reference: Reference) -> Array:
         """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""

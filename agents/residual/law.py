@@ -17,6 +17,7 @@ import numpy as np
 from agents.residual import authority, unexplained
 from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSettings
 from baselines.estimation import disturbance_observer, observers
+from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import (
@@ -224,6 +225,10 @@ class ResidualLaw(StagedController):
         fresh[PISTONS + (observers.FRESH if sampled else 4)] = 1.0
         own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *self._p]), fresh)
         return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
+
+    def declared_impedance(self, reference: Reference) -> Impedance | None:
+        """What the law underneath means to render, over N lanes; None without a law."""
+        return declared_by(self._law, reference)
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         self._law.explain(measurement, reference)

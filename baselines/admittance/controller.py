@@ -20,6 +20,7 @@ from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_gains, require_stiffness
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.observers import FRESH, memory_rows
+from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import exact
@@ -99,6 +100,10 @@ class AdmittanceBackstepping(StagedController):
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
         return self._memories[0][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
+
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """The mass, damper and spring of the admittance, over N lanes."""
+        return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         g, rig = self._gains["lab" if sampled else "ideal"], self.parameters

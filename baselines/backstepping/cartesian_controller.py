@@ -8,8 +8,10 @@ import numpy as np
 
 from baselines.backstepping import cartesian_law
 from baselines.backstepping.controller import PNEUMATIC_GAIN, SIGN_WIDTH
+from baselines.backstepping.impedance import cartesian_impedance
 from baselines.controller import lanes_of, require_stiffness
 from baselines.estimation.observers import PistonObserver, measured_joints
+from baselines.impedance import Impedance
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.lanes import Array, parameter_column
 from birthsim_env.physics.parameters import Parameters, load_parameters
@@ -38,6 +40,11 @@ class CartesianBackstepping:
         least_gain = max(rig.cylinder1.viscous_friction, rig.cylinder2.viscous_friction) / (3 * rig.mechanics.mass)
         self._least_stiffness = rig.mechanics.mass * (least_gain**2 + 2) / 3
         self._observer = PistonObserver(self.parameters, self._p)
+
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """What the gain matrices render to slow pushes at the reference pose, over N lanes."""
+        require_stiffness(reference, self._least_stiffness)
+        return cartesian_impedance(reference, self.parameters)
 
     def reset(self, lanes: Mask | None = None) -> None:
         self._observer.reset(lanes)

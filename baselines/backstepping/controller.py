@@ -10,8 +10,10 @@ import numpy as np
 
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
+from baselines.backstepping.impedance import paper_impedance
 from baselines.controller import feedforward_rows, lanes_of
 from baselines.estimation.observers import BANDWIDTH, FRESH, PistonObserver, measured_joints, memory_rows, observe
+from baselines.impedance import Impedance
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import (
     ACTION,
@@ -154,6 +156,10 @@ class BacksteppingController(StagedController):
         self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
         self._options[backstepping_law.FORCE_FIRST] = self.force_first
         self._observer = PistonObserver(self.parameters, self._p)
+
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
+        return paper_impedance(reference, self.parameters, self.damping_ratio)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         board, rows = self.parameters.electronics, memory_rows(self.parameters) if sampled else 0

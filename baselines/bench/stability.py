@@ -1,31 +1,27 @@
 """Where a controller is stable: maps over what it does not know of its rig, and over the hand that holds the end effector.
 
-A hand is a spring to the point where the end effector rests, without mass or damping: what damps it is the rig. From rest it
-is pushed with 40 N, more than stiction, for 0.3 s. Five seconds later, for one second, the motion that remains is judged.
+A hand is a spring to the point where the end effector rests. In the maps of ``MAPS`` it has no mass or damping: what damps it
+is the rig. From rest it is pushed with 40 N, more than stiction, for 0.3 s. Five seconds later, for one second, the motion that
+remains is judged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from baselines.bench.pieces import file_stem
 from baselines.bench.probes import Window, board_limit
+from baselines.bench.rig_port import Port, RigPort
 from baselines.bench.tasks import Result, Task
 from baselines.controller import Controller
 from baselines.registry import make_controller
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.dynamics import INTEGRATION_STEP
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.loop.signals import REFERENCES, Mask, Reference
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.plant import Plant
 
 PLACE = (0.5, 0.0)
 """m, the target: the middle of the workspace."""
@@ -71,11 +67,14 @@ FRICTION = Axis("dry friction, fraction of the believed one", 0.0, 1.5, 13)
 
 @dataclass(frozen=True)
 class Cases:
-    """N cases: their rigs, the stiffness of the hand (N,) and that asked for (N,), N/m."""
+    """N cases: their rigs, the stiffness of the hand (N,) and that asked for (N,), N/m; damping, N s/m, and mass, kg, of the
+    hand (N,), none where not given."""
 
     rigs: Sequence[Parameters]
     hand: Array
     asked: Array
+    damping: Array | None = None
+    mass: Array | None = None
 
 
 def _rig_cases(rig: Parameters, lag: Array, mass: Array) -> Cases:
@@ -137,50 +136,53 @@ VARIANTS: dict[str, dict[str, dict[str, float]]] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """Peak to peak motion of the larger axis in the second that is judged, m, (N,); ``stable`` and ``lost`` (N,)."""
+    """Peak to peak motion of the larger axis in the second that is judged, m, (N,); ``stable`` and ``lost`` (N,); peak to peak
+    force at the port in that second, N, (N,), and the most energy that the port had given to the hand at any time, J, (N,)."""
 
     motion: Array
     stable: Mask
     lost: Mask
+    force: Array
+    energy: Array
 
 
-def judge(cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0) -> Verdict:
-    """Hold, push and release every lane, a case each."""
+def judge(
+    cases: Cases, controller: Controller, sensors: str = "ideal", seed: int = 0, damping_factor: Array | None = None,
+    force_sensor: bool = True,
+) -> Verdict:  # fmt: skip
+    """Hold, push and release every lane, a case each. ``damping_factor`` (N,) and ``force_sensor`` as in ``RigPort``."""
     rigs, lanes = cases.rigs, len(cases.hand)
-    board, plant = rigs[0].electronics, Plant(rigs, lanes)
     rows = np.zeros((REFERENCES, lanes))
     rows[:2], rows[8:10], rows[10:12] = np.transpose([PLACE]), cases.asked, np.transpose([PNEUMATIC])
-    reference, held = Reference(rows), rows[:2].copy()
-    piston = inverse_geometry(held, rigs[0])
-    plant.state = balanced_state(plant.lane_parameters, piston, np.zeros((2, lanes)), reference.pneumatic_stiffness)
-    model = SENSORS[sensors](board, lanes)
-    for lane in range(lanes):
-        model.begin(lane, stream(seed + lane, 0, "sensors"))
-    controller.reset()
-    impacts, window = np.zeros(lanes), Window(lanes)
-    # The hand answers at the integrator's steps, not at those of the control board.
-    answers = max(1, round(board.control_period / INTEGRATION_STEP))
-    step = board.control_period / answers
-    for period in range(round(END / board.control_period)):
-        now = period * board.control_period
+    damping, mass = (np.zeros(lanes) if given is None else given for given in (cases.damping, cases.mass))
+    port = RigPort(rigs, Reference(rows), controller, sensors, seed, mass, damping_factor, force_sensor)
+    verdict = push_and_release(port, rows[:2].copy(), cases.hand, damping)
+    lost = verdict.lost | (port.impacts > board_limit(rigs))
+    return replace(verdict, stable=verdict.stable & ~lost, lost=lost)
+
+
+def push_and_release(port: Port, held: Array, stiffness: Array, damping: Array) -> Verdict:
+    """What remains at a port of the push, where hands of a stiffness (N,), N/m, and a damping (N,), N s/m, hold it at
+    positions ``held`` (2, N), m."""
+
+    def hand(now: float, position: Array, velocity: Array) -> Array:
         push = np.transpose([PUSH]) * float(PUSHED <= now < RELEASED)
-        motion = plant.end_effector()
-        if now >= JUDGED:
-            window.add(motion[:2])
-        force = push - cases.hand * (motion[:2] - held)
-        clock, ticks = np.full(lanes, now), np.full(lanes, period)
-        seen: Measurement = model.measure(ticks, clock, motion, plant.pressures, force)
-        openings = controller.command(seen, reference)
-        for answer in range(answers):
-            motion = plant.end_effector() if answer else motion
-            # Half a step ahead, or a force that is held for a step would feed the spring with energy.
-            force = push - cases.hand * (motion[:2] + 0.5 * step * motion[2:] - held)
-            plant.advance_unchecked(openings, np.ascontiguousarray(force[None]), step)
-            np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
-    span = window.span().max(axis=0)
-    lost = ~np.isfinite(span) | (impacts > board_limit(rigs))
+        return np.asarray(push - stiffness * (position - held) - damping * velocity)
+
+    motion, force, most = Window(port.lanes), Window(port.lanes), np.zeros(port.lanes)
+    for period in range(round(END / port.period)):
+        judged = period * port.period >= JUDGED
+        if judged:
+            motion.add(port.motion()[:2])
+        port.advance(hand)
+        np.maximum(most, port.energy, out=most)
+        if judged:
+            force.add(port.force)
+    span = motion.span().max(axis=0)
+    lost = ~np.isfinite(span)
     with np.errstate(divide="ignore"):
-        return Verdict(span, ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / cases.hand)), lost)
+        stable = ~lost & (span < np.minimum(MOST_MOTION, MOST_FORCE / stiffness))
+    return Verdict(span, stable, lost, force.span().max(axis=0), most)
 
 
 def variants_of(controller: str) -> dict[str, dict[str, float]]:

@@ -18,7 +18,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.controller import check_gains, lanes_of
+from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.state_estimator import Estimate, StateEstimator
+from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
@@ -130,6 +132,10 @@ class NonlinearMPC:
         names = ("speed", "stiffness", "flow")
         tolerances = {"position": self.POSITION_TOLERANCE, **{name: gains[f"{name}_tolerance"] for name in names}}
         return Planner(self.parameters, self._steps, tolerances)
+
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """The mass, damper and spring of the admittance, over N lanes."""
+        return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""

@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from baselines.controller import check_gains, lanes_of
-from baselines.estimation.admittance import Admittance
+from baselines.estimation.admittance import DAMPING_RATIO, Admittance
 from baselines.estimation.observers import PistonObserver
 from baselines.estimation.state_estimator import is_moving
+from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.feedforward import NEEDED, prepare
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.compilation import helper
@@ -68,6 +69,10 @@ class TrackingController(ABC):
         self._admittance = Admittance(self.parameters)
         self._observer = PistonObserver(self.parameters, self._p)
         self._integral: Array = np.empty((2, 0))
+
+    def declared_impedance(self, reference: Reference) -> Impedance:
+        """The mass, damper and spring of the admittance, over N lanes."""
+        return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     @abstractmethod
     def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:

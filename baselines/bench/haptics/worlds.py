@@ -1,0 +1,113 @@
+"""The rigs, targets and laws that the measurements share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.probes import board_limit
+from baselines.bench.rig_port import RigPort, takes_damping_factor
+from baselines.bench.stability import PNEUMATIC
+from baselines.controller import Controller
+from baselines.registry import make_controller
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.parts.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.seeding import stream
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+
+POSES = ((0.5, 0.0), (0.4, 0.05), (0.62, -0.1))
+"""m: the middle of the workspace and two corners, of those of ``baselines.bench.probes``."""
+
+DIRECTIONS = ((1.0, 0.0), (0.0, 1.0))
+"""A hand pushes along x or along y."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A law as JSON names it: ``controller`` and the ``rig`` as it believes it; sensors and their first seed; the number of
+    rigs drawn, 0 for the one that is believed; ``force_sensor`` False hides the hand's force."""
+
+    controller: str
+    rig: Parameters
+    sensors: str
+    seed: int
+    rigs: int
+    force_sensor: bool
+
+    def law(self) -> Controller:
+        """A new one."""
+        return make_controller(self.controller, self.rig)
+
+    def drawn(self) -> list[Parameters]:
+        """The rigs: world k has the seed ``seed + k``."""
+        ranges = documented_ranges(self.rig)
+        drawn = [draw_parameters(self.rig, ranges, stream(self.seed + k, 0, "parameters")) for k in range(self.rigs)]
+        return drawn or [self.rig]
+
+    def port(self, law: Controller, rigs: Sequence[Parameters], reference: Reference) -> RigPort:
+        """Lanes with these rigs under this condition."""
+        return RigPort(rigs, reference, law, self.sensors, self.seed, force_sensor=self.force_sensor)
+
+    def refusal(self, stiffness: float, damping_factor: float | None = None) -> str | None:
+        """Why the law refuses a stiffness setpoint, N/m, and a damping factor, in words; None where it takes them."""
+        factor = None if damping_factor is None else np.array([damping_factor])
+        try:
+            RigPort([self.rig], resting([POSES[0]], [stiffness]), self.law(), damping_factor=factor).advance(no_hand)
+        except ValueError as error:
+            return str(error)
+        return None
+
+
+def condition_of(
+    controller: str, source: str, rig: dict[str, Any], sensors: str, seed: int, rigs: int, force_sensor: bool
+) -> Condition:
+    """From the settings of a piece; ``source`` only tells controllers of different files apart."""
+    return Condition(controller, Parameters.from_dict(rig), sensors, seed, rigs, force_sensor)
+
+
+def no_hand(now: float, position: Array, velocity: Array) -> Array:
+    """Nobody holds the end effector."""
+    return np.zeros_like(position)
+
+
+def resting(poses: Sequence[Sequence[float]], stiffness: Sequence[float]) -> Reference:
+    """Resting targets at poses (m) with the same stiffness along x and y (N/m), a lane each."""
+    rows = np.zeros((REFERENCES, len(poses)))
+    rows[:2], rows[8:10], rows[10:12] = np.transpose(poses), np.asarray(stiffness), np.transpose([PNEUMATIC])
+    return Reference(rows)
+
+
+def lost_lanes(port: RigPort, rigs: Sequence[Parameters]) -> Mask:
+    """Lanes (N,) that left the range of numbers or ran into an end stop."""
+    return np.asarray(~np.isfinite(port.motion()).all(axis=0) | (port.impacts > board_limit(rigs)))
+
+
+def varies_damping(law: Controller) -> bool:
+    """Whether the law's damping can be asked for: ``RigPort`` can hand it a factor."""
+    return takes_damping_factor(law)
+
+
+def uses_force(condition: Condition) -> bool:
+    """Whether the law does anything else when its force sensor says 1 N: two lanes differ in nothing more."""
+    if not condition.force_sensor:
+        return False
+    law, reference = condition.law(), resting([POSES[0]] * 2, [2000.0] * 2)
+    law.reset()
+    plant, force, still = Plant(condition.rig, 2), np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2))
+    plant.state = balanced_state(
+        plant.lane_parameters, inverse_geometry(reference.position, condition.rig), still, reference.pneumatic_stiffness
+    )
+    differ = False
+    for k in range(20):
+        time = np.full(2, k * condition.rig.electronics.control_period)
+        seen = Measurement(time, reference.position.copy(), time, still, plant.pressures, force, False)
+        answer = law.command(seen, reference)
+        differ |= bool((answer[:, 0] != answer[:, 1]).any())
+    return differ

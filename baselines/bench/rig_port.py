@@ -1,0 +1,118 @@
+"""A rig with its law and sensors, as a hand at the end effector finds it.
+
+The hand answers at the integrator's steps, not at those of the control board. Its force is held for such a step, at the value
+that it takes half a step ahead: else a spring would gain energy. A mass of the hand moves with the end effector and carries
+its own weight.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from baselines.controller import Controller
+from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.physics.dynamics import INTEGRATION_STEP
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.lanes import Array, parameter_array
+from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.plant import Plant
+
+Hand = Callable[[float, Array, Array], Array]
+"""Time (s), position (2, N) (m) and velocity (2, N) (m/s) -> force of the hand (2, N), N, without that of its mass."""
+
+
+class Port(Protocol):
+    """What a hand can hold: N lanes, carried on by one ``period`` (s) at a time.
+
+    ``force`` (2, N), N, is what passed through the port at the start of the last period; ``energy`` (N,), J, is what the port
+    has given to the hand since the start, - integral of Fu . v dt.
+    """
+
+    period: float
+    lanes: int
+    force: Array
+    energy: Array
+
+    def motion(self) -> Array:
+        """Position and velocity now, (4, N): x, y (m), vx, vy (m/s)."""
+        ...
+
+    def advance(self, hand: Hand) -> None:
+        """Go on by one period with this hand."""
+        ...
+
+
+class RigPort:
+    """N rigs at rest on their targets, one control period at a time.
+
+    Arguments: ``rigs``, one per lane; ``reference``, a resting target in every lane; ``controller``; name and first seed of the
+    ``sensors``, lane i has seed + i; ``hand_mass`` (N,), kg; ``damping_factor`` (N,) for laws whose ``command`` takes one;
+    ``force_sensor`` False shows the law a force of zero. Raises ``ValueError`` for a target outside the workspace.
+
+    Besides what ``Port`` has: ``air`` (N,), kg from the supply; ``saturated`` (N,), periods with a valve at its limit;
+    ``impacts`` (N,), m/s, the fastest collision with an end stop.
+    """
+
+    def __init__(
+        self, rigs: Sequence[Parameters], reference: Reference, controller: Controller, sensors: str = "ideal", seed: int = 0,
+        hand_mass: Array | None = None, damping_factor: Array | None = None, force_sensor: bool = True,
+    ) -> None:  # fmt: skip
+        board, self.lanes = rigs[0].electronics, len(rigs)
+        self._hand_mass = np.zeros(self.lanes) if hand_mass is None else np.asarray(hand_mass, dtype=np.float64)
+        pairs = zip(rigs, self._hand_mass, strict=True)
+        heavy = [rig.replace({"mechanics.mass": rig.mechanics.mass + float(more)}) if more else rig for rig, more in pairs]
+        self._plant, self._reference, self._controller = Plant(heavy, self.lanes), reference, controller
+        piston = inverse_geometry(reference.position, rigs[0])
+        alone = parameter_array(list(rigs), self.lanes)
+        self._plant.state = balanced_state(alone, piston, np.zeros((2, self.lanes)), reference.pneumatic_stiffness)
+        self._model: Any = SENSORS[sensors](board, self.lanes)
+        for lane in range(self.lanes):
+            self._model.begin(lane, stream(seed + lane, 0, "sensors"))
+        controller.reset()
+        self._weight = np.array([np.zeros(self.lanes), self._hand_mass * [rig.mechanics.gravity for rig in rigs]])
+        self._options = {} if damping_factor is None else {"damping_factor": damping_factor}
+        self._force_sensor, self._ticks = force_sensor, 0
+        self._motion, self._acceleration = self._plant.end_effector(), np.zeros((2, self.lanes))
+        self.period = board.control_period
+        self._answers = max(1, round(self.period / INTEGRATION_STEP))
+        self.force, self.energy, self.air = np.zeros((2, self.lanes)), np.zeros(self.lanes), np.zeros(self.lanes)
+        self.saturated, self.impacts = np.zeros(self.lanes), np.zeros(self.lanes)
+
+    def motion(self) -> Array:
+        """Position and velocity of the end effector now, (4, N): x, y (m), vx, vy (m/s)."""
+        return self._motion
+
+    def advance(self, hand: Hand) -> None:
+        """Measure, command, and let the plant go on by one control period."""
+        plant, step, now = self._plant, self.period / self._answers, self._ticks * self.period
+        self.force = hand(now, self._motion[:2], self._motion[2:]) - self._hand_mass * self._acceleration
+        clock, ticks = np.full(self.lanes, now), np.full(self.lanes, self._ticks)
+        seen: Measurement = self._model.measure(ticks, clock, self._motion, plant.pressures, self.force)
+        if not self._force_sensor:
+            seen = replace(seen, user_force=np.zeros_like(self.force))
+        openings = self._controller.command(seen, self._reference, **self._options)
+        for answer in range(self._answers):
+            place, speed = self._motion[:2], self._motion[2:]
+            force = hand(now + (answer + 0.5) * step, place + 0.5 * step * speed, speed)
+            plant.advance_unchecked(openings, np.ascontiguousarray((force + self._weight)[None]), step)
+            self._motion = plant.end_effector()
+            gained = self._motion[2:] ** 2 - speed**2
+            self._acceleration = (self._motion[2:] - speed) / step
+            self.energy += (0.5 * self._hand_mass * gained - force * (self._motion[:2] - place)).sum(axis=0)
+            np.maximum(self.impacts, plant.impacts.max(axis=0), out=self.impacts)
+        self.air += plant.mass_flows()[:4].sum(axis=0) * self.period
+        self.saturated += np.abs(openings).max(axis=0) >= 1.0
+        self._ticks += 1
+
+
+def takes_damping_factor(controller: Controller) -> bool:
+    """Whether a law's damping can be varied from outside."""
+    return "damping_factor" in inspect.signature(controller.command).parameters

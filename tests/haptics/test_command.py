@@ -1,0 +1,156 @@
+"""birthsim-haptics: files, tables and figures, what is refused, and pages that carry the tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from baselines.bench import stability
+from baselines.bench.haptics import backdriving, coupled, rendering
+from baselines.bench.haptics.coupled import measure_hands, measure_z_width, stable_up_to
+from baselines.bench.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
+from baselines.figures import haptics as figures
+from birthsim_env.physics.parameters import Parameters
+from tests.console import call, strict
+
+SETTINGS: dict[str, Any] = {
+    "controller": "admittance-backstepping", "source": "", "rig": Parameters().to_dict(), "sensors": "ideal", "seed": 3,
+    "rigs": 2, "force_sensor": True,
+}  # fmt: skip
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few hands, a push at once, and a run of 0.15 s."""
+    for name, value in (("PUSHED", 0.0), ("RELEASED", 0.05), ("JUDGED", 0.1), ("END", 0.15)):
+        monkeypatch.setattr(stability, name, value)
+    for name, value in (("STIFFNESSES", (100.0, 3000.0)), ("MASSES", (0.0, 1.0, 2.0)), ("ASKED", (500.0, 2000.0))):
+        monkeypatch.setattr(coupled, name, value)
+    monkeypatch.setattr(coupled, "HANDS", ((0.0, 0.0), (2000.0, 1.0)))
+    monkeypatch.setattr(coupled, "FACTORS", (1.0, 2.0, 3.0))
+
+
+@pytest.mark.usefixtures("short")
+def test_a_map_of_hands_has_the_worst_rig() -> None:
+    """Rows over masses, columns over stiffnesses; two rigs are as bad as the worse of each alone."""
+    both = measure_hands(0.0, **SETTINGS)
+    alone = [measure_hands(0.0, **{**SETTINGS, "seed": seed, "rigs": 1}) for seed in (3, 4)]
+    assert np.shape(both["motion_mm"]) == (3, 2)
+    worst = np.max([one["motion_mm"] for one in alone], axis=0)
+    np.testing.assert_allclose(both["motion_mm"], worst, rtol=1e-9)
+    assert both["stable"] == np.all([one["stable"] for one in alone], axis=0).tolist()
+
+
+@pytest.mark.usefixtures("short")
+def test_z_width_says_what_is_refused() -> None:
+    """Rows over damping where it can be asked for, else one; setpoints without gains are refused in the law's words."""
+    found = measure_z_width(**SETTINGS)
+    assert found["factors"] == [1.0, 2.0, 3.0]
+    assert np.shape(found["stable"]) == (3, 2)
+    assert found["refused"] == [[None, None]] * 3
+    soft = measure_z_width(**{**SETTINGS, "controller": "backstepping-cartesian"})
+    assert soft["factors"] == [1.0]
+
+
+def test_stable_up_to_the_first_that_is_not() -> None:
+    """From the softest that is not refused; nothing after the first miss counts."""
+    piece = {
+        "stable": [[None, True, True, False, True, None, None, None], [False] + [True] * 7],
+        "refused": [["too soft", *[None] * 4, "no", "no", "no"], [None] * 8],
+    }
+    assert stable_up_to(piece) == [coupled.ASKED[2], 0.0]
+
+
+def test_tables_say_lost_and_refused() -> None:
+    run = {"controller": "mine", "sensors": "lab", "uses_force": False}
+    pieces = [
+        {"stiffness": 500.0, "refused": None, "mean": [1.0, 2.0, None], "most": [3.0, 4.0, None], "lost": [False, False, True]},
+        {"stiffness": 0.0, "refused": "stiffness setpoint ..."},
+    ]
+    table = backdriving_table([{**run, "backdriving": pieces}])
+    assert "| law | sensors | uses the hand's force | at 500 N/m | at 0 N/m |" in table
+    assert "| mine | lab | no | 2; lost | refused |" in table
+    piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
+    assert "| mine | lab | no | 5; 5 | - | 1.5; 1.5 | - | 3; 3 | 4.5 | 0; 0 | 0 |" in release_table(
+        [{**run, "release": [{**piece, "ideal": None}]}]
+    )
+
+
+def test_a_page_carries_the_tables() -> None:
+    page = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    filled = page_with(page, "new\n")
+    assert filled == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
+    assert page_with(filled, "new\n") == filled
+    with pytest.raises(ValueError, match="the page has no"):
+        page_with("no marks", "new")
+
+
+def test_the_phase_is_shown_near_the_declared_one() -> None:
+    """190 degrees beside 170, not -170."""
+    piece = {"declared": [[[-1.0]], [[0.1]]], "peak": [10.0], "lost": [False]}
+    felt = np.exp(1j * np.radians([[190.0]]))
+    np.testing.assert_allclose(figures._phase(piece, felt), 190.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--controller", "nobody"], "controller = 'nobody'; allowed: backstepping, "),
+        (["--subject", "moon"], "invalid choice: 'moon'"),
+        (["--rigs", "0"], "'0'; allowed: a whole number >= 1"),
+        (["--page", "nowhere.md"], "nowhere.md"),
+    ],
+)
+def test_bad_input_is_one_plain_line(
+    arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, _, complained = call("haptics", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
+    assert status == 2
+    assert complaint in complained
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.slow
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
+    monkeypatch.setattr(rendering, "STIFFNESSES", (2000.0,))
+    monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))
+    own = tmp_path / "own.py"
+    own.write_text(OWN)
+    page = tmp_path / "page.md"
+    page.write_text(f"{BEGIN}\n{END}\n")
+    out = tmp_path / "out"
+    options = ("--controller", "admittance-backstepping", f"{own}:Still", "--sensors", "ideal", "--nominal", "--page", page)
+    status, printed, _ = call("haptics", monkeypatch, capsys, *options, "--out", out)
+    assert status == 0
+    best, still = strict(out / "haptics.json")["runs"]
+    assert best["uses_force"]
+    assert not still["uses_force"]
+    (middle,) = best["impedance"]
+    assert middle["stiffness"] == 2000.0
+    assert np.median(np.array(middle["bandwidth"])[np.array(middle["peak"]) == 10.0]) > 3.0
+    assert still["impedance"][0]["declared"] is None
+    assert still["backdriving"][-1]["refused"] is None
+    assert best["backdriving"][-1]["refused"].startswith("stiffness setpoint")
+    for name in ("haptics_impedance", "haptics_energy", "haptics_release", "stability_hand_mass_held_ideal", "haptics_z_width"):
+        assert (out / f"{name}.png").stat().st_size > 20_000
+    assert page.read_text() == f"{BEGIN}\n\n{(out / 'haptics.md').read_text()}\n{END}\n"
+    assert (out / "haptics.md").read_text() in printed
+
+
+OWN = """
+import numpy as np
+
+class Still:
+    def __init__(self, parameters):
+        pass
+
+    def reset(self, lanes=None):
+        pass
+
+    def command(self, measurement, reference):
+        return np.zeros((4, measurement.position.shape[1]))
+"""
