@@ -111,10 +111,7 @@ class Processes:
 
     def __init__(self, jobs: int) -> None:
         self.width = jobs
-        for tracker in (joblibs_tracker, pythons_tracker):
-            # Beginning Python's takes the mask away: both have begun before any worker does.
-            with _masked():
-                tracker.ensure_running()
+        _begin_trackers()
         with _masked():
             self._executor = ProcessPoolExecutor(jobs, env=ONE_THREAD, initializer=_begin_worker, initargs=(os.getpid(),))
         self._begun: list[Any] = []
@@ -136,6 +133,24 @@ class Processes:
         while any(not one.running() and not one.done() for one in self._begun):
             time.sleep(0.01)
         self._executor.shutdown(wait=True, kill_workers=bool(self._begun))
+
+
+def _begin_trackers() -> None:
+    """Begin joblib's and Python's tracker of semaphores, before any worker: beginning Python's takes the mask away.
+
+    They remove what a killed parent has left, and say nothing of it.
+    """
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = "ignore"
+    try:
+        for tracker in (joblibs_tracker, pythons_tracker):
+            with _masked():
+                tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 @contextmanager

@@ -47,21 +47,32 @@ def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], 
     before = {number: signal.signal(number, end) for number in words}
     try:
         action(arguments)
-    except ValueError as error:
-        _say(parser, f"error: {error}", 2)
-    except OSError as error:
-        place = "" if error.filename is None else f"{str(error.filename)!r}: "
-        _say(parser, f"error: {place}{error.strerror or error}", 2)
-    except MemoryError:
-        _say(parser, "error: out of memory; allowed: fewer lanes, episodes or jobs", 2)
     except KeyboardInterrupt as error:
         number, said = error.number if isinstance(error, Ended) else int(signal.SIGINT), True
         _say(parser, words[number], 128 + number)
+    except Exception as error:
+        if came:
+            # Compiled code, in which the signal came, has made another error of it, and may not be fit to be left in order.
+            os.write(2, f"{parser.prog}: {words[came[0]]}\n".encode())
+            os._exit(128 + came[0])
+        _say(parser, _problem(error), 2)
     finally:
         # After a signal the process ends, and another one ends it at once.
         if not came:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _problem(error: Exception) -> str:
+    """What a user can mend; anything else is raised again."""
+    if isinstance(error, ValueError):
+        return f"error: {error}"
+    if isinstance(error, OSError):
+        place = "" if error.filename is None else f"{str(error.filename)!r}: "
+        return f"error: {place}{error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return "error: out of memory; allowed: fewer lanes, episodes or jobs"
+    raise error
 
 
 def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:

@@ -33,6 +33,17 @@ atexit.register(leave)
 run(argparse.ArgumentParser("birthsim-x"), lambda arguments: signal.raise_signal(signal.SIGTERM))
 """
 
+SWALLOWED = """
+import argparse, signal
+from baselines.commands.shared import run
+def act(arguments):
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except BaseException:
+        raise TypeError("what compiled code may make of it") from None
+run(argparse.ArgumentParser("birthsim-x"), act)
+"""
+
 
 @pytest.mark.parametrize(
     ("ending", "said"), [("SIGINT", "interrupted"), ("SIGTERM", "terminated"), ("SIGHUP", "the terminal is gone")]
@@ -52,6 +63,11 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
             process.kill()
     expected = f"birthsim-tune: {said}\n" if program == LOADING else "birthsim-x: terminated\n"
     assert (process.returncode, complained) == (128 + number, expected)
+
+
+def test_a_signal_that_compiled_code_makes_another_error_of_is_a_signal():
+    done = subprocess.run([sys.executable, "-c", SWALLOWED], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (143, "birthsim-x: terminated\n")
 
 
 def test_signals_wait_while_results_replace_others(tmp_path, monkeypatch):

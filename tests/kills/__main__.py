@@ -26,7 +26,7 @@ def main() -> None:
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="may be repeated (default: all)")
     parser.add_argument("--kills", type=int, default=50, help="per target, over all scenarios (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the moments (default: %(default)s)")
-    parser.add_argument("--out", type=Path, help="JSON file to write; what it holds of other targets stays")
+    parser.add_argument("--out", type=Path, help="JSON file to write; what it holds of other targets and seeds stays")
     parser.add_argument("--page", nargs="?", type=Path, const=PAGE, help="write the table from --out (default: docs/kills.md)")
     arguments = parser.parse_args()
     hear_signals()

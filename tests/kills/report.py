@@ -29,9 +29,9 @@ def summary(outcome: Outcome) -> str:
 
 
 def write_outcomes(path: Path, outcomes: Sequence[Outcome], seed: int) -> list[dict[str, Any]]:
-    """Write what was found, and return all of the file; outcomes of other targets that it holds stay."""
+    """Write what was found, and return all of the file; outcomes of other targets and seeds that it holds stay."""
     new = {outcome.target for outcome in outcomes}
-    kept = [one for one in (read_outcomes(path) if path.exists() else []) if one["target"] not in new]
+    kept = [one for one in (read_outcomes(path) if path.exists() else []) if one["target"] not in new or one["seed"] != seed]
     every = [*kept, *({**asdict(outcome), "seed": seed} for outcome in outcomes)]
     write_json(path, {"outcomes": every})
     return every
