@@ -141,7 +141,7 @@ def test_what_is_not_finite_is_left_out(values, pair):
         (["--out", "pull.png"], "--out 'pull.png'; allowed: a file that ends in .webp or .gif"),
         (["--end", "99", "--out", "a.gif"], "allowed: from 0 to 15 s"),
         (["--begin", "2", "--end", "2.5", "--out", "a.gif"], "allowed: from 0 to 15 s, a second apart"),
-        (["--begin", "nan", "--out", "a.gif"], "allowed: from 0 to 15 s"),
+        (["--begin", "nan", "--out", "a.gif"], "--begin: 'nan'; allowed: a finite number"),
         (["--controller", "backstepping", "nobody", "--out", "a.gif"], "controller = 'nobody'; allowed: backstepping, "),
         (["--out", "a.gif", "--controller", "backstepping"], "expected 2 arguments"),
         (["--env", "BirthSIM/Moon-v1", "--out", "a.gif"], "--env 'BirthSIM/Moon-v1'; allowed: BirthSIM/Circle-v1"),
