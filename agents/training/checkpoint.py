@@ -73,7 +73,7 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
         )
     try:
         return _restore(_nested(about["content"], arrays), model, env)
-    except (LookupError, TypeError, ValueError, AttributeError, RuntimeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError) as error:
         raise ValueError(f"{str(path)!r} does not fit this version ({problem(error)}); {allowed}") from error
 
 
@@ -99,7 +99,9 @@ def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str
     torch.set_rng_state(torch.from_numpy(of_torch))
     np.random.set_state(of_numpy)  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = of_actions
-    past: dict[str, Any] = content["past"]
+    past = content["past"]
+    if not isinstance(past, dict):
+        raise TypeError("its past is no dictionary")
     return past
 
 

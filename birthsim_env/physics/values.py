@@ -7,10 +7,10 @@ import sys
 from numbers import Integral, Real
 from typing import Any
 
-LONGEST = 80
+LONGEST = 160
 """Characters of a value in an error; a longer one is cut."""
 
-HUGE = 10**LONGEST
+HUGE = 10**80
 """A whole number from here on is told by its digits: Python refuses to write the longest."""
 
 

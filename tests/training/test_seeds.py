@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import sys
 from dataclasses import replace
@@ -135,22 +136,28 @@ def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkey
 
 
 @pytest.mark.slow
-def test_without_a_policy_the_scenarios_own_is_evaluated_and_an_interrupted_seed_is_kept(tmp_path, monkeypatch, capsys):
+def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def stopped(env, controller, name, episodes, seed, **setting):
-        asked.append(name)
-        made = evaluation(name, np.ones(episodes if name != "residual seed_3" else 1))
-        made.traces = [np.ones((3, len(made.seeds), 2))]
-        return made
+    def computed(tasks, folder, jobs, title, cluster):
+        asked.extend(task.group for task in tasks)
+        one = evaluation("", np.ones(4))
+        trace = np.ones((3, 4, 2), dtype="<f4")
+        result = {
+            "seeds": one.seeds, "metrics": one.metrics, "lost": one.lost, "success": [True] * 4, "cost": 1.0,
+            "required_strength_ratio": one.required_strength_ratio,
+            "returns": {str(discount): [1.0] * 4 for discount in one.returns},
+            "trace": {"shape": trace.shape, "float32": base64.b64encode(trace.tobytes()).decode()},
+        }  # fmt: skip
+        return {task.name: result for task in tasks}, {}
 
-    monkeypatch.setattr(command, "evaluate", stopped)
+    monkeypatch.setattr(command, "run_tasks", computed)
     arguments = ("--env", "BirthSIM/Probe-v1", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     command.main()
-    assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(4))]
-    assert "residual, 3 seeds " in capsys.readouterr().out
-    assert "; 3 training seeds" in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
+    assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]
+    assert "residual, 5 seeds " in capsys.readouterr().out
+    assert "; 5 training seeds" in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert content["arguments"]["policy"] == "probe"
-    assert [len(result["seeds"]) for result in content["results"]] == [4, 4, 4, 4, 4, 1]
+    assert [len(result["seeds"]) for result in content["results"]] == [4] * 7
