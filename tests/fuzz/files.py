@@ -6,6 +6,7 @@ import json
 import struct
 import tomllib
 import zlib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,12 @@ def _configuration(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Ca
     load_configuration(written(case, folder / "ours.toml", toml_bytes(rng, files[rng.integers(len(files))])))
 
 
+@cache
+def _bomb() -> bytes:
+    """A chunk of 200 MB, packed where memory is not yet limited."""
+    return _chunk(bytes(200 * 2**20))
+
+
 def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarray[Any, Any], bytes]:
     from birthsim_env.physics.parameters import Parameters
     from birthsim_live.rig.frames import FIELDS
@@ -85,6 +92,7 @@ def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarra
     session.advance(40 * EVERY)
     session.recorder.finish()
     whole = load_recording(path)
+    _bomb()
     header = {"format": FORMAT, "birthsim": "0", "rig": whole.rig.to_dict(), "columns": list(FIELDS), "interval": 0.004}
     return header, {"events": whole.events}, whole.rows, path.read_bytes()
 
@@ -125,7 +133,7 @@ def _recording(valid: tuple[Any, Any, Any, bytes], rng: Rng, folder: Path, case:
         chunks = [_chunk(_said(rng, header) + b"\n"), _chunk(_said(rng, events) + b"\n" + _rows(rng, rows))]
         match int(rng.integers(10)):
             case 0:
-                chunks.append(_chunk(bytes(200 * 2**20)))
+                chunks.append(_bomb())
             case 1:
                 chunks[int(rng.integers(2))] = _chunk(b"{}\n", digest=1)
             case 2:
