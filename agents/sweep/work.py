@@ -12,6 +12,7 @@ from agents.sweep.plan import Point, Sweep
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash
 from baselines.bench.tasks import Result, Task
 from baselines.commands.shared import policy_of
+from baselines.files import own_folder
 from birthsim_env.physics.parameters import Parameters, load_parameters
 
 WORLD = ("sensors", "randomize", "reference", "user_force")
@@ -77,10 +78,10 @@ def train_point(
     from agents.training.configuration import TrainingSettings
     from agents.training.trainer import train
 
-    folder, parameters = Path(place), Parameters.from_dict(rig)
-    folder.mkdir(parents=True, exist_ok=True)
+    parameters = Parameters.from_dict(rig)
     settings = TrainingSettings(**{**training, "hidden": tuple(training["hidden"])})
-    train(settings, ResidualSettings(**residual), folder, parameters)
+    with own_folder(Path(place)) as folder:
+        train(settings, ResidualSettings(**residual), folder, parameters)
     result = evaluate_point(
         controller="residual", source="", rig=rig, environment=environment, world=world, files=files, seed=seed,
         episodes=episodes, policy=str(folder),

@@ -25,6 +25,7 @@ from birthsim_env.physics.parameters import Parameters
 
 ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
 SENSORS = ("ideal", "lab")
+"""Sensor models of the bench. Its own test rigs lack the control board of ``honest`` sensors, which they leave out."""
 PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
 """Plant -> the environments' argument ``randomize``."""
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tqdm import tqdm
 
+from baselines.bench.comparison import SENSORS
 from baselines.bench.evaluation import evaluate
 from baselines.bench.journal import open_journal
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
@@ -34,7 +35,6 @@ from baselines.files import own_folder, whole_results, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
 from birthsim_env.parts.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import SENSORS
 from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.parameters import Parameters, load_parameters
 from birthsim_env.physics.reading import read_json
