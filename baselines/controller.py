@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.values import is_within, limits, shown
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.values import is_within, limits, shown
 
 BEYOND = 1000.0
 """A gain may be so many times below the lowest, or above the highest, that tuning tries."""

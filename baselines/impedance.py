@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Reference
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 Complex = NDArray[np.complex128]
 

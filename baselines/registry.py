@@ -18,8 +18,8 @@ from baselines.controller import Controller
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
-from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.values import problem, shown
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import problem, shown
 
 Factory = Callable[..., Controller]
 

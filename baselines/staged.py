@@ -19,8 +19,8 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 from birthsim_env.loop.stage import Stage
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 
 @dataclass(frozen=True)

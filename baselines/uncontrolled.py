@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.values import checked_count
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import checked_count
 
 HELD = 0.01
 """s that a random opening is held: the default policy period."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.physics import control_model, valves
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 
 @helper

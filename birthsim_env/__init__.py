@@ -7,12 +7,12 @@ their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 from gymnasium.envs.registration import register, registry
 
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import ForceProfile, UserForce
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import normalized_score, reference_scores
 
 __all__ = [

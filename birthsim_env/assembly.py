@@ -17,13 +17,13 @@ from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn
+from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ranges
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
-from birthsim_env.parts.randomization import checked_ranges, documented_ranges
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.physics.values import is_within, shown
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import is_within, shown
 from birthsim_env.simulation import Simulation
 
 Randomize = bool | str | Mapping[str, tuple[float, float]]

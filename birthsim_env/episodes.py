@@ -11,9 +11,9 @@ from birthsim_env.assembly import Setup
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.loop.signals import Mask
 from birthsim_env.outcome import Outcome
-from birthsim_env.parts.seeding import lane_seeds
-from birthsim_env.physics.lanes import PRESSURES, Y1, Y2, Array
-from birthsim_env.physics.values import shown
+from birthsim_env.parts.drawn.seeding import lane_seeds
+from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Y2, Array
+from birthsim_env.physics.rig.values import shown
 from birthsim_env.state import State, give_state, take_state
 
 if TYPE_CHECKING:

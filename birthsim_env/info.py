@@ -6,9 +6,9 @@ import numpy as np
 
 from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import control_model, dynamics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 FIELDS = {
     "time": (1, "s since the episode began"),

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement, Reference, compliance
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.lanes import Array
 
 LIMIT = 10.0
 """Bound of every observation entry, in units of its scale."""

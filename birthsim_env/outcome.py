@@ -28,8 +28,8 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, compliance
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, singles, table2
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 
 MOVED, TALLY, FRESH, LAST = 0, 4, 8, 9
 """Rows of memory at which its parts begin: what ``reward.assess`` carries on, what ``success.add`` carries on, 1 where an

@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 
 from birthsim_env.loop.signals import compliance
-from birthsim_env.physics import exact
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 ERROR_UNIT = 1e-3
 """m. A tracking error e costs ln(1 + e/``ERROR_UNIT``) per 10 ms: what is small counts, and what is large still matters."""

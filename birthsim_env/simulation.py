@@ -35,18 +35,18 @@ from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import checked_start
-from birthsim_env.parts.randomization import Ranges, draw_columns
+from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
+from birthsim_env.parts.drawn.worlds import begin, worlds
+from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import UserForce, forces_of
-from birthsim_env.parts.worlds import begin, worlds
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
 
 Part = Stage | Callable[[int], None]

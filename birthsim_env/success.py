@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from birthsim_env.loop.signals import compliance
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 SETTLED = 0.5
 """s after a jump of force or setpoint (or the start) from which an error counts as settled."""

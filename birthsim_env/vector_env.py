@@ -13,9 +13,9 @@ from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_o
 from birthsim_env.episodes import Episodes
 from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import MOST_LANES
-from birthsim_env.physics.values import checked_count, shown
+from birthsim_env.physics.rig.values import checked_count, shown
 from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.state import State
 

@@ -43,7 +43,7 @@ MODULES = {
     "birthsim_env.physics.dynamics": ("dynamics", "mechanics", "plant"),
     "birthsim_env.physics.equilibrium": ("equilibrium", "plant", "elasto_plastic", "mechanics"),
     "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
-    "birthsim_env.physics.exact": ("exact",),
+    "birthsim_env.physics.compiled.exact": ("exact",),
     "baselines.backstepping.gains": ("gain_limits", "gains", "damping"),
     "baselines.backstepping.law": (
         "law_kernel",

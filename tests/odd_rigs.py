@@ -23,7 +23,7 @@ import numpy as np
 import tomli_w
 from tqdm import tqdm
 
-from birthsim_env.physics.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import load_parameters
 
 COMMANDS = ("evaluate", "train", "tune", "animate", "live")
 

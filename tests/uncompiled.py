@@ -50,7 +50,7 @@ def switch_off() -> None:
     importlib.import_module("numba").njit = interpreted
     numpy = importlib.import_module("numpy")
     stage = importlib.import_module("birthsim_env.loop.stage")
-    block = importlib.import_module("birthsim_env.physics.compilation").BLOCK
+    block = importlib.import_module("birthsim_env.physics.compiled.compilation").BLOCK
 
     def scratch(rows: int) -> Any:
         return numpy.empty((rows, block))

@@ -8,11 +8,9 @@ from typing import Any
 
 import gymnasium
 
-import birthsim_env
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
-from baselines.bench.tasks import Result, run_tasks
 from baselines.commands.evaluate_all import evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import (
@@ -27,10 +25,12 @@ from baselines.commands.shared import (
     shown_arguments,
     whole_up_to,
 )
-from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import controller_names
-from birthsim_env.parts.randomization import described
-from birthsim_env.parts.sensors import SENSORS
+from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.tasks import Result, run_tasks
+from birthsim_env.parts.drawn.randomization import described
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import load_parameters
 
 
 def main() -> None:
@@ -100,7 +100,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     arguments.env = arguments.env or "BirthSIM/Circle-v1"
     arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
-    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
+    rig = load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
         allowed = ", ".join(
             sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.bench.statistics import number
 from baselines.commands.shared import run
-from baselines.files import make_folder, write_json, write_text
+from baselines.work.files import make_folder, write_json, write_text
 
 
 def main() -> None:
@@ -43,7 +43,7 @@ def _explain(arguments: argparse.Namespace) -> None:
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     from baselines.registry import make_controller
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     places = policy_folders(arguments.policy)
     policies = [load_policy(place) for place in places]

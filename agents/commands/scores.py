@@ -15,11 +15,11 @@ from baselines.bench.comparison import ENVIRONMENTS, default_controllers
 from baselines.bench.evaluation import DISCOUNTS, evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import number, penalize_lost, summarize
-from baselines.bench.tasks import Result, Task, code_stamp, run_tasks
 from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, whole_up_to
-from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import UNCONTROLLED, make_controller
-from birthsim_env.physics.parameters import Parameters
+from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.tasks import Result, Task, code_stamp, run_tasks
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import BEST, RIGS, ROLES, SENSORS, SHUT
 
 Rows = dict[str, dict[str, Any]]

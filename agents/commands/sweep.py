@@ -11,9 +11,9 @@ from agents.sweep.plan import HeatMap, Point, Search, Sweep, load_sweep
 from agents.sweep.search import search_points
 from agents.sweep.work import tasks_of
 from baselines.bench.metrics import UNITS
-from baselines.bench.tasks import Result, Task, run_tasks
 from baselines.commands.shared import JOBS, add_processes, run
-from baselines.files import make_folder, own_folder, whole_results, write_json, write_text
+from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
+from baselines.work.tasks import Result, Task, run_tasks
 
 
 def main() -> None:

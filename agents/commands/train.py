@@ -14,11 +14,11 @@ from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.training.time_split import told
 from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
-from baselines.files import make_folder, own_folder, write_json
-from baselines.side_by_side import side_by_side
-from birthsim_env.parts.randomization import described
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from baselines.work.files import make_folder, own_folder, write_json
+from baselines.work.side_by_side import side_by_side
+from birthsim_env.parts.drawn.randomization import described
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 
 def main() -> None:

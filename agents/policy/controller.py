@@ -16,8 +16,8 @@ from baselines.impedance import Impedance
 from birthsim_env import observation
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
 """Actions (N, ``settings.size``) in [-1, 1] for observations (N, ``observation_size(settings)``)."""

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 Weights = NDArray[np.float32]
 Statistics = NDArray[np.float64]

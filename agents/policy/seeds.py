@@ -12,7 +12,7 @@ from agents.policy.files import WEIGHTS, load_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, number, penalize_lost, quantile
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""

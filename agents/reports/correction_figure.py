@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, save
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 
 def draw_corrections(

@@ -21,14 +21,14 @@ from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import quantile
 from baselines.controller import Controller
 from birthsim_env.loop.signals import displacement
-from birthsim_env.parts.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.hands.user_forces import ForceProfile
 from birthsim_env.parts.references import Circle, Hold, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import ForceProfile
-from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import theta1
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 FRICTIONLESS = {f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)}
 """Changes of a rig that take its dry friction away."""

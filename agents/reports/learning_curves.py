@@ -12,7 +12,7 @@ from matplotlib import pyplot as plt
 
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 SHOWN = (
     ("pooled_mm", "pooled settled error (mm)"),

@@ -15,10 +15,11 @@ import numpy as np
 
 from baselines.admittance.law import sustained
 from baselines.backstepping.cartesian_law import across, along
-from birthsim_env.physics import exact, geometry
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 LEVEL = 0.1
 """m/s of the speed error; smaller half waves do not count. As in ``admittance-backstepping``."""

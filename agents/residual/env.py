@@ -8,7 +8,7 @@ from agents.residual.law import ResidualActuation
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import refuse_unknown
 from birthsim_env.env import BirthSIMEnv
-from birthsim_env.physics.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
 

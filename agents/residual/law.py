@@ -38,11 +38,11 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
-from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import PARAMETERS, Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFEST = 4000.0
 """N/m: the law is made no stiffer than that, unless more is asked for. With 6000 rigs of 2.4 kg and less with valves of 7 ms

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from birthsim_env.physics.values import is_within, shown
+from birthsim_env.physics.rig.values import is_within, shown
 
 NO_LAW = "none"
 

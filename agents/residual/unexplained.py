@@ -6,10 +6,11 @@ turns. What was met when the piston last moved out and in tells weight and frict
 
 from __future__ import annotations
 
-from birthsim_env.physics import exact, geometry
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 BANDWIDTH = 60.0
 """1/s, of the observer where speeds are measured; assumed."""

@@ -16,8 +16,8 @@ from agents.sweep.report import short
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number
 from baselines.figures.runs import STYLE, legend_below, save
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import field_of
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import field_of
 
 LOST_COLOUR = "#303030"
 

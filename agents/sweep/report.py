@@ -12,7 +12,7 @@ from agents.sweep.plan import Point
 from baselines.bench.comparison_tables import markdown
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
-from baselines.bench.tasks import Result
+from baselines.work.tasks import Result
 
 SHOWN_POINTS = 500
 """Rows of the table; the Parquet file has all."""

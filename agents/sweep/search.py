@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from agents.sweep.plan import Point, Search, Sweep
-from baselines.bench.journal import open_journal
 from baselines.bench.statistics import penalize_lost, summarize
-from baselines.bench.tasks import Result
+from baselines.work.journal import open_journal
+from baselines.work.tasks import Result
 
 WORST = 1000.0
 """What a search counts where the figure is infinite or no number, in the metric's unit; assumed."""

@@ -10,10 +10,10 @@ from typing import Any
 
 from agents.sweep.plan import Point, Sweep
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash
-from baselines.bench.tasks import Result, Task
 from baselines.commands.shared import policy_of
-from baselines.files import own_folder
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from baselines.work.files import own_folder
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 WORLD = ("sensors", "randomize", "reference", "user_force")
 """Names that are arguments of the environment."""

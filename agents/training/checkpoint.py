@@ -15,8 +15,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.training.sb3_adapter import SB3VecEnv
-from baselines.files import whole_file
-from birthsim_env.physics.values import problem
+from baselines.work.files import whole_file
+from birthsim_env.physics.rig.values import problem
 
 NAME = "checkpoint.safetensors"
 FORMAT = "birthsim-checkpoint-1"

@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.reading import read_toml
-from birthsim_env.physics.values import checked_count, checked_number, in_line, shown
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.reading import read_toml
+from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, shown
 
 ALGORITHMS = ("ppo", "sac", "tqc")
 

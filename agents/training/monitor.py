@@ -18,7 +18,7 @@ from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.time_split import split
 from agents.training.validation import validate
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
 """Figures of a validation that TensorBoard shows."""

@@ -23,9 +23,9 @@ from baselines.estimation.observers import FRESH, memory_rows
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.physics import exact
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 LEAST_FRACTION = 0.35
 """Lower bound of the gain reduction. With less gain friction holds the piston."""

@@ -19,10 +19,11 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.backstepping.cartesian_law import across, along, load_rates, pressure_openings
-from birthsim_env.physics import exact, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics import geometry, mechanics
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 MEMORY_NAMES = (
     *("gain_fraction_t", "extreme_t", "since_t", "last_peak_t"),

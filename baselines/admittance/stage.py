@@ -22,8 +22,8 @@ from birthsim_env.loop.rows import (
     VELOCITY,
 )
 from birthsim_env.loop.stage import block, numbers, scratch
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import PARAMETERS
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS
 
 ADMITTANCE, BRISTLES, CHAMBERS, JOINTS, LAW = 0, 5, 7, 20, 24
 PISTONS = LAW + admittance_law.MEMORY

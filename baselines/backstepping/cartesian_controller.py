@@ -13,9 +13,9 @@ from baselines.controller import lanes_of, require_stiffness
 from baselines.estimation.observers import PistonObserver, measured_joints
 from baselines.impedance import Impedance
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.physics.values import is_within, limits, shown
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import is_within, limits, shown
 
 
 class CartesianBackstepping:

@@ -20,10 +20,10 @@ from baselines.estimation.admittance import square_root
 from baselines.valve_inverse import force_first_openings
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
-from birthsim_env.physics.lanes import Array
 
 
 @helper

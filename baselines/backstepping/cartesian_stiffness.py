@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 
 @helper

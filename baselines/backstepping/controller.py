@@ -32,12 +32,12 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.lanes import PARAMETERS, Array
-from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.values import is_finite, is_within, limits, shown
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 ITERATIONS = 8
 """Newton from above on a convex function: quadratic, at rounding error after six unless beside the least stiffness."""

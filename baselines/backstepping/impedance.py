@@ -16,9 +16,9 @@ import numpy as np
 from baselines.backstepping.gains import gains_for
 from baselines.impedance import Impedance, matrix_root, stiffness_matrix
 from birthsim_env.loop.signals import Reference
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 def joint_impedance(c: tuple[float, float, float], apparent_mass: float, viscous: float) -> tuple[float, float, float]:

@@ -21,11 +21,11 @@ from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_ga
 from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.inverse_kinematics import piston_reference
-from birthsim_env.physics.lanes import Array
 
 OPTIONS = 7
 PNEUMATIC_GAIN, SIGN_WIDTH, WEIGHT, COULOMB_RATE, DAMPING_RATIO, ONE_VALVE, FORCE_FIRST = range(OPTIONS)

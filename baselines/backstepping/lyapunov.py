@@ -24,9 +24,9 @@ import numpy as np
 
 from baselines.backstepping.controller import BacksteppingController
 from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 PNEUMATIC_UNIT = 1e-5
 """e per N/m of pneumatic stiffness; assumed: an error of 100 N/m weighs as much as 1 mm."""

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from birthsim_env.physics import control_model, friction, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.plant import checked
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 @kernel

@@ -18,10 +18,10 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
-from baselines.bench.tasks import Result, Task
 from baselines.registry import CONTROLLERS, SLOW, make_controller
+from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
 SENSORS = ("ideal", "lab")
@@ -30,7 +30,7 @@ PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
 """Plant -> the environments' argument ``randomize``."""
 
 MOVING = ("sine", "noise", "guided")
-"""Hands of ``birthsim_env.parts.moving_hands`` that move all the time."""
+"""Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
 
 REFERENCE = "backstepping"
 """The law that the others are compared with, episode by episode."""

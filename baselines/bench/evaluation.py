@@ -13,12 +13,12 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-import birthsim_env
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import UNITS, EpisodeMetrics
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller, checked_command
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import load_parameters
 
 LANES = 128
 """Episodes that run side by side."""
@@ -126,7 +126,7 @@ def _run_batch(
     spent: list[float],
     progress: bool,
 ) -> None:
-    period = birthsim_env.physics.parameters.load_parameters(arguments.get("parameters")).electronics.control_period
+    period = load_parameters(arguments.get("parameters")).electronics.control_period
     env: Any = gymnasium.make_vec(
         environment, num_envs=len(seeds), policy_period=period, autoreset_mode=AutoresetMode.SAME_STEP, **arguments
     )

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.parts.user_forces import forces_of
-from birthsim_env.physics import lanes as at
+from birthsim_env.parts.hands.user_forces import forces_of
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
-from birthsim_env.physics.lanes import Array
 
 STEP = 0.05
 """s between the instants that are looked at."""

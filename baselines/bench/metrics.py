@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.success import SETTLED
 
 QUIET = 1.0

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate, merged
-from baselines.bench.tasks import Result, Task
 from baselines.registry import SLOW, make_controller, split_options
-from birthsim_env.physics.parameters import Parameters
+from baselines.work.tasks import Result, Task
+from birthsim_env.physics.rig.parameters import Parameters
 
 EPISODES, SLOW_EPISODES = 64, 4
 """Episodes of a piece, and of one whose controller is slow: a minute's work at most on this project's machines."""

@@ -13,13 +13,13 @@ import numpy as np
 from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 REST, RISE, HOLD = 2.0, 1.0, 3.0
 """s, assumed: before the push, of the ramp, and at full force."""

@@ -16,14 +16,14 @@ import numpy as np
 
 from baselines.controller import Controller
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import Array, parameter_array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 Hand = Callable[[float, Array, Array], Array]
 """Time (s), position (2, N) (m) and velocity (2, N) (m/s) -> force of the hand (2, N), N, without that of its mass."""

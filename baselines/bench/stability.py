@@ -16,12 +16,12 @@ import numpy as np
 from baselines.bench.pieces import file_stem
 from baselines.bench.probes import Window, board_limit
 from baselines.bench.rig_port import Port, RigPort
-from baselines.bench.tasks import Result, Task
 from baselines.controller import Controller
 from baselines.registry import make_controller
+from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import REFERENCES, Mask, Reference
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 PLACE = (0.5, 0.0)
 """m, the target: the middle of the workspace."""

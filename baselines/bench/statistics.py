@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 RESAMPLES = 9999
 """Bootstrap samples of an interval: 0.2 % of the interval's width in error."""

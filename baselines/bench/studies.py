@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 from baselines.bench.pieces import file_stem
 from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
-from baselines.bench.tasks import Result, Task
 from baselines.registry import make_controller
+from baselines.work.tasks import Result, Task
 from birthsim_env.loop.signals import Mask, displacement
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 SETPOINTS = (1000.0, 1500.0, 2000.0, 3000.0, 4000.0)
 """N/m, the same on both axes."""

@@ -15,13 +15,13 @@ from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, finite_number, policy_of, run, seed_number
-from baselines.files import make_folder, whole_file
 from baselines.registry import controller_names, make_controller
+from baselines.work.files import make_folder, whole_file
 from birthsim_env.drawing.rendering import PairRenderer, Scene
-from birthsim_env.parts.randomization import described
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.parts.drawn.randomization import described
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 RATES = (10, 20, 25, 50)
 """Frames per second whose period is a whole number of the 10 ms that a GIF counts in."""

@@ -18,15 +18,15 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
-from baselines.bench import speed
 from baselines.bench.comparison import default_controllers
-from baselines.bench.stopwatch import seconds_per_call
-from baselines.bench.twin import Twin, has_compiler
+from baselines.bench.speed import speeds as speed
+from baselines.bench.speed.stopwatch import seconds_per_call
+from baselines.bench.speed.twin import Twin, has_compiler
 from baselines.commands.shared import finite_number, run
-from baselines.files import make_folder, write_json
 from baselines.registry import make_controller
+from baselines.work.files import make_folder, write_json
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 POLICY_PERIOD = 0.01
 PERIODS = 50

@@ -6,20 +6,19 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import birthsim_env
 from baselines.bench import comparison
 from baselines.bench.comparison import Conditions, all_conditions, cell_task, default_controllers
 from baselines.bench.comparison_tables import full, losses, overview
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
-from baselines.bench.tasks import Result, code_stamp, run_tasks
 from baselines.commands.parts import with_options
 from baselines.commands.shared import JOBS, shown_arguments
-from baselines.files import make_folder, whole_results, write_json, write_text
 from baselines.registry import CONTROLLERS, SLOW, split_options
-from birthsim_env.parts.randomization import described
-from birthsim_env.physics.parameters import Parameters
+from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.tasks import Result, code_stamp, run_tasks
+from birthsim_env.parts.drawn.randomization import described
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 NARROWED = {"scenario": "nominal", "all": "randomised"}
 """The option --randomize -> the one plant that is then compared."""
@@ -27,7 +26,7 @@ NARROWED = {"scenario": "nominal", "all": "randomised"}
 
 def evaluate_all(arguments: argparse.Namespace) -> None:
     """Run what ``--out`` does not hold yet, and write comparison.json, comparison.md and the figures."""
-    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
+    rig = load_parameters(arguments.parameters)
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
     names = with_options(names, arguments.set)
     for name in names:

@@ -14,10 +14,11 @@ from tqdm import tqdm
 import birthsim_env
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import run
-from baselines.files import make_folder, whole_file, whole_results, write_json
 from baselines.registry import controller_names, make_controller
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.lanes import Array
+from baselines.work.files import make_folder, whole_file, whole_results, write_json
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.success import SETTLED
 
 PICTURE: dict[str, Any] = {"render_mode": "rgb_array", "picture_size": (1280, 960)}
@@ -54,7 +55,7 @@ def record_run(
 
     ``picture`` is where to save what the rig looks like during the first push.
     """
-    rig = birthsim_env.physics.parameters.load_parameters(parameters)
+    rig = load_parameters(parameters)
     period = rig.electronics.control_period
     env = gymnasium.make("BirthSIM/Circle-v1", parameters=rig, sensors=sensors, policy_period=period, **PICTURE)
     law = make_controller(controller, rig)
@@ -99,7 +100,7 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
 
 
 def _figure4(arguments: argparse.Namespace) -> None:
-    rig = birthsim_env.physics.parameters.load_parameters(arguments.parameters)
+    rig = load_parameters(arguments.parameters)
     controller = with_options([arguments.controller], arguments.set)[0]
     make_controller(controller, rig)
     folder = make_folder(arguments.out)

@@ -10,11 +10,11 @@ from baselines.bench.comparison import SENSORS
 from baselines.bench.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from baselines.bench.haptics.tables import page_with, report
 from baselines.bench.pieces import controller_settings
-from baselines.bench.tasks import run_tasks
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
-from baselines.files import finite, make_folder, whole_results, write_json, write_text
-from birthsim_env.physics.parameters import load_parameters
+from baselines.work.files import finite, make_folder, whole_results, write_json, write_text
+from baselines.work.tasks import run_tasks
+from birthsim_env.physics.rig.parameters import load_parameters
 
 LAWS = ("backstepping", "backstepping-cartesian", "admittance-backstepping", "pid")
 """What is measured where no controller is named: the paper's law, its Cartesian form, the best law and a rival."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from baselines.registry import known_options, split_options
-from birthsim_env.parts.moving_hands import HANDS
+from birthsim_env.parts.hands.moving_hands import HANDS
 
 
 def add_parts(parser: argparse.ArgumentParser) -> None:

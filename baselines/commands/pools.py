@@ -6,7 +6,7 @@ import argparse
 import time
 
 from baselines.commands.shared import cluster_name, run
-from baselines.side_by_side import side_by_side
+from baselines.work.side_by_side import side_by_side
 
 PIECES, LASTS = 200, 0.05
 """Pieces of a measurement, and s that each lasts."""

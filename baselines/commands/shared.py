@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import gymnasium
 
 from baselines.commands.start import endings
-from birthsim_env.physics.values import shown
+from birthsim_env.physics.rig.values import shown
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""

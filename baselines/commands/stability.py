@@ -10,11 +10,11 @@ from baselines.bench import stability
 from baselines.bench.comparison import SENSORS
 from baselines.bench.pieces import controller_settings
 from baselines.bench.stability import MAPS, describe_map, stability_tasks
-from baselines.bench.tasks import run_tasks
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole_up_to
-from baselines.files import make_folder, whole_results, write_json
-from birthsim_env.physics.parameters import load_parameters
+from baselines.work.files import make_folder, whole_results, write_json
+from baselines.work.tasks import run_tasks
+from birthsim_env.physics.rig.parameters import load_parameters
 
 
 def main() -> None:

@@ -25,20 +25,20 @@ from tqdm import tqdm
 
 from baselines.bench.comparison import SENSORS
 from baselines.bench.evaluation import evaluate
-from baselines.bench.journal import open_journal
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import check_world, run, seed_number, whole_up_to
 from baselines.controller import Controller
-from baselines.files import own_folder, whole_results, write_json
 from baselines.registry import CONTROLLERS, make_controller, split_options
-from birthsim_env.parts.randomization import described, documented_ranges, draw_parameters
-from birthsim_env.parts.seeding import stream
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.physics.reading import read_json
-from birthsim_env.physics.values import is_finite, is_within, problem, shown
+from baselines.work.files import own_folder, whole_results, write_json
+from baselines.work.journal import open_journal
+from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.reading import read_json
+from birthsim_env.physics.rig.values import is_finite, is_within, problem, shown
 
 if TYPE_CHECKING:
     from optuna import Study

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from baselines.bench import accuracy, accuracy_tables
-from baselines.bench.motions import MOTIONS
+from baselines.bench.accuracy import errors as accuracy
+from baselines.bench.accuracy import tables as accuracy_tables
+from baselines.bench.accuracy.motions import MOTIONS
 from baselines.commands.shared import run, seed_number, whole
-from baselines.files import make_folder, write_json, write_text
-from birthsim_env.physics.parameters import load_parameters
+from baselines.work.files import make_folder, write_json, write_text
+from birthsim_env.physics.rig.parameters import load_parameters
 
 
 def main() -> None:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from baselines.controller import feedforward_rows, require_stiffness
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""

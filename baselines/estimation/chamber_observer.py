@@ -12,10 +12,11 @@ import numpy as np
 
 from baselines.valve_inverse import driving_flows
 from birthsim_env.loop.signals import Mask
-from birthsim_env.physics import control_model, exact, valves
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics import control_model, valves
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 
 @helper

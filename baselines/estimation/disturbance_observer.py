@@ -12,10 +12,10 @@ import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.lanes import Array
 
 
 @kernel

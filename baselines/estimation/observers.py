@@ -18,12 +18,13 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement
-from birthsim_env.physics import exact, geometry, mechanics
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics import geometry, mechanics
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 BANDWIDTH = 70.0
 """1/s; assumed: as fast as 0.1 mm of noise at 240 Hz allows the valves without chatter."""

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import friction
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
-from birthsim_env.physics.lanes import Array
 
 
 @helper

@@ -22,10 +22,10 @@ from baselines.estimation.observers import PistonObserver
 from baselines.estimation.reference_friction import ReferenceFriction
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics import geometry
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 
 MOVING_SPEED = 1e-3
 """m/s; assumed: a slower reference lets the pistons rest."""

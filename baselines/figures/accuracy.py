@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-from baselines.bench.accuracy import ADAPTIVE, EVALUATIONS
+from baselines.bench.accuracy.errors import ADAPTIVE, EVALUATIONS
 from baselines.figures.runs import LINES, STYLE, legend_below, log_ticks, look, save
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 LOST = 1e5
 """um: at a tenth of a metre it is another motion, whatever the number; unstable runs are drawn there."""
 
 
 def accuracy_figure(found: dict[str, Any], folder: Path) -> list[Path]:
-    """Errors that ``baselines.bench.accuracy.measure`` found: median and range over the rigs, adaptive methods beside."""
+    """Errors that ``bench.accuracy.errors.measure`` found: median and range over the rigs, adaptive methods beside."""
     names = list(found["motions"])
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(2, len(names), figsize=(4.6 * len(names), 7.4), layout="constrained", squeeze=False)

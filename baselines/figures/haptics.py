@@ -18,7 +18,7 @@ from baselines.bench.haptics.rendering import PEAKS
 from baselines.bench.haptics.tables import PEAK
 from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
 from baselines.figures.stability import stability_figure
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 Runs = Sequence[dict[str, Any]]
 

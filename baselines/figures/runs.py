@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.bench.evaluation import TRACE, Evaluation
-from baselines.files import whole_file
-from birthsim_env.physics.lanes import Array
+from baselines.work.files import whole_file
+from birthsim_env.physics.compiled.lanes import Array
 
 DARK, MIDDLE, ACCENT, LIGHT = "#1b2a41", "#b23a0a", "#3f9e6a", "#8fb2dc"
 """Colours from dark to light: in grey they lie a sixth of the way from black to white apart. Line styles differ too."""

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.figures.runs import ACCENT, DARK, STYLE, label_of, legend_below, save
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 RANGE = (0.01, 100.0)
 """mm, of the colours."""

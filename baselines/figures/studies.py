@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, label_of, legend_below, look, save
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 Study = Mapping[str, dict[str, Any]]
 """Label of a controller -> its result, as ``baselines.bench.studies`` returns it."""

@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from birthsim_env.physics import geometry
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
-from birthsim_env.physics.lanes import Array
 
 SIGN_WIDTH = 0.01
 """m/s; assumed: over this REFERENCE speed the Coulomb feedforward goes from rest to sliding, slowly enough for the valves."""

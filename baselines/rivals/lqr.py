@@ -25,10 +25,10 @@ from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
 from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
 from birthsim_env.physics import control_model
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 RATE_TOLERANCE = 1000.0
 """N/s at the end effector; assumed: what the valves give cylinder 1 with something to spare. Only ratios to it matter."""

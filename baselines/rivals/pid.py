@@ -20,10 +20,10 @@ from typing import Any, ClassVar
 from baselines.rivals.feedforward import FORCE1, KAPPA
 from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import driving_flows
-from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 
 @helper

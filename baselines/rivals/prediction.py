@@ -19,7 +19,7 @@ import numpy as np
 
 from baselines.rivals.tracking import LEAST_LENGTH
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics.parameters import Cylinder, Parameters
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 
 PRESSURE, FLOW = 1e5, 1e-3
 """Pa and kg/s: units of pressures and flows inside the residuals' arguments, so that all are of like size."""

@@ -24,8 +24,8 @@ from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 STEPS = (0.002, 0.003, 0.005, 0.007, 0.010, 0.013, 0.017)
 """s, assumed: from node to node of the horizon, 57 ms in all; rounded to whole control periods."""

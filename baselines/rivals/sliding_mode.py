@@ -22,9 +22,9 @@ from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
 from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
 from baselines.valve_inverse import two_valve_openings
 from birthsim_env.physics import control_model
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 
 @kernel

@@ -16,9 +16,9 @@ from baselines.estimation.state_estimator import is_moving
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.feedforward import NEEDED, prepare
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.compilation import helper
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters, load_parameters
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 LEAST_LENGTH = 0.002
 """m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""

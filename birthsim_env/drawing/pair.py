@@ -16,7 +16,7 @@ from birthsim_env.drawing.panel import pressure_colour
 from birthsim_env.drawing.pen import FINE, Box, Pen, Point, number
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.drawing.view import View
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 WINDOW = 0.02
 """m: width of both magnifiers."""

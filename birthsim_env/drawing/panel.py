@@ -11,7 +11,7 @@ from birthsim_env.drawing import pen as d
 from birthsim_env.drawing.lettering import Lettering
 from birthsim_env.drawing.magnifier import Magnifier
 from birthsim_env.drawing.pen import FINE, Box, Colour, Pen, number
-from birthsim_env.physics.parameters import Air
+from birthsim_env.physics.rig.parameters import Air
 
 
 def _fraction(pressure: float, air: Air) -> float:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.drawing.scene import Scene
-from birthsim_env.physics.parameters import Parameters
-from birthsim_env.physics.values import shown
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import shown
 
 if TYPE_CHECKING:
     import pygame

@@ -10,7 +10,7 @@ import numpy as np
 
 from birthsim_env.drawing.pen import CAP, FAINT, INK, PAPER, SKIN, SKIN_EDGE, STEEL, Axis, Colour, Pen, Point
 from birthsim_env.physics import geometry
-from birthsim_env.physics.parameters import Cylinder, Parameters
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 
 _NEAR_STOP = 1e-4  # m
 

@@ -12,7 +12,7 @@ from birthsim_env.drawing.lettering import Lettering
 from birthsim_env.drawing.pen import FINE, Axis, Box, Colour, Pen, Point
 from birthsim_env.drawing.rig import Pose, Rig
 from birthsim_env.drawing.scene import Scene, path_of
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 _LEAST_FORCE = 0.05  # N; below it an arrow would only flicker
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import TABLE, Stage, address_of, carray, pointer
 from birthsim_env.loop.stage import call as call_stage
-from birthsim_env.physics.compilation import BLOCK, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 WORTH_A_THREAD = 300
 """Lanes times periods that are worth another thread, which takes about 0.1 ms to set to work; a lane and period takes 0.4 to

@@ -7,7 +7,7 @@ state stand at the beginning of the world, in the order of ``physics.lanes``.
 from __future__ import annotations
 
 from birthsim_env.loop.signals import REFERENCES, Measurement
-from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 
 STATE = PARAMETERS
 IMPACT = STATE + STATES

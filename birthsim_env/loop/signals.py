@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compilation import helper
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array
 
 REFERENCE_NAMES = (
     *("x", "y", "vx", "vy", "ax", "ay", "jx", "jy"),

@@ -21,8 +21,8 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compilation import BLOCK, helper
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.compilation import BLOCK, helper
+from birthsim_env.physics.compiled.lanes import Array
 
 ARGUMENTS = 7
 SIGNATURE = types.int64(*[types.int64] * ARGUMENTS)

@@ -19,9 +19,9 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.physics import dynamics, spools
-from birthsim_env.physics.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.geometry import end_effector_motion
-from birthsim_env.physics.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.plant import Plant
 
 

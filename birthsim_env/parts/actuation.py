@@ -15,11 +15,11 @@ import numpy as np
 from birthsim_env.loop.rows import ACTION, OPENING, SEEN, STATE, WORLD
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers
-from birthsim_env.physics import lanes as at
 from birthsim_env.physics import valves
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import driving_flows
-from birthsim_env.physics.lanes import Array
 from birthsim_env.physics.plant import Plant
 
 VALVE_LAYOUTS = ("two_valves", "one_valve")

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.parts.drawn.seeding import is_vectorised
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.seeding import is_vectorised
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.geometry import inverse_geometry, well_inside
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import checked
+from birthsim_env.physics.rig.parameters import Parameters
 
 CHECKS = 64
 """Instants of a new episode at which its reference is checked."""

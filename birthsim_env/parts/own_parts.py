@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from birthsim_env.parts.moving_hands import HANDS
+from birthsim_env.parts.hands.moving_hands import HANDS
+from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.user_forces import ForceProfile, UserForce
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.reading import read
-from birthsim_env.physics.values import problem, shown
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.reading import read
+from birthsim_env.physics.rig.values import problem, shown
 
 LARGEST_CSV = 64 * 2**20
 """Bytes of a file of numbers; an hour at 1 kHz takes them."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, table2
-from birthsim_env.parts.seeding import Range, draw, put, vectorised
-from birthsim_env.physics import exact
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.values import checked_number, checked_range, shown
+from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 
 FARTHEST = 10.0
 """m: coordinates and lengths up to here; rigs are smaller."""

@@ -10,9 +10,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, Contractions, Pulls, Ramp, UserForce
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import AlternatingSteps, Contractions, Pulls, Ramp, UserForce
 
 Parts = tuple[Trajectory, UserForce, StiffnessSchedule]
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, numbers, table3
+from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
-from birthsim_env.parts.seeding import Range, draw, put, vectorised
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.values import checked_number, checked_range, shown
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 
 SOFTEST, STIFFEST = 1e-3, 1e7
 """N/m: setpoints that can be asked for; steel rods of this size are as stiff."""

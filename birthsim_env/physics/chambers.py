@@ -9,7 +9,7 @@ Both are computed from powers, so that one division by P V serves a chamber.
 
 from __future__ import annotations
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 
 @helper

@@ -6,7 +6,7 @@ exchange; the plant does. Scalar helpers for kernels; all of them also work on N
 
 from __future__ import annotations
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 
 @helper

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from birthsim_env.physics import chambers, friction, geometry, mechanics, valves
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import BLOCK, helper, kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 INTEGRATION_STEP = 0.25e-3
 """s. The default step of the classical Runge-Kutta method; the fastest mode (spool, friction, air) is below 8000 1/s."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from birthsim_env.physics.quantities import Part, quantity
+from birthsim_env.physics.rig.quantities import Part, quantity
 
 NO_LARGER = "an episode draws within +-"
 

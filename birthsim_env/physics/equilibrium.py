@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from birthsim_env.physics import friction, geometry
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array
 
 REST_SPEED = 1e-9
 """m/s: a slower piston starts at rest, without friction. Rounding leaves 1e-17, and its sign must not choose the friction's."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 RELAXATION_LIMIT = 8000.0
 """1/s. The bristle relaxes at s0 |v| / G; above this rate (about 2 m/s) it has long slid, and the rate is held so that the

@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import (
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import (
     COS_GAMMA3,
     D_PRODUCT,
     D_SQUARES,
@@ -28,7 +28,7 @@ from birthsim_env.physics.lanes import (
     Y2,
     Array,
 )
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 @helper

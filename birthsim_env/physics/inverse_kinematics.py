@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compilation import helper, kernel
-from birthsim_env.physics.lanes import COS_GAMMA3, D_PRODUCT, D_SQUARES, K1, K2, SIN_GAMMA3, Array
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import COS_GAMMA3, D_PRODUCT, D_SQUARES, K1, K2, SIN_GAMMA3, Array
 
 
 @helper

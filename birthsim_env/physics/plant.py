@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from birthsim_env.physics import dynamics, geometry, spools
+from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
-from birthsim_env.physics.parameters import Parameters, load_parameters
-from birthsim_env.physics.values import checked_count, is_within, shown
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import checked_count, is_within, shown
 
 MOST_LANES = 2**20
 """Lanes side by side; a million take some gigabytes."""

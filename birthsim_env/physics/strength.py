@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry, joint_force
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 def carried(position: Array, rig: Parameters) -> Array:

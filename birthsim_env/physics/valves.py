@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from birthsim_env.physics.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper
 
 LINEAR_RATIO = 0.99
 """Pressure ratio above which the flow falls linearly to zero, as ISO 6358-1:2013 does in the laminar range; without it the

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_env.physics.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.server.addresses import listen
 

@@ -12,7 +12,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from baselines.commands.start import endings
-from birthsim_env.physics.values import shown
+from birthsim_env.physics.rig.values import shown
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 LEAST_TIME, PACE = 0.5, 0.1
 """s and m/s, assumed: a target passes over in the least time and a second for every 0.1 m: with 0.15 m/s at most."""

@@ -10,8 +10,8 @@ from baselines.controller import Controller
 from baselines.registry import make_controller
 from baselines.rivals.tracking import TrackingController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.settings import RESIDUAL
 
 DAMPED = (BacksteppingController, AdmittanceBackstepping, TrackingController)

@@ -11,8 +11,8 @@ import numpy as np
 
 from birthsim_env.info import ROWS, describe, single_info
 from birthsim_env.physics import geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation
 from birthsim_live.rig.hand import Hands
 

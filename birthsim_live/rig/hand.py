@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from birthsim_env.parts.user_forces import UserForce
-from birthsim_env.physics.lanes import Array
+from birthsim_env.parts.hands.user_forces import UserForce
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.bridge import Fade
 
 DRAG_LIMIT = 100.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Any
 
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.frames import SLICES, frame_of
 from birthsim_live.rig.recording import EVENTS, Recording
 

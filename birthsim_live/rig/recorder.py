@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import birthsim_env
-from baselines.files import whole_file
-from birthsim_env.physics.lanes import Array
+from baselines.work.files import whole_file
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.frames import FIELDS
 from birthsim_live.rig.recording import FORMAT, packed
 

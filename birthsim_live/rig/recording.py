@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.frames import COLUMNS, FIELDS
 
 FORMAT = "birthsim-recording-2"

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
-from birthsim_env.physics.lanes import Array
 
 
 class ExchangeableSensors:

@@ -11,10 +11,10 @@ import numpy as np
 
 from baselines.controller import Controller
 from birthsim_env.parts.actuation import ValveActuation
+from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, Parts
-from birthsim_env.parts.seeding import stream
-from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_env.simulation import Simulation
 from birthsim_live.rig.bridge import Course

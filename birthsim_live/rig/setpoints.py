@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.bridge import Fade
 
 TRANSITION = 0.05

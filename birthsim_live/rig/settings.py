@@ -12,8 +12,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, cre
 from baselines.registry import CONTROLLERS, controller_names
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
 """Settings that take the place of the scenario's setpoints, in the order of a reference's rows 8 to 11."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from birthsim_env.physics.geometry import end_effector
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.clock import Clock, Source
 from birthsim_live.rig.hand import DRAG_LIMIT
 from birthsim_live.rig.settings import Choices

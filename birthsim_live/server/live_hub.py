@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.files import LEFTOVERS, remove_leftovers
+from baselines.work.files import LEFTOVERS, remove_leftovers
 from birthsim_live.rig.clock import LOG
 from birthsim_live.rig.controllers import build_controller
 from birthsim_live.rig.hand import Hold

@@ -6,7 +6,7 @@ import os
 from dataclasses import asdict
 from typing import Any
 
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 def shapes(rig: Parameters) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from baselines import BacksteppingController
 from baselines.backstepping.gains import closed_loop_damping, closed_loop_stiffness
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import mechanics
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points

@@ -10,9 +10,9 @@ import pytest
 
 from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import joint_force
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.backstepping.test_backstepping import many, of_lanes
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived

@@ -14,10 +14,10 @@ from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.controller import Controller
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 
 D3, D6, R4, R2 = sp.symbols("d3 d6 r4 r2", positive=True)

@@ -18,8 +18,8 @@ from baselines.backstepping.gains import (
     least_stiffness,
 )
 from baselines.bench.probes import POSES
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.backstepping.test_gains import rigs
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import linprog
 
 from baselines.valve_inverse import force_first_openings, two_valve_openings
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Cylinder, Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import derived_law
 
 RIG = Parameters()

@@ -11,7 +11,7 @@ import birthsim_env
 from baselines import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.backstepping.test_backstepping import as_signals, random_situations
 from tests.oracles import derived_law as derived
 

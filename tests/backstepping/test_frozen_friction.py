@@ -8,7 +8,7 @@ import pytest
 from baselines import BacksteppingController
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 
 CASES = [(pose, setpoint, axis) for pose in POSES for setpoint in (1000.0, 2000.0, 4000.0) for axis in (0, 1)]

@@ -18,7 +18,7 @@ from baselines.backstepping.gains import (
     gains_for,
     least_stiffness,
 )
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 C1, C2, C3, MASS, FV, PUSH = sp.symbols("c1 c2 c3 m Fv U", positive=True)
 Y, V, F, WEIGHT = sp.symbols("y v F weight", real=True)

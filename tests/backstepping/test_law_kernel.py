@@ -7,8 +7,8 @@ import pytest
 
 from baselines.backstepping import law
 from birthsim_env.loop.signals import REFERENCES
-from birthsim_env.physics.lanes import parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 @pytest.mark.parametrize("ratio", [0.0, 1.2])

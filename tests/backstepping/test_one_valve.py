@@ -12,8 +12,8 @@ from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Cylinder, Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.backstepping.test_backstepping import as_signals, random_situations
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS
 

@@ -8,12 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from baselines.bench import accuracy, accuracy_tables
-from baselines.bench.motions import MOTIONS, smooth, stick_slip, strong
+from baselines.bench.accuracy import errors as accuracy
+from baselines.bench.accuracy import tables as accuracy_tables
+from baselines.bench.accuracy.motions import MOTIONS, smooth, stick_slip, strong
 from baselines.figures.accuracy import accuracy_figure
-from birthsim_env.parts.randomization import documented_ranges
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.console import call
 
 
@@ -84,7 +85,7 @@ def found() -> dict:
         rigs = {name: rig for name, rig in accuracy.rigs_to_measure(Parameters(), 1, 0).items() if "corner 1" not in name}
         measured = accuracy.measure(rigs, MOTIONS, lambda: ticks.append(None))
         assert len(ticks) == accuracy.runs(len(rigs), len(MOTIONS))
-    from baselines.files import finite
+    from baselines.work.files import finite
 
     return json.loads(json.dumps(finite(measured), allow_nan=False))
 

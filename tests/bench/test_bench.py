@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from baselines.bench import speed
+from baselines.bench.speed import speeds as speed
 from baselines.commands import bench
 from tests.console import call
 

@@ -9,7 +9,7 @@ import pytest
 from baselines.admittance.controller import AdmittanceBackstepping
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, StiffnessSchedule, UserForce
-from birthsim_env.physics.lanes import MASS, Array
+from birthsim_env.physics.compiled.lanes import MASS, Array
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body

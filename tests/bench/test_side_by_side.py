@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.side_by_side import side_by_side
+from baselines.work.side_by_side import side_by_side
 
 
 def threads(number):
@@ -63,7 +63,7 @@ def test_a_process_that_dies_is_an_error_that_says_so():
 PARENT = """
 import os, sys, time
 from pathlib import Path
-from baselines.side_by_side import side_by_side
+from baselines.work.side_by_side import side_by_side
 from tests.bench.test_side_by_side import wait_beside
 if __name__ == "__main__":
     side_by_side(wait_beside, [(sys.argv[1],), (sys.argv[1],)], 2, lambda number, result: None)

@@ -31,11 +31,11 @@ from baselines.bench.stability import (
 )
 from baselines.figures.stability import _border, _edges, stability_figure
 from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import STATES, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.console import call, strict
 
 RIG = Parameters()

@@ -23,9 +23,9 @@ from baselines.bench.studies import (
 )
 from baselines.figures import studies as study_figures
 from birthsim_env import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, joint_force
-from birthsim_env.physics.lanes import PRESSURES, V1, V2
 from birthsim_env.physics.plant import Plant
 
 RIG = Parameters()

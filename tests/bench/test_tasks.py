@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from baselines.bench import claims, tasks
-from baselines.bench.claims import Claims
-from baselines.bench.tasks import Task, code_stamp, run_tasks
-from baselines.files import this_process
+from baselines.work import claims, tasks
+from baselines.work.claims import Claims
+from baselines.work.files import this_process
+from baselines.work.tasks import Task, code_stamp, run_tasks
 from tests.bench.test_side_by_side import waited_for
 
 
@@ -170,7 +170,7 @@ def test_a_claim_is_touched_and_respected_until_it_is_given_up(tmp_path, monkeyp
 PROCESS = """
 import sys
 from pathlib import Path
-from baselines.bench.tasks import run_tasks
+from baselines.work.tasks import run_tasks
 from tests.bench.test_tasks import made, slowly
 if __name__ == "__main__":
     log, out = map(Path, sys.argv[1:])

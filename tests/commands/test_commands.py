@@ -12,7 +12,7 @@ import pytest
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import policy_folders
 from baselines.commands import start
-from baselines.files import write_json
+from baselines.work.files import write_json
 from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.files import whole_results
+from baselines.work.files import whole_results
 from tests.console import PATIENCE, ROOT
 
 LOADING = """

@@ -11,7 +11,7 @@ import pytest
 from baselines.commands import tune
 from baselines.registry import make_controller
 from birthsim_env import Parameters
-from birthsim_env.parts.randomization import documented_ranges
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from tests.console import call
 
 OWN = """

@@ -10,10 +10,10 @@ import pytest
 from baselines.admittance import law as admittance_law
 from baselines.admittance.controller import LEAST_FRACTION, AdmittanceBackstepping
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body
 from tests.oracles import linkage_by_points as by_points
 

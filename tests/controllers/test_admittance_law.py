@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance import law
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.controllers.test_admittance_backstepping import PERIOD, Law, near, remembered
 from tests.oracles import derived_law as derived
 from tests.oracles import rigid_body

@@ -12,12 +12,12 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.randomization import documented_ranges, draw_parameters
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import LabSensors
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 
 BELIEVED = Parameters()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.physics.lanes import PRESSURES, SPOOLS, Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_column
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 VALVES = {"default": RIG, "hot, leaking": RIG.replace({"air.temperature": 320.0, "valves.leakage_ratio": 0.08})}

@@ -11,7 +11,7 @@ import pytest
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.simulation import Simulation
 
 CONTROLLER = """
@@ -19,7 +19,7 @@ import numpy as np
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import ASKED, OPENING, POSITION, SEEN
 from birthsim_env.loop.stage import block, numbers
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled.compilation import kernel
 
 @kernel
 def push(world, seen, memory, constants, tables, lane, n):
@@ -39,7 +39,7 @@ import gymnasium
 from birthsim_env.parts.references import Path
 from birthsim_env.parts.scenarios import SCENARIOS, Scenario
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.parts.user_forces import Ramp
+from birthsim_env.parts.hands.user_forces import Ramp
 
 def parts():
     return Path((0.48, 0.0), 0.0, 0.04, ends=2.0), Ramp(amplitude=15.0), StiffnessSchedule()
@@ -52,9 +52,9 @@ SENSOR = """
 import numpy as np
 from birthsim_env.loop.rows import POSITION, SEEN
 from birthsim_env.loop.stage import Stage, block, numbers
-from birthsim_env.parts.sensors import SENSORS, IdealSensors
-from birthsim_env.physics.compilation import kernel
-from birthsim_env.parts.sensors import ideal_stage
+from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.parts.sensors.sensors import ideal_stage
 
 @kernel
 def coarse(world, seen, memory, constants, tables, lane, n):

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import birthsim_env
-from birthsim_env.parts.moving_hands import HANDS
+from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import SCENARIOS
 
 WORLDS = st.fixed_dictionaries(

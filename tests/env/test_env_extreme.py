@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import birthsim_env
-from birthsim_env.parts.randomization import documented_ranges
-from birthsim_env.physics.lanes import Array
+from birthsim_env.parts.drawn.randomization import documented_ranges
+from birthsim_env.physics.compiled.lanes import Array
 
 SETUPS = [
     ("BirthSIM/Circle-v1", "two_valves", "lugre"),

@@ -12,7 +12,7 @@ import pytest
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 
 IDS = tuple(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))

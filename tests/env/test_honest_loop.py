@@ -10,10 +10,10 @@ import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.actuation import ValveActuation
-from birthsim_env.parts.honest_sensors import HonestSensors
-from birthsim_env.parts.randomization import described, documented_ranges
-from birthsim_env.parts.sensor_errors import FIGURES
-from birthsim_env.parts.sensors import SENSORS
+from birthsim_env.parts.drawn.randomization import described, documented_ranges
+from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensors import SENSORS
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {

@@ -15,9 +15,9 @@ from birthsim_env import StiffnessSchedule, Trajectory, UserForce
 from birthsim_env.loop.loop import Loop, available_threads
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import ValveActuation
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, ForceProfile
 from birthsim_env.parts.references import Circle
-from birthsim_env.parts.sensors import SENSORS, IdealSensors
-from birthsim_env.parts.user_forces import AlternatingSteps, ForceProfile
+from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from birthsim_env.drawing.rendering import Renderer, Scene
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 NOWHERE = (math.nan, math.nan)
@@ -270,7 +270,7 @@ SCRIPT = """
 import sys
 import numpy as np
 import birthsim_env
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 import birthsim_env.drawing.rendering as rendering
 assert "pygame" not in sys.modules, "importing must not load pygame"
 scene = rendering.Scene(0.0, (0.0, 0.0), (0.5, 0.0), (0.5, 0.0), (0.0, 0.0), (2e5,) * 4, (1.0, 1.0), np.zeros((0, 2)))

@@ -8,7 +8,7 @@ import pytest
 
 from birthsim_env import StiffnessSchedule, reward
 from birthsim_env.loop.signals import REFERENCES
-from birthsim_env.physics.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
+from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
 
 CIRCLE, PROBE, FORCEPS, DESCENT = (f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Forceps", "Descent"))
 TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.registry import make_controller
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.success import add
 
 CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"

@@ -12,8 +12,8 @@ from scipy.linalg import expm, sqrtm
 
 from baselines.estimation.admittance import DAMPING_RATIO, Admittance, square_root
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 MASS, PERIOD = 3.0, 1e-3
 COUPLED = np.array([[3000.0, 800.0], [800.0, 1500.0]])

@@ -11,9 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from baselines.estimation.chamber_observer import ChamberObserver
-from birthsim_env.physics.lanes import SPOOLS, Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
 
 PERIOD = 1e-3

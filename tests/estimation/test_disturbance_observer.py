@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from baselines.estimation.disturbance_observer import DisturbanceObserver
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 

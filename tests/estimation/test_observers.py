@@ -11,11 +11,11 @@ import pytest
 from baselines import BacksteppingController
 from baselines.estimation.observers import PistonObserver
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
 

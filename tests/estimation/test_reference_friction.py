@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from baselines.estimation.reference_friction import ReferenceFriction
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Cylinder, Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 

@@ -10,11 +10,11 @@ import pytest
 
 from baselines.estimation.observers import RELUCTANCE, REST_BANDWIDTH, REST_TIME
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
-from birthsim_env.physics.lanes import PRESSURES, Array, parameter_array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.estimation.test_observers import PERIOD, lane_of, observer, rms
 
 STUCK = np.array([[0.02], [-0.05]])

@@ -10,10 +10,10 @@ import pytest
 
 from baselines.estimation.state_estimator import BELIEVED_LIMIT, MOVING_SPEED, Estimate, StateEstimator
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import PRESSURES, SPOOLS, Array, parameter_array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body
 
 PERIOD = 1e-3

@@ -122,7 +122,8 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from baselines.backstepping.controller import BacksteppingController
     from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
     from baselines.uncontrolled import RandomValves
-    from birthsim_env.parts import moving_hands, references, stiffness_schedules, user_forces
+    from birthsim_env.parts import references, stiffness_schedules
+    from birthsim_env.parts.hands import moving_hands, user_forces
     from birthsim_env.physics.plant import Plant
 
     parts = (
@@ -148,7 +149,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
 def _constructors(folder: Path) -> dict[str, tuple[Callable[..., Any], bool]]:
     _ready(folder)
     makers = _makers()
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     for name, (_, takes_rig) in makers.items():
         if takes_rig:
@@ -159,9 +160,9 @@ def _constructors(folder: Path) -> dict[str, tuple[Callable[..., Any], bool]]:
 
 def _use(made: Any, rng: Rng) -> None:
     """A few steps with what was made: nothing that was accepted fails later."""
+    from birthsim_env.parts.hands.user_forces import UserForce
     from birthsim_env.parts.references import Trajectory
     from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-    from birthsim_env.parts.user_forces import UserForce
     from birthsim_env.vector_env import BirthSIMVectorEnv
 
     role = {Trajectory: "reference", UserForce: "user_force", StiffnessSchedule: "stiffness"}
@@ -186,7 +187,7 @@ def _use(made: Any, rng: Rng) -> None:
 
 
 def _constructor(makers: dict[str, tuple[Callable[..., Any], bool]], rng: Rng, folder: Path, case: Case) -> None:
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     name = list(makers)[rng.integers(len(makers))]
     make, takes_rig = makers[name]
@@ -214,7 +215,7 @@ def _constructor(makers: dict[str, tuple[Callable[..., Any], bool]], rng: Rng, f
 def _field(_: None, rng: Rng, folder: Path, case: Case) -> None:
     import dataclasses
 
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
     from tests.fuzz.files import run_a_little
 
     rig = Parameters()

@@ -40,7 +40,7 @@ def run_a_little(rig: Any, rng: Rng, **arguments: Any) -> None:
 
 
 def _rig_files(_: Path) -> list[dict[str, Any]]:
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
     from tests.odd_rigs import odd_rig
 
     rig = Parameters()
@@ -52,7 +52,7 @@ def _rig_files(_: Path) -> list[dict[str, Any]]:
 
 
 def _rig(files: list[dict[str, Any]], rng: Rng, folder: Path, case: Case) -> None:
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     path = written(case, folder / "our_rig.toml", toml_bytes(rng, files[rng.integers(len(files))]))
     rig = Parameters.from_toml(path)
@@ -81,7 +81,7 @@ def _bomb() -> bytes:
 
 
 def _recordings(folder: Path) -> tuple[dict[str, Any], dict[str, Any], np.ndarray[Any, Any], bytes]:
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
     from birthsim_live.rig.frames import FIELDS
     from birthsim_live.rig.recorder import EVERY, Recorder
     from birthsim_live.rig.recording import FORMAT, load_recording
@@ -151,15 +151,15 @@ def _recording(valid: tuple[Any, Any, Any, bytes], rng: Rng, folder: Path, case:
 
 def loaded(_: Path) -> None:
     """What the readers of small files need, before memory is limited."""
-    import baselines.bench.tasks
     import baselines.commands.tune
+    import baselines.work.tasks
     from baselines.registry import make_controller
     from birthsim_env.parts.own_parts import trajectory_of
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     make_controller("pid", Parameters())
     trajectory_of(lambda time: (0.5, 0.0), 1.0).sample(np.zeros(2))
-    baselines.bench.tasks.code_stamp()
+    baselines.work.tasks.code_stamp()
 
 
 def _tasks(folder: Path) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def _tasks(folder: Path) -> dict[str, Any]:
 
 
 def _run(folder: Path) -> None:
-    from baselines.bench.tasks import Task, run_tasks
+    from baselines.work.tasks import Task, run_tasks
 
     results, failures = run_tasks([Task("piece", "pieces", _worked, {"seed": 1})], folder, 1, "pieces")
     assert not failures

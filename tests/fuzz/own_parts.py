@@ -67,7 +67,7 @@ _SOURCES = (
 
 def _controller_file(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     from baselines.registry import make_controller
-    from birthsim_env.physics.parameters import Parameters
+    from birthsim_env.physics.rig.parameters import Parameters
 
     text = _SOURCES[rng.integers(len(_SOURCES))].encode()
     path = written(case, folder / "ours.py", damaged(rng, text) if rng.random() < 0.5 else text)

@@ -76,7 +76,7 @@ def test_the_harness_sees_every_misbehaviour(monkeypatch):
 
 
 def test_any_value_is_shown_in_a_short_line():
-    from birthsim_env.physics.values import LONGEST, shown
+    from birthsim_env.physics.rig.values import LONGEST, shown
 
     silent = type("Odd", (), {"__repr__": None})()
     for value in (10**320, 16**5000, -(10**320), nested(3000), "x" * 5000, "a\nb", np.zeros((9, 9)), silent):

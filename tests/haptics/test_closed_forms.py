@@ -32,7 +32,7 @@ from baselines.bench.haptics.release import PULL, flight, pulling_hand
 from baselines.bench.haptics.worlds import resting
 from baselines.bench.stability import push_and_release
 from baselines.impedance import mass_spring_damper
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 from tests.oracles.ideal_ports import IdealPort, impedance, stiffest
 
 MASS, STIFFNESS = 3.0, 2000.0

@@ -13,7 +13,7 @@ from baselines.bench.haptics import backdriving, coupled, rendering
 from baselines.bench.haptics.coupled import measure_hands, measure_z_width, stable_up_to
 from baselines.bench.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
 from baselines.figures import haptics as figures
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.console import call, strict
 
 SETTINGS: dict[str, Any] = {

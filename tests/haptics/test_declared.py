@@ -15,7 +15,7 @@ from baselines.bench.rig_port import RigPort
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.registry import CONTROLLERS, UNCONTROLLED, make_controller
 from birthsim_env.loop.signals import Reference
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 SLIDING = RIG.replace({f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)})

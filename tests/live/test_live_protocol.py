@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.settings import STIFFNESSES, Choices, combined, default_settings, merged
 from birthsim_live.server import protocol
 from birthsim_live.server.protocol import parse

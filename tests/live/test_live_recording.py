@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig import recorder, recording
 from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES
 from birthsim_live.rig.hand import Hold

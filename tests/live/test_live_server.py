@@ -16,7 +16,7 @@ import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.frames import FIELDS, SLICES
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.recording import load_recording

@@ -12,9 +12,9 @@ import pytest
 import birthsim_env
 from baselines.registry import make_controller
 from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.bridge import Course
 from birthsim_live.rig.frames import SLICES, frame_of
 from birthsim_live.rig.hand import DRAG_DAMPING, DRAG_LIMIT, Hold, drag_force
@@ -143,7 +143,7 @@ def test_setpoints_pass_over_with_consistent_rates() -> None:
 def test_mass_and_friction_change_the_rig_but_not_what_the_controller_believes() -> None:
     one = session(controller="backstepping-weight")
     one.change({"mass": 5.0, "friction": 0.5})
-    plant = birthsim_env.physics.lanes.parameter_column(
+    plant = birthsim_env.physics.compiled.lanes.parameter_column(
         RIG.replace(
             {
                 "mechanics.mass": 5.0,

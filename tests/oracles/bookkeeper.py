@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from birthsim_env.physics.lanes import PRESSURES, TEMPERATURES, V1, V2, Y1, Y2, Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, TEMPERATURES, V1, V2, Y1, Y2, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 R, GAMMA, WALL = 287.05, 1.4, 293.15
 CV, CP = R / (GAMMA - 1), GAMMA * R / (GAMMA - 1)

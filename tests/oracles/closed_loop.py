@@ -9,11 +9,11 @@ import pytest
 
 from baselines.bench import probes
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 FRICTIONLESS = Parameters().replace({"cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
 """Neither Coulomb nor Stribeck friction; the viscous part stays."""

@@ -7,7 +7,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from baselines.bench.rig_port import Hand
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 PERIOD, ANSWERS = 1e-3, 4
 STEP = PERIOD / ANSWERS

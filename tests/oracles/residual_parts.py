@@ -8,8 +8,8 @@ from agents.residual import authority, unexplained
 from baselines.estimation.disturbance_observer import DisturbanceObserver
 from baselines.estimation.observers import PistonObserver
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 class AuthorityLimiter:

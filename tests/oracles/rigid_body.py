@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
 from tests.oracles import linkage_by_points as by_points
 

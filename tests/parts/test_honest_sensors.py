@@ -12,10 +12,10 @@ import pytest
 from scipy.special import j0
 
 from birthsim_env import Parameters
-from birthsim_env.parts.honest_sensors import HonestSensors
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensor_errors import FIGURES
-from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.sensor_errors import FIGURES
+from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.electronics import Electronics
 
 OFF = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from birthsim_env.parts.moving_hands import CALM, HANDS, Guided, Noise, Sine
+from birthsim_env.parts.hands.moving_hands import CALM, HANDS, Guided, Noise, Sine
 
 CIRCLE = "BirthSIM/Circle-v1"
 

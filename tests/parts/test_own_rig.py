@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from birthsim_env import Parameters
-from birthsim_env.parts.randomization import described, documented_ranges
+from birthsim_env.parts.drawn.randomization import described, documented_ranges
+from birthsim_env.physics.compiled.lanes import FC1, MASS, parameter_column
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.lanes import FC1, MASS, parameter_column
 from birthsim_env.physics.strength import carried
 
 HEAVY = """

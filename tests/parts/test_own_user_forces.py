@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from birthsim_env import UserForce
-from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.drawn.seeding import stream
 
 PROBE = "BirthSIM/Probe-v1"
 

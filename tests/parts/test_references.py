@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env import Circle, Hold, Parameters, Path, Trajectory
+from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.seeding import stream
 from birthsim_env.physics.geometry import end_effector
 
 RIG = Parameters()

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env import Parameters
-from birthsim_env.parts.randomization import documented_ranges, draw_parameters
-from birthsim_env.parts.seeding import STREAMS, draw, lane_seeds, stream
-from birthsim_env.physics.lanes import PARAMETER_NAMES, parameter_column
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.seeding import STREAMS, draw, lane_seeds, stream
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_column
 
 DESIGN = {
     "mechanics.mass": (2.0, 5.0),

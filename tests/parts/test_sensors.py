@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from birthsim_env import Parameters
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.sensors import IdealSensors, LabSensors
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.sensors.sensors import IdealSensors, LabSensors
 
 CIRCLE = "BirthSIM/Circle-v1"
 SEEN = ("position", "position_time", "velocity", "pressures")

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env import StiffnessSchedule
+from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.seeding import stream
 
 CIRCLE = "BirthSIM/Circle-v1"
 TWO = ((0.0, 0.8), (2000.0, 4000.0), (4600.0, 3600.0), (2300.0, 1800.0))

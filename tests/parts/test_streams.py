@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from birthsim_env import Circle, Hold, Parameters, StiffnessSchedule
 from birthsim_env.parts import courses
-from birthsim_env.parts.moving_hands import HANDS
-from birthsim_env.parts.randomization import draw_columns, draw_parameters
+from birthsim_env.parts.drawn.randomization import draw_columns, draw_parameters
+from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
+from birthsim_env.parts.drawn.streams import Streams
+from birthsim_env.parts.drawn.worlds import TOGETHER, begin, worlds
+from birthsim_env.parts.hands.moving_hands import HANDS
+from birthsim_env.parts.hands.user_forces import Contractions, ForceProfile, Ramp
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.seeding import STREAMS, draw, stream, vectorised
-from birthsim_env.parts.sensors import SENSORS, LabSensors
-from birthsim_env.parts.streams import Streams
-from birthsim_env.parts.user_forces import Contractions, ForceProfile, Ramp
-from birthsim_env.parts.worlds import TOGETHER, begin, worlds
-from birthsim_env.physics.lanes import parameter_column
+from birthsim_env.parts.sensors.sensors import SENSORS, LabSensors
+from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.simulation import Simulation
 
 SEEDS = st.one_of(st.sampled_from([0, 1, 2**32 - 1, 2**32, 2**64 - 1]), st.integers(0, 2**64 - 1))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from birthsim_env import ForceProfile
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, Contractions, Pulls, Ramp
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.seeding import stream
-from birthsim_env.parts.user_forces import AlternatingSteps, Contractions, Pulls, Ramp
 
 PROBE = "BirthSIM/Probe-v1"
 

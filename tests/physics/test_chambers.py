@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
-from birthsim_env.physics.lanes import V1, V2, Y1, Y2, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.bookkeeper import CP, CV, GAMMA, WALL, Bookkeeper, P, T, Volumes, mass_and_energy
 
 SEALED = {"valves.leakage_ratio": 0.0}

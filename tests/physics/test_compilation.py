@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from birthsim_env.physics import compilation
-from birthsim_env.physics.compilation import source_stamp
+from birthsim_env.physics.compiled import compilation
+from birthsim_env.physics.compiled.compilation import source_stamp
 
 ROOT = Path(__file__).parent.parent.parent
 PROBE = """
-from birthsim_env.physics.compilation import kernel
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.loop.signals import compliance
 
 @kernel

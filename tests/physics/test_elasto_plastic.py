@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from birthsim_env.physics import friction
+from birthsim_env.physics.compiled.lanes import ELASTO_PLASTIC, PRESSURES, V1, V2, Y2, Z1, Z2, Array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import ELASTO_PLASTIC, PRESSURES, V1, V2, Y2, Z1, Z2, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.physics.test_friction import FS, FV, INSTANTS, MOTIONS, S0, S1, PlantFriction, along, follows, stribeck
 
 LAW = {"friction.law": "elasto_plastic"}

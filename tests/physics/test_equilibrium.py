@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from birthsim_env.physics import lanes as at
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import rigid_body
 from tests.physics.test_dynamics import MOVED
 from tests.physics.test_mechanics import bore_force

@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from birthsim_env.physics import exact
+from birthsim_env.physics.compiled import exact
 
 RNG = np.random.default_rng(0)
 SMALL = 10.0 ** RNG.uniform(-12, 0, 300)

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from birthsim_env.physics import friction
-from birthsim_env.physics.lanes import PRESSURES, V1, V2, Y1, Y2, Z1, Z2, Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2, Y1, Y2, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 
 FC, FS, VS, FV = (12.0, 15.0), (12.0 * 1.33, 15.0 * 1.33), 0.015, 35.0

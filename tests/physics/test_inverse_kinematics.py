@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array, parameter_column
 from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
-from birthsim_env.physics.lanes import V1, V2, Y1, Y2, Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 
 RIGS = {

@@ -10,9 +10,9 @@ import pytest
 import sympy as sp
 
 from birthsim_env.physics import dynamics, geometry, mechanics
-from birthsim_env.physics.lanes import PN1, PN2, PP1, PP2, V1, V2, Y1, Y2, Array
-from birthsim_env.physics.parameters import Cylinder, Friction, Parameters
+from birthsim_env.physics.compiled.lanes import PN1, PN2, PP1, PP2, V1, V2, Y1, Y2, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Cylinder, Friction, Parameters
 from tests.oracles import linkage_by_points as by_points
 
 FRICTIONLESS = {"coulomb_friction": 0.0, "viscous_friction": 0.0}

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from birthsim_env.physics.lanes import PARAMETER_NAMES, parameter_array, parameter_column
-from birthsim_env.physics.parameters import Cylinder, Parameters, field_of, load_parameters
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
+from birthsim_env.physics.rig.parameters import Cylinder, Parameters, field_of, load_parameters
 
 FIELDS = [
     (section.name, field)

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import PARAMETER_NAMES, STATE_NAMES, Y1, Y2, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 ROOT = Path(__file__).parent.parent.parent
 RANDOMIZED = {

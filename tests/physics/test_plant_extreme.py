@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics import dynamics
-from birthsim_env.physics.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 RANGES: dict[str, tuple[float, float]] = {
     f"{section.name}.{field.name}": field.metadata["randomized"]

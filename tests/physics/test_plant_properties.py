@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from birthsim_env.physics import lanes as at
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD = 0.01
 CHAMBERS = (

@@ -133,7 +133,7 @@ def test_stages_run_as_plain_python():
         "import sys; from tests.uncompiled import switch_off\n"
         "if len(sys.argv) > 1: switch_off()\n"
         "import numpy as np; from baselines import BacksteppingController\n"
-        "from birthsim_env.physics.parameters import Parameters\n"
+        "from birthsim_env.physics.rig.parameters import Parameters\n"
         "from tests.backstepping.test_backstepping import as_signals, random_situations\n"
         "rig = Parameters(); s = random_situations(rig, 0.01, True, 5, np.random.default_rng(5))\n"
         "print(BacksteppingController(rig).command(*as_signals(s, rig)).tobytes().hex())"

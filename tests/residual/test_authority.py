@@ -7,8 +7,8 @@ import pytest
 
 from agents.residual.authority import LEAST, LEVEL, MOST_SOFTENING, RECOVERY, SOFTENING, SWING, YIELDING
 from birthsim_env.loop.signals import REFERENCES, Reference
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles.residual_parts import AuthorityLimiter
 

@@ -17,7 +17,7 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from tests.oracles import closed_loop
 

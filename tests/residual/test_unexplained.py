@@ -10,11 +10,11 @@ import pytest
 from agents.residual.unexplained import MOVING, ROWS
 from baselines.admittance.controller import AdmittanceBackstepping
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop, rigid_body
 from tests.oracles import derived_law as derived
 from tests.oracles.residual_parts import UnexplainedForceObserver

@@ -17,10 +17,10 @@ from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
 from baselines.rivals.predictive import Planner
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.lanes import PRESSURES, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.controllers.test_through_friction import lane_of, recorded
 from tests.controllers.test_valve_inverse import into_chambers
 from tests.oracles import closed_loop, derived_law, rigid_body

@@ -16,8 +16,8 @@ from baselines.registry import make_controller
 from baselines.rivals import prediction
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, ControlModel, residuals
 from baselines.rivals.predictive import STEPS, Buffered, NonlinearMPC
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law, rigid_body
 from tests.oracles import linkage_by_points as by_points
 
@@ -267,7 +267,7 @@ def test_all_other_controllers_do_without_casadi() -> None:
     code = (
         "import sys; sys.modules['casadi'] = None\n"
         "from baselines.registry import CONTROLLERS, make_controller\n"
-        "from birthsim_env.physics.parameters import Parameters\n"
+        "from birthsim_env.physics.rig.parameters import Parameters\n"
         "for name in set(CONTROLLERS) - {'nonlinear-mpc'}: make_controller(name, Parameters())\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

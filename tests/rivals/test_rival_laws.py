@@ -13,8 +13,8 @@ from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, prepare
 from baselines.rivals.tracking import TrackingController
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics import geometry
-from birthsim_env.physics.lanes import Array, parameter_column
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles.closed_loop import FRICTIONLESS

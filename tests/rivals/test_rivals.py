@@ -16,10 +16,10 @@ from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors import LabSensors
+from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics import geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 

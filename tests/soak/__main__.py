@@ -22,8 +22,8 @@ os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBL
 import numpy as np
 from tqdm import tqdm
 
-from baselines.bench.tasks import code_stamp
-from baselines.files import make_folder, write_json, write_text
+from baselines.work.files import make_folder, write_json, write_text
+from baselines.work.tasks import code_stamp
 from tests.soak.laps import LANES, STEPS, run
 
 GROWTH = 10.0

@@ -16,12 +16,12 @@ from gymnasium.vector import AutoresetMode
 import agents
 from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.registry import make_controller
-from birthsim_env.parts.moving_hands import HANDS
-from birthsim_env.parts.randomization import documented_ranges
+from birthsim_env.parts.drawn.randomization import documented_ranges
+from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors import SENSORS
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 assert agents  # registers the environments with a law inside
 

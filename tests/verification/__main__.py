@@ -17,8 +17,8 @@ from pathlib import Path
 from tests.verification import balances, mutants, reached, report, sources
 
 ACCURACY = (
-    *("baselines/bench/accuracy.py", "baselines/bench/motions.py", "baselines/bench/second_model.py"),
-    *("birthsim_env/parts/randomization.py", *(path for path in balances.SOURCES if path.startswith("birthsim_env"))),
+    *("baselines/bench/accuracy/errors.py", "baselines/bench/accuracy/motions.py", "baselines/bench/accuracy/second_model.py"),
+    *("birthsim_env/parts/drawn/randomization.py", *(path for path in balances.SOURCES if path.startswith("birthsim_env"))),
 )
 """Files that decide the figures of ``birthsim-verify``."""
 

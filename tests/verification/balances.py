@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
-from birthsim_env.physics.lanes import V1, V2, Y1, Y2, Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.bookkeeper import GAMMA, Bookkeeper, P, Volumes
 
 LANES, SECONDS = 6, 2.0

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from baselines.bench import accuracy_tables
+from baselines.bench.accuracy import tables as accuracy_tables
 from tests.verification import mutants, sources
 
 PAGE = sources.ROOT / "docs" / "verification.md"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines.bench.tasks import Task, run_tasks
-from baselines.side_by_side import side_by_side
+from baselines.work.side_by_side import side_by_side
+from baselines.work.tasks import Task, run_tasks
 
 SWEEP = """
 [base]

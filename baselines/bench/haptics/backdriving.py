@@ -10,8 +10,8 @@ import numpy as np
 from baselines.bench.haptics.recording import Recording, record
 from baselines.bench.haptics.worlds import DIRECTIONS, POSES, condition_of, lost_lanes, resting
 from baselines.bench.rig_port import Hand
-from baselines.bench.tasks import Result
-from birthsim_env.physics.lanes import Array
+from baselines.work.tasks import Result
+from birthsim_env.physics.compiled.lanes import Array
 
 STIFFNESSES = (500.0, 200.0, 100.0, 50.0, 0.0)
 """N/m."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from baselines.bench.haptics.worlds import Condition, condition_of, varies_damping
 from baselines.bench.stability import Cases, Verdict, judge
-from baselines.bench.tasks import Result
 from baselines.controller import Controller
+from baselines.work.tasks import Result
 
 STIFFNESSES = (100.0, 300.0, 1000.0, 3000.0, 8000.0, 20000.0)
 """N/m, of a hand: next to none, to a clamp."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from baselines.impedance import Complex
 from birthsim_env.loop.signals import Mask
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 MAGNITUDE, PHASE = 0.10, 10.0
 """Fraction and degrees within which the impedance felt is the one declared: the issue's definition (design section 11)."""

@@ -13,7 +13,7 @@ from baselines.bench.haptics.release import measure_release
 from baselines.bench.haptics.rendering import measure_rendering
 from baselines.bench.haptics.worlds import condition_of, uses_force
 from baselines.bench.pieces import file_stem
-from baselines.bench.tasks import Result, Task
+from baselines.work.tasks import Result, Task
 
 SUBJECTS = ("impedance", "release", "backdriving", "hands", "z_width")
 """What can be measured; ``impedance`` has own error, energy, air and saturation beside it."""

@@ -12,7 +12,7 @@ import numpy as np
 from baselines.bench.haptics.recording import Recording
 from baselines.bench.rig_port import Hand
 from baselines.impedance import Complex
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 FUNDAMENTAL = 0.2
 """Hz: 5 s a period."""

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from baselines.bench.haptics.recording import Recording
 from baselines.impedance import Impedance
 from birthsim_env.loop.signals import Reference
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 
 def declared_offset(impedance: Impedance, force: Array, period: float) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.bench.rig_port import Hand, Port
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from baselines.bench.haptics.own_error import declared_offset
 from baselines.bench.haptics.recording import Recording, record
 from baselines.bench.haptics.worlds import condition_of, lost_lanes, resting
 from baselines.bench.rig_port import Hand
-from baselines.bench.tasks import Result
 from baselines.impedance import declared_by
-from birthsim_env.physics.lanes import Array
+from baselines.work.tasks import Result
+from birthsim_env.physics.compiled.lanes import Array
 
 PULL, STIFFNESS = 190.0, 4000.0
 """N, within the 150-200 N of a forceps pull, and N/m, the setpoint of ``BirthSIM/Forceps``."""

@@ -29,8 +29,8 @@ from baselines.bench.haptics.own_error import declared_offset, error_size, pure_
 from baselines.bench.haptics.recording import record
 from baselines.bench.haptics.worlds import DIRECTIONS, POSES, condition_of, lost_lanes, resting
 from baselines.bench.metrics import NORMAL_DENSITY
-from baselines.bench.tasks import Result
 from baselines.impedance import declared_by
+from baselines.work.tasks import Result
 
 STIFFNESSES = (1000.0, 2000.0, 4000.0)
 """N/m."""

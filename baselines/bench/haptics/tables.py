@@ -10,7 +10,7 @@ import numpy as np
 from baselines.bench.haptics.coupled import HANDS, SETPOINT, stable_up_to
 from baselines.bench.haptics.release import PULL, STIFFNESS
 from baselines.bench.statistics import number, quantile
-from birthsim_env.physics.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array
 
 Runs = Sequence[dict[str, Any]]
 """What ``baselines.bench.haptics.measurements.gathered`` gives, in the order of the rows."""

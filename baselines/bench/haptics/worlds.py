@@ -14,13 +14,13 @@ from baselines.bench.stability import PNEUMATIC
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.parts.randomization import documented_ranges, draw_parameters
-from birthsim_env.parts.seeding import stream
+from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.lanes import Array
-from birthsim_env.physics.parameters import Parameters
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 
 POSES = ((0.5, 0.0), (0.4, 0.05), (0.62, -0.1))
 """m: the middle of the workspace and two corners, of those of ``baselines.bench.probes``."""

@@ -1,0 +1,192 @@
+"""The whole rig a second time, from first principles and in other coordinates, for an adaptive method of SciPy's.
+
+It is the oracle of the plant: tests compare both, and ``accuracy`` measures the plant's error against it. State (18): end
+effector x, y, vx, vy; air masses (4) and internal energies (4) of chambers P1, N1, P2, N2; bristles z1, z2; spools (4). Rod
+forces act between points, chambers obey conservation of mass and energy, and nothing of the package is imported but the data of
+a rig. End stops are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from birthsim_env.physics.rig.parameters import Parameters
+
+Array = NDArray[np.float64]
+F = TypeVar("F", bound=Callable[..., Any])
+
+SCALES = np.array([0.1, 0.1, 0.1, 0.1, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 4])
+"""Size of each state: the solver sees multiples of it, so that one absolute tolerance serves all."""
+
+
+def constants(rig: Parameters) -> tuple[Array, ...]:
+    """Numbers of a rig: linkage, mass, friction per cylinder, chambers, valves, air."""
+    g, m, f, v, air = rig.geometry, rig.mechanics, rig.friction, rig.valves, rig.air
+    cylinders = (rig.cylinder1, rig.cylinder2)
+    pivot = g.d3 * np.exp(1j * g.gamma3)
+    linkage = np.array([pivot.real, pivot.imag, g.d6, g.k1, g.k2, m.mass, m.gravity])
+    sizes = [(c.piston_diameter, c.rod_diameter, c.stroke) for c in cylinders]
+    pistons = np.array([(*size, c.coulomb_friction, c.viscous_friction) for size, c in zip(sizes, cylinders, strict=True)])
+    bristle = f.bristle_stiffness, f.bristle_damping
+    number = ("coulomb", "lugre", "elasto_plastic").index(f.law)
+    law = np.array([number, f.static_ratio, f.stribeck_speed, *bristle, f.sign_speed, f.breakaway_ratio], dtype=float)
+    heat = np.array([rig.chambers.dead_volume, rig.chambers.wall_heat_transfer, rig.chambers.piston_conductance])
+    valve = np.array([v.sonic_conductance, v.critical_ratio, v.leakage_ratio * v.sonic_conductance, v.time_constant])
+    around = air.supply_pressure, air.atmospheric_pressure, air.temperature
+    reference = air.reference_density, air.reference_temperature
+    gas = np.array([*around, air.gas_constant, air.heat_capacity_ratio, *reference])
+    return linkage, pistons, law, heat, valve, gas
+
+
+def compiled(function: F) -> F:
+    """Machine code of a function, in this module's own way."""
+    fast: Any = numba.njit(function)
+    return fast  # type: ignore[no-any-return]
+
+
+@compiled
+def orifice(conductance: float, p_up: float, t_up: float, p_down: float, b: float, rho: float, t_ref: float) -> float:
+    """ISO 6358 mass flow for p_up >= p_down, kg/s."""
+    x = p_down / p_up
+    if x < b:
+        psi = 1.0
+    elif x < 0.99:
+        psi = np.sqrt(1 - ((x - b) / (1 - b)) ** 2)
+    else:
+        psi = np.sqrt(1 - ((0.99 - b) / (1 - b)) ** 2) * (1 - x) * 100
+    flow: float = conductance * rho * p_up * np.sqrt(t_ref / t_up) * psi
+    return flow
+
+
+@compiled
+def plastic_fraction(z: float, v: float, steady: float, breakaway: float) -> float:
+    """alpha of the elasto-plastic law: where the bristle leans the way it moves, a cubic from z_ba to z_ss."""
+    if z * v <= 0 or abs(z) <= breakaway * steady:
+        return 0.0
+    if abs(z) >= steady:
+        return 1.0
+    s = (abs(z) - breakaway * steady) / (steady - breakaway * steady)
+    return 3 * s**2 - 2 * s**3
+
+
+@compiled
+def rates(
+    s: Array, command: Array, push: Array, linkage: Array, pistons: Array, law: Array, heat: Array, valve: Array, gas: Array
+) -> Array:
+    """d(state)/dt."""
+    ox, oy, d6, k1, k2, mass, gravity = linkage
+    supply, atmosphere, ambient, r, gamma, rho, t_ref = gas
+    ds = np.zeros(18)
+    x, y, vx, vy = s[0], s[1], s[2], s[3]
+
+    # The linkage as points: beam direction e, its left normal n, attachment A, rod direction u.
+    r2 = np.sqrt(x * x + y * y)
+    ex, ey = x / r2, y / r2
+    nx, ny = -ey, ex
+    ax, ay = d6 * ex, d6 * ey
+    r4 = np.sqrt((ax - ox) ** 2 + (ay - oy) ** 2)
+    ux, uy = (ax - ox) / r4, (ay - oy) / r4
+    turning = (vx * nx + vy * ny) / r2
+    speed = (turning * d6 * (nx * ux + ny * uy), vx * ex + vy * ey)
+    extension = (r4 - k1, r2 - k2)
+
+    along = np.zeros(2)
+    for c in range(2):
+        bore, rod, stroke, fc, fv = pistons[c]
+        full, ring = np.pi / 4 * bore**2, np.pi / 4 * (bore**2 - rod**2)
+        v, pressure, temperature = speed[c], np.zeros(2), np.zeros(2)
+        volume, rate, wall = np.zeros(2), np.zeros(2), np.zeros(2)
+        for side in range(2):
+            m, energy = s[4 + 2 * c + side], s[8 + 2 * c + side]
+            area, sign = (full, 1.0) if side == 0 else (ring, -1.0)
+            column = stroke / 2 + sign * extension[c]
+            volume[side], rate[side], wall[side] = heat[0] + area * column, area * sign * v, 2 * area + np.pi * bore * column
+            temperature[side] = energy / (m * r / (gamma - 1))
+            pressure[side] = m * r * temperature[side] / volume[side]
+        for side in range(2):
+            p, t, k = pressure[side], temperature[side], 2 * c + side
+            spool = s[14 + k]
+            opened_in, opened_out = valve[2] + valve[0] * max(spool, 0.0), valve[2] + valve[0] * max(-spool, 0.0)
+            mass_rate, enthalpy_rate, cp = 0.0, 0.0, gamma * r / (gamma - 1)
+            for source, opened in ((supply, opened_in), (atmosphere, opened_out)):
+                if source > p:
+                    q = orifice(opened, source, ambient, p, valve[1], rho, t_ref)
+                    mass_rate, enthalpy_rate = mass_rate + q, enthalpy_rate + q * cp * ambient
+                else:
+                    q = orifice(opened, p, t, source, valve[1], rho, t_ref)
+                    mass_rate, enthalpy_rate = mass_rate - q, enthalpy_rate - q * cp * t
+            warming = heat[1] * wall[side] * (ambient - t) + heat[2] * (temperature[1 - side] - t)
+            ds[4 + k] = mass_rate
+            ds[8 + k] = enthalpy_rate - p * rate[side] + warming
+            ds[14 + k] = (command[k] - spool) / valve[3]
+
+        if law[0] > 0:
+            level = fc + (law[1] * fc - fc) / (1 + (v / law[2]) ** 2)
+            alpha = 1.0 if law[0] == 1 else plastic_fraction(s[12 + c], v, level / law[3], law[6])
+            sliding = v - alpha * law[3] * abs(v) / level * s[12 + c]
+            ds[12 + c] = sliding
+            rubbing = law[3] * s[12 + c] + law[4] * sliding + fv * v
+        else:
+            rubbing = fv * v + fc * (v / law[5] if abs(v) < law[5] else np.sign(v))
+        along[c] = pressure[0] * full - pressure[1] * ring - atmosphere * (full - ring) - rubbing
+
+    # Rod 1 turns the massless beam; the torque about O1 reaches the end effector as a force across the beam.
+    across = along[0] * (ax * uy - ay * ux) / r2
+    ds[0], ds[1] = vx, vy
+    ds[2] = (along[1] * ex + across * nx + push[0]) / mass
+    ds[3] = (along[1] * ey + across * ny + push[1]) / mass - gravity
+    return ds
+
+
+class SecondModel:
+    """A rig in these coordinates, with translations from and to what the plant shows."""
+
+    def __init__(self, rig: Parameters, observed: Array, state: Array) -> None:
+        """``observed`` is the plant's end effector (4,), ``state`` its state (18,), for the same instant."""
+        self.constants = constants(rig)
+        self._rig = rig
+        pressure, temperature = state[[6, 8, 10, 12]], state[[7, 9, 11, 13]]
+        mass = pressure * self._volumes(observed) / (rig.air.gas_constant * temperature)
+        energy = mass * temperature * rig.air.gas_constant / (rig.air.heat_capacity_ratio - 1)
+        self.state: Array = np.concatenate([observed, mass, energy, state[4:6], state[14:18]])
+
+    def _volumes(self, s: Array) -> Array:
+        g, half = self._rig.geometry, np.array([self._rig.cylinder1.stroke, self._rig.cylinder2.stroke]) / 2
+        point, pivot = complex(s[0], s[1]), g.d3 * np.exp(1j * g.gamma3)
+        y = np.array([abs(g.d6 * point / abs(point) - pivot) - g.k1, abs(point) - g.k2])
+        bore, rod = self.constants[1][:, 0], self.constants[1][:, 1]
+        columns = np.stack([np.pi / 4 * bore**2 * (half + y), np.pi / 4 * (bore**2 - rod**2) * (half - y)], axis=1)
+        return self._rig.chambers.dead_volume + columns.ravel()
+
+    @property
+    def pressures(self) -> Array:
+        """Pressures of chambers P1, N1, P2, N2: (gamma - 1) U / V."""
+        return (self._rig.air.heat_capacity_ratio - 1) * self.state[8:12] / self._volumes(self.state)
+
+    def advance(
+        self, command: Array, push: Array, seconds: float, method: str = "DOP853", rtol: float = 1e-11, atol: float = 1e-14
+    ) -> int:
+        """Integrate with constant opening commands (4,) and user force (2,); returns the evaluations of the equations.
+
+        ``method`` is one of ``solve_ivp``. By default it has order 8 and chooses its own steps. Tolerances are those of the
+        scaled state (``SCALES``).
+        """
+        evaluations = 0
+
+        def scaled(_: float, s: Array) -> Array:
+            nonlocal evaluations
+            evaluations += 1
+            result: Array = rates(s * SCALES, command, push, *self.constants) / SCALES
+            return result
+
+        solution = solve_ivp(scaled, (0, seconds), self.state / SCALES, method=method, rtol=rtol, atol=atol)
+        if not solution.success:
+            raise RuntimeError(f"the second model could not be integrated: {solution.message}")
+        self.state = solution.y[:, -1] * SCALES
+        return evaluations

@@ -1,0 +1,1 @@
+"""What an episode's seed decides: rigs, starts, noise."""

@@ -1,0 +1,133 @@
+"""Domain randomisation of the rig: uniform draws from the ranges that the parameter fields document."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from birthsim_env.parts.drawn.streams import Streams
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.physics.compiled.lanes import Array, parameter_columns
+from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
+from birthsim_env.physics.rig.values import is_finite, shown
+
+Ranges = Mapping[str, tuple[float, float]]
+
+SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
+"""Sections and fields in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal rig,
+and sensors too where their model does not draw them (``sensors.drawn_by``)."""
+
+
+_DRAWN_BY_SOME = tuple(name for sensors in SENSORS for name in drawn_by(sensors))
+
+WORST_AT_LEAST = ("mechanics.mass", "friction.sign_speed", "chambers.dead_volume", "air.supply_pressure")
+"""Fields whose least values are the hardest on a rig; of all others, the largest are."""
+
+BORES = ("cylinder1.piston_diameter", "cylinder2.piston_diameter")
+"""Wide ones ask for dead volume, narrow ones for thin rods."""
+
+KNOWN = 0.2
+"""Share of a figure by which it may be off where a rig's owner has described it; assumed."""
+
+
+def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+    """Dotted field name -> (low, high), SI units: what domain randomisation of a rig with a sensor model draws from.
+
+    A figure of the default rig is assumed, and has the range that its field documents (design section 4); one that the owner
+    has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count.
+    """
+    ranges = {}
+    for section in dataclasses.fields(Parameters):
+        for field in dataclasses.fields(section.default) if section.name != "ranges" else ():  # type: ignore[arg-type]
+            if field.metadata["randomized"]:
+                value = getattr(getattr(nominal, section.name), field.name)
+                low, high = field.metadata["randomized"]
+                if value != getattr(section.default, field.name):
+                    low, high = (
+                        max((1 - KNOWN) * value, field.metadata["least"]),
+                        min((1 + KNOWN) * value, field.metadata["most"]),
+                    )
+                ranges[f"{section.name}.{field.name}"] = (low, high)
+    volume = "chambers.dead_volume"
+    ranges[volume] = (max(ranges[volume][0], least_dead_volume(nominal)), ranges[volume][1])
+    ranges.update({name: (low, high) for name, low, high in nominal.ranges})
+    left_out = set(_DRAWN_BY_SOME) - set(drawn_by(sensors))
+    return {name: pair for name, pair in ranges.items() if name not in left_out}
+
+
+def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> str:
+    """What the environments' argument ``randomize`` draws of the rig, in words: ``rigs drawn: mass 2 to 5 kg, ...``."""
+    if not isinstance(randomize, Mapping):
+        randomize = documented_ranges(nominal, sensors) if randomize in (True, "plant") else {}
+    named = []
+    for name, (low, high) in randomize.items():
+        section, _, own = name.partition(".")
+        words = f"{own} of {section}" if section.startswith("cylinder") else own
+        named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {field_of(name).metadata['unit']}")
+    return f"rigs drawn: {', '.join(named)}" if named else "the rig as described"
+
+
+def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+    """``ranges`` if each names a numeric field that lanes may differ in, with a finite (low, high) possible for ``nominal``
+    under a sensor model.
+
+    Else ``ValueError`` naming the entry.
+    """
+    checked = {}
+    for name, bounds in ranges.items():
+        if not isinstance(name, str):
+            raise ValueError(f"randomize[{shown(name)}]; allowed: dotted names of parameters such as 'mechanics.mass'")
+        if field_of(name).metadata["choices"]:
+            raise ValueError(f"randomize[{shown(name)}]: allowed: numeric parameters, {name} is a choice")
+        if name not in drawn_by(sensors) and (name.partition(".")[0] in SHARED or name in SHARED):
+            more = f"; with other sensors {name}" if name in _DRAWN_BY_SOME else ""
+            raise ValueError(
+                f"randomize[{shown(name)}]: allowed: all but {', '.join(SHARED)}, which are the same in all lanes{more}"
+            )
+        pair = tuple(bounds) if isinstance(bounds, (tuple, list, np.ndarray)) and np.shape(bounds) == (2,) else (math.nan,) * 2
+        if not (is_finite(pair[0]) and is_finite(pair[1]) and pair[0] <= pair[1]):
+            raise ValueError(f"randomize[{shown(name)}] = {shown(bounds)}; allowed: (low, high), finite and ordered")
+        low, high = float(pair[0]), float(pair[1])
+        checked[name] = (low, high)
+        nominal.replace({name: low})
+        nominal.replace({name: high})
+    # Whatever is checked of several fields together grows or falls with each: two rigs are the worst of all that can be drawn.
+    for thinnest in (False, True):
+        least = (*WORST_AT_LEAST, *BORES) if thinnest else WORST_AT_LEAST
+        worst = {name: low if name in least else high for name, (low, high) in checked.items()}
+        try:
+            nominal.replace(worst)
+        except ValueError as error:
+            raise ValueError(f"randomize: some of the rigs drawn are impossible: {error}") from None
+    return checked
+
+
+def draw_parameters(nominal: Parameters, ranges: Ranges, rng: np.random.Generator) -> Parameters:
+    """``nominal`` with every field in ``ranges`` drawn uniformly, independently, in the order of the names."""
+    return nominal.replace(_drawn(ranges, rng))
+
+
+def draw_columns(nominal: Parameters, ranges: Ranges, streams: Streams, num_lanes: int) -> Array:
+    """``parameter_column`` of what ``draw_parameters`` gives each lane, (PARAMETERS, num_lanes); ``ranges`` are checked."""
+    drawn = _drawn(ranges, streams)
+    rig = copy.copy(nominal)
+    for name, values in drawn.items():
+        section, _, own = name.partition(".")
+        if getattr(rig, section) is getattr(nominal, section):
+            object.__setattr__(rig, section, copy.copy(getattr(rig, section)))
+        # Past the checks of one rig: ``checked_ranges`` has refused what they could refuse.
+        object.__setattr__(getattr(rig, section), own, values)
+    if "chambers.dead_volume" not in drawn:
+        bore, before = (np.maximum(one.cylinder1.area_p, one.cylinder2.area_p) for one in (rig, nominal))
+        object.__setattr__(rig, "chambers", copy.copy(rig.chambers))
+        object.__setattr__(rig.chambers, "dead_volume", bore / before * nominal.chambers.dead_volume)
+    return parameter_columns(rig, num_lanes)
+
+
+def _drawn(ranges: Ranges, rng: Any) -> dict[str, Any]:
+    return {name: rng.uniform(*ranges[name]) for name in sorted(ranges)}

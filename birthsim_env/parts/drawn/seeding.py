@@ -1,0 +1,81 @@
+"""Random streams: every random part of a lane has a child seed of its own, so two controllers meet the same world.
+
+Episode ``e`` of a lane seeded ``s`` depends on s and e alone, never on what happened in earlier episodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from birthsim_env.physics.rig.values import checked_range, shown
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+STREAMS = ("parameters", "reference", "user_force", "stiffness", "sensors")
+
+
+def stream(lane_seed: int, episode: int, name: str) -> np.random.Generator:
+    """Generator of one random part (one of ``STREAMS``) for one episode of one lane."""
+    return np.random.default_rng(np.random.SeedSequence(lane_seed, spawn_key=(episode, STREAMS.index(name))))
+
+
+def lane_seeds(seed: int | list[int | None] | None, num_envs: int, generator: np.random.Generator) -> list[int]:
+    """One seed per lane: ``seed + i`` for an integer, the given ones for a list; missing ones come from ``generator``."""
+    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
+        if seed < 0:
+            raise ValueError(f"seed = {shown(seed)}; allowed: None or a whole number >= 0")
+        return [int(seed) + i for i in range(num_envs)]
+    if seed is not None and (isinstance(seed, str) or not isinstance(seed, (Sequence, np.ndarray))):
+        raise ValueError(f"seed = {shown(seed)}; allowed: None, an integer, or one entry for each of {num_envs} lanes")
+    given: list[int | None] = [None] * num_envs if seed is None else list(seed)
+    if len(given) != num_envs:
+        raise ValueError(f"seed has {len(given)} entries; allowed: None, an integer, or one entry for each of {num_envs} lanes")
+    for lane, s in enumerate(given):
+        if not (s is None or (isinstance(s, (int, np.integer)) and not isinstance(s, bool) and s >= 0)):
+            raise ValueError(f"seed[{lane}] = {shown(s)}; allowed: None or an integer >= 0")
+    return [int(generator.integers(2**63)) if s is None else int(s) for s in given]
+
+
+Range = float | tuple[float, float]
+"""A fixed number, or (low, high): drawn uniformly at the start of every episode."""
+
+
+def draw(value: Range, rng: np.random.Generator) -> float:
+    """The number itself, or one drawn from its range."""
+    if isinstance(value, tuple):
+        low, high = checked_range("range", value, "SI")
+        return rng.uniform(float(low), float(high))
+    return float(value)
+
+
+def vectorised(method: F) -> F:
+    """Marks a method ``begin(lane, rng)``, ``knots(rng)`` or ``sample(time)`` of a part that serves many lanes in one call.
+
+    It is typed as for one lane. ``begin`` and ``knots`` then also get lanes (L,) and their ``Streams``, so that what they draw
+    is (L,). A part whose ``sample`` is marked has ``some(lanes)``. A user's own method is not marked, also where it takes the
+    place of a marked one: it is called lane by lane, with NumPy's generator.
+    """
+    method.vectorised = True  # type: ignore[attr-defined]
+    return method
+
+
+def is_vectorised(method: Callable[..., Any]) -> bool:
+    """Whether ``method`` of a part is marked by ``vectorised``."""
+    return getattr(method, "vectorised", False)
+
+
+def served(method: Callable[..., Any], lane: Any, rng: Any) -> Iterator[tuple[Any, Any]]:
+    """The lanes and streams with which ``method`` is to be called: one lane as it is, several at once or one by one."""
+    if np.ndim(lane) == 0 or is_vectorised(method):
+        yield lane, rng
+    else:
+        yield from zip(lane.tolist(), rng.generators(), strict=True)
+
+
+def put(rows: Iterable[Any], lane: Any, values: Iterable[Any]) -> None:
+    """Writes a number, or one per lane, into each of ``rows`` (R, N): into one lane or lanes (L,)."""
+    for row, value in zip(rows, values, strict=True):
+        row[lane] = value

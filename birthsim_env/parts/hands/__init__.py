@@ -1,0 +1,1 @@
+"""Hands: the forces on the end effector."""

@@ -1,0 +1,347 @@
+"""Forces of the user's hand at the end effector, evaluated for all lanes at once.
+
+A user's own force derives from ``UserForce`` and implements ``force``. The built-in ones are piecewise linear in time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.loop.rows import FORCE, SEEN, TIME
+from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
+from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
+from birthsim_env.parts.references import LONGEST, TURNED
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.plant import checked
+from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
+
+STRONGEST = 1000.0
+"""N: five times what clinicians pull; more breaks end stops within a policy step."""
+
+MOST = 100
+"""Pushes, pulls or contractions of an episode."""
+
+
+class UserForce:
+    """The hand (or the uterus) that pushes the end effector.
+
+    ``prepare(num_envs)`` is called once, ``begin(lane, rng)`` at the start of every episode of a lane with that lane's own
+    random stream; both may stay as they are. ``force(time, position, velocity)`` gets K instants of every lane, s, (K, N),
+    and the end effector's position and velocity at the first of them, (2, N), m and m/s; it returns (K, 2, N), N. Each
+    sample is held for one control period. A force that depends on position or velocity sets ``closed_loop = True`` and
+    is then asked at every control period (K = 1), and again at the same instant where another lane starts anew; it may
+    return one force per lane, (2, N).
+    A component that changes faster than ``jump_rate``, N/s, jumps: no tracking can follow, and ``info["since_jump"]`` starts
+    anew.
+    """
+
+    closed_loop = False
+    jump_rate = 150.0
+
+    def prepare(self, num_envs: int) -> None:
+        """Make room for ``num_envs`` lanes."""
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        """Force on the end effector, N, (K, 2, N)."""
+        raise NotImplementedError(f"{type(self).__name__}.force(time, position, velocity) is missing; it returns N, (K, 2, N)")
+
+
+def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) -> Array:
+    """What a hand pushes with, N, (K, 2, N), at ``time`` (K, N), s; ``position`` and ``velocity`` (2, N) in m and m/s.
+
+    A hand may return one force per lane, (2, N), for one instant. Raises ``ValueError`` for anything but finite numbers.
+    """
+    force = hand.force(time, position, velocity)
+    instants, lanes = time.shape
+    if instants == 1 and np.shape(force) == (2, lanes):
+        force = np.asarray(force)[None]
+    return checked("user_force.force(...)", force, (instants, 2, lanes), "N")
+
+
+@kernel
+def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> None:
+    """``knots`` (M, 3, N): time, Fx, Fy; the first ``counts`` (N,) of them count; constant before and after."""
+    for i in range(time.shape[1]):
+        last = int(counts[i]) - 1
+        for k in range(time.shape[0]):
+            t = time[k, i]
+            low, high = 0, last
+            while high - low > 1:
+                middle = (low + high) // 2
+                if knots[middle, 0, i] <= t:
+                    low = middle
+                else:
+                    high = middle
+            span = knots[high, 0, i] - knots[low, 0, i]
+            part = max(0.0, min(1.0, (t - knots[low, 0, i]) / span)) if span > 0.0 else 1.0
+            forces[k, 0, i] = knots[low, 1, i] + part * (knots[high, 1, i] - knots[low, 1, i])
+            forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
+
+
+@helper
+def force_block(world: int, n: int) -> Array:
+    """The hand's force in a block of the world, one instant: (1, 2, n)."""
+    return carray(pointer(world + FORCE * BLOCK * 8, np.float64), (1, 2, BLOCK))[:, :, :n]
+
+
+@kernel
+def _knots_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
+    _interpolate(s[TIME : TIME + 1, :n], knots, counts, force_block(world, n))
+    return 0
+
+
+def _checked_knots(name: str, knots: Any, lanes: int = 1) -> Array:
+    """Knots as an array (M, 3, L), or a ``ValueError`` that names them, of the first lane that is wrong.
+
+    They are a sequence of (time, Fx, Fy), whose entries are numbers or (L,).
+    """
+    try:
+        columns = np.empty((len(knots), 3, lanes))
+        for rows, knot in zip(columns, knots, strict=True):
+            put(rows, slice(None), knot)
+    except (TypeError, ValueError, OverflowError):
+        columns = np.empty((0, 3, lanes))
+    late = columns[1:, 0] < columns[:-1, 0]
+    if len(columns) == 0 or late.any() or not np.isfinite(columns).all():
+        if lanes > 1:
+            wrong = late.any(axis=0) | ~np.isfinite(columns).all(axis=(0, 1))
+            knots = [tuple(knot) for knot in columns[:, :, int(wrong.argmax())].tolist()]
+        raise ValueError(f"{name} = {shown(knots)}; allowed: finite (time, Fx, Fy) with increasing times (s, N, N)")
+    return columns
+
+
+class ForceProfile(UserForce):
+    """A force that is linear between knots. Subclasses draw their knots at the start of every episode."""
+
+    def __init__(self, knots: list[tuple[float, float, float]] | None = None) -> None:
+        if not (knots is None or isinstance(knots, (list, tuple))):
+            raise ValueError(f"knots = {shown(knots)}; allowed: a list of (time, Fx, Fy)")
+        self._fixed = knots or [(0.0, 0.0, 0.0)]
+        _checked_knots("knots", self._fixed)
+
+    @vectorised
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        """(time, Fx, Fy) of one episode, s and N, with increasing times."""
+        return self._fixed
+
+    def prepare(self, num_envs: int) -> None:
+        self._knots: Array = np.zeros((1, 3, num_envs))
+        self._counts = np.ones(num_envs)
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        for one, own in served(self.knots, lane, rng):
+            lanes = np.atleast_1d(one)
+            columns = _checked_knots(f"{type(self).__name__}.knots(rng)", self.knots(own), len(lanes))
+            missing = len(columns) - len(self._knots)
+            if missing > 0:
+                self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
+            for rows, values in zip(self._knots, columns, strict=False):
+                put(rows, lanes, values)
+            self._counts[one] = len(columns)
+
+    def force(self, time: Array, position: Array, velocity: Array) -> Array:
+        forces = np.empty((time.shape[0], 2, time.shape[1]))
+        _interpolate(time, self._knots, self._counts, forces)
+        return forces
+
+    def stage(self) -> Stage:
+        """``force``, compiled into the closed loop."""
+        return Stage(_knots_stage, tables=(self._knots, self._counts))
+
+
+class AlternatingSteps(ForceProfile):
+    """The pushes of Fig. 4, repeated every ``repeat`` s: +x, -x, +y, -y of ``amplitude`` N, ``ramp`` s up and down."""
+
+    STARTS = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0), (6.9, 7.7))
+    """Assumed: start and end of the four pushes, s; every push ends well before the next."""
+
+    jump_rate = 1.0
+    """N/s: every ramp is a step, however small the push."""
+
+    def __init__(self, amplitude: Range = 30.0, ramp: float = 0.1, repeat: float = 8.0, repeats: int = 2) -> None:
+        super().__init__()
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_number("ramp", ramp, "s", least=0.0, most=0.3)
+        checked_number("repeat", repeat, "s", least=8.0, most=LONGEST)
+        checked_count("repeats", repeats, 0, MOST)
+        self.amplitude, self.ramp, self.repeat, self.repeats = amplitude, ramp, repeat, repeats
+
+    @vectorised
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        knots = [(0.0, 0.0, 0.0)]
+        directions = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+        for k in range(self.repeats):
+            for (start, end), (dx, dy) in zip(self.STARTS, directions, strict=True):
+                size = draw(self.amplitude, rng)
+                begin, stop = k * self.repeat + start, k * self.repeat + end
+                knots += [(begin, 0.0, 0.0), (begin + self.ramp, size * dx, size * dy)]
+                knots += [(stop, size * dx, size * dy), (stop + self.ramp, 0.0, 0.0)]
+        return knots
+
+
+class Ramp(ForceProfile):
+    """The stiffness test: from ``begins`` ramp to ``amplitude`` N over ``rise`` s along ``angle`` (rad from x), then hold.
+
+    ``angle`` "axes" draws one of the four axis directions.
+    """
+
+    def __init__(self, amplitude: Range = 20.0, angle: Range | str = 0.0, begins: float = 1.0, rise: float = 1.0) -> None:
+        super().__init__()
+        if isinstance(angle, str) and angle != "axes":
+            raise ValueError(f"angle = {shown(angle)}; allowed: a number or (low, high) in rad, or 'axes'")
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_range("angle", 0.0 if isinstance(angle, str) else angle, "rad", least=-TURNED, most=TURNED)
+        checked_number("begins", begins, "s", least=0.0, most=LONGEST)
+        checked_number("rise", rise, "s", least=0.0, most=LONGEST)
+        self.amplitude, self.angle, self.begins, self.rise = amplitude, angle, begins, rise
+
+    @vectorised
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        size = draw(self.amplitude, rng)
+        x, y = exact.direction(rng.integers(4) * math.pi / 2 if isinstance(self.angle, str) else draw(self.angle, rng))
+        return [(0.0, 0.0, 0.0), (self.begins, 0.0, 0.0), (self.begins + self.rise, size * x, size * y)]
+
+
+class Pulls(ForceProfile):
+    """Tractions one after the other: ramp at ``rate`` N/s, hold, release, pause.
+
+    ``sizes`` N, one per pull; ``angle`` rad from x; ``hold``, ``release``, ``pause`` and ``begins`` in s.
+    """
+
+    def __init__(
+        self,
+        sizes: tuple[Range, ...],
+        rate: Range,
+        angle: Range = 0.0,
+        begins: float = 1.0,
+        hold: float = 2.0,
+        release: float = 0.3,
+        pause: float = 1.2,
+    ) -> None:
+        super().__init__()
+        if not isinstance(sizes, (tuple, list)) or len(sizes) > MOST:
+            raise ValueError(f"sizes = {shown(sizes)}; allowed: a tuple of at most {MOST} pulls (N)")
+        for size in sizes:
+            checked_range("sizes", size, "N", least=0.0, most=STRONGEST)
+        checked_range("rate", rate, "N/s", least=1.0, most=1e6)
+        checked_range("angle", angle, "rad", least=-TURNED, most=TURNED)
+        for name, value in (("begins", begins), ("hold", hold), ("release", release), ("pause", pause)):
+            checked_number(name, value, "s", least=0.0, most=LONGEST)
+        self.sizes, self.rate, self.angle = sizes, rate, angle
+        self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
+
+    @vectorised
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        knots = [(0.0, 0.0, 0.0)]
+        now = self.begins
+        for sizes in self.sizes:
+            size, rate = draw(sizes, rng), draw(self.rate, rng)
+            along, across = exact.direction(draw(self.angle, rng))
+            x, y, top = size * along, size * across, now + size / rate
+            knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
+            now = top + self.hold + self.release + self.pause
+        return knots
+
+
+@kernel
+def _contraction(
+    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
+    knots: Array,
+) -> None:  # fmt: skip
+    """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
+
+    It carries 1 - ``fraction``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
+    a unit vector.
+    """
+    least = bumps.min()
+    pushes = np.empty(bumps.max() - least + 1)
+    for k in range(time.shape[0]):
+        middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
+        contraction = exact.sine(math.pi * time[k] / lasts)
+        for more in range(pushes.shape[0]):
+            pushes[more] = exact.sine(math.pi * (least + more) * middle)
+        for i in range(lanes.shape[0]):
+            push = pushes[bumps[i] - least]
+            force = size[i] * ((1.0 - fraction[i]) * contraction * contraction + fraction[i] * push * push)
+            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
+
+
+class Contractions(ForceProfile):
+    """Uterine contractions: sin^2 of ``lasts`` s and ``amplitude`` N, with maternal pushes on top, along ``heading``.
+
+    Each contraction carries ``pushes`` sin^2 bumps of ``push`` times its amplitude over its middle half (assumed).
+    """
+
+    GRID = 0.05
+    """s between knots: below 0.2 % of the amplitude in error."""
+
+    def __init__(
+        self,
+        amplitude: Range = 80.0,
+        count: int = 2,
+        lasts: float = 12.0,
+        pushes: tuple[int, int] = (4, 5),
+        push: Range = 0.25,
+        heading: float = 0.0,
+    ) -> None:
+        super().__init__()
+        self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
+        self.heading = heading
+        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
+        checked_count("count", count, 1, MOST)
+        checked_number("lasts", lasts, "s", least=2 * self.GRID, most=3600.0)
+        if not (isinstance(pushes, tuple) and len(pushes) == 2):
+            raise ValueError(f"pushes = {shown(pushes)}; allowed: the least and the most pushes of a contraction")
+        checked_count("pushes, the most", pushes[1], checked_count("pushes, the least", pushes[0], 0, MOST), MOST)
+        checked_range("push", push, "1", least=0.0, most=1.0)
+        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
+
+    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+        table = self._table(1)
+        self._contract(table, np.zeros(1, dtype=np.int64), rng)
+        return [tuple(knot) for knot in table[:, :, 0].tolist()]
+
+    def prepare(self, num_envs: int) -> None:
+        self._knots = self._table(num_envs)
+        self._counts = np.full(num_envs, float(len(self._knots)))
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        if type(self).knots is Contractions.knots:
+            self._contract(self._knots, np.atleast_1d(lane), rng)
+        else:
+            super().begin(lane, rng)
+
+    @property
+    def _time(self) -> Array:
+        """Since a contraction began, s, (M,)."""
+        return np.arange(0.0, self.lasts, self.GRID)
+
+    def _table(self, lanes: int) -> Array:
+        """Knots (M, 3, N) without forces; their times are the same in all lanes and episodes."""
+        times = [begins + self._time for begins in self.lasts * np.arange(self.count)]
+        table = np.zeros((self.count * len(self._time) + 1, 3, lanes))
+        table[:, 0] = np.concatenate([*times, [self.count * self.lasts]])[:, None]
+        return table
+
+    def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
+        """Draw the forces of the lanes (L,) of a table of knots."""
+        time, along = self._time, np.array(exact.direction(self.heading))
+        for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
+            size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
+            bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
+            drawn = (np.full(len(lanes), number) for number in (size, fraction, bumps))
+            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]

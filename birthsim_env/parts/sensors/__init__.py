@@ -1,0 +1,1 @@
+"""What a controller is shown of the rig."""

@@ -1,0 +1,174 @@
+"""Sensor models: ``ideal`` sees everything at every control period, ``lab`` is a magnetic tracker and pressure cells with
+noise and latency, ``honest`` has the errors of a force sensor, a tracker, pressure cells and a control board besides.
+
+A sensor model's ``measure`` is called at every control instant at which somebody looks: at each one where ``sampled`` is
+True, at policy instants otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.loop.rows import (
+    FORCE,
+    MOTION,
+    POSITION,
+    POSITION_TIME,
+    PRESSURE,
+    SEEN,
+    STATE,
+    TICK,
+    TIME,
+    USER_FORCE,
+    VELOCITY,
+    WORLD,
+)
+from birthsim_env.loop.signals import Measurement
+from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
+from birthsim_env.parts.drawn.seeding import vectorised
+from birthsim_env.parts.sensors import tracker
+from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.noise import normal
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.electronics import Electronics
+
+
+@kernel
+def ideal_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Shows position, velocity, pressures and the hand's force as they are."""
+    w, s = block(world, WORLD), block(seen, SEEN)
+    for i in range(n):
+        s[POSITION_TIME, i] = s[TIME, i]
+        for axis in range(2):
+            s[POSITION + axis, i], s[VELOCITY + axis, i] = w[MOTION + axis, i], w[MOTION + 2 + axis, i]
+            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+        for chamber in range(4):
+            s[PRESSURE + chamber, i] = w[STATE + PRESSURES[chamber], i]
+    return 0
+
+
+class IdealSensors:
+    """Position, velocity, pressures and the user's force, exact and at once."""
+
+    sampled = False
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        pass
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
+        return Measurement(time, motion[:2], time, motion[2:], pressures, force, sampled=False)
+
+    def stage(self) -> Stage:
+        """``measure``, compiled into the closed loop."""
+        return Stage(ideal_stage)
+
+
+@kernel
+def _lab(
+    ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
+    rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
+    seen: Array,
+) -> None:  # fmt: skip
+    """One control instant; ``queue``, ``shown`` and ``velocity`` as in ``parts.tracker``, ``seen`` (4, N): noisy pressures."""
+    for i in range(time.shape[0]):
+        tick, key = int(ticks[i]), keys[i]
+        if tracker.sample_due(tick, time[i], period, rate):
+            x = motion[0, i] + position_noise * normal(key, tick, 4)
+            y = motion[1, i] + position_noise * normal(key, tick, 5)
+            tracker.take(queue, i, time[i], rate, x, y)
+            if tick == 0:
+                tracker.start(queue, shown, velocity, i, x, y, motion[2, i], motion[3, i])
+        tracker.arrive(queue, shown, velocity, i, time[i], latency)
+        for chamber in range(4):
+            seen[chamber, i] = pressures[chamber, i] + pressure_noise * normal(key, tick, chamber)
+
+
+@kernel
+def _lab_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 5)
+    keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
+    queue, shown, velocity = table3(tables, 1)[:, :, mine], table2(tables, 2)[:, mine], table2(tables, 3)[:, mine]
+    pressures = scratch(4)
+    for chamber in range(4):
+        for i in range(n):
+            pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]
+    _lab(
+        w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, keys, about[0], about[1], about[2], about[3], about[4],
+        queue, shown, velocity, s[PRESSURE : PRESSURE + 4, :n],
+    )  # fmt: skip
+    for i in range(n):
+        s[POSITION_TIME, i] = shown[2, i]
+        for axis in range(2):
+            s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], velocity[axis, i]
+            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+    return 0
+
+
+class LabSensors:
+    """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period.
+
+    No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal
+    force sensor.
+    """
+
+    sampled = True
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None:
+        board = electronics
+        # A tracker faster than the control board is read once a period; the queue's slots count samples, one a period at most.
+        rate = min(board.position_rate, 1 / board.control_period)
+        self._numbers = (
+            board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
+        )  # fmt: skip
+        self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), 3, num_envs))
+        self._shown: Array = np.zeros((3, num_envs))
+        self._keys = np.zeros(num_envs, dtype=np.uint64)
+        self._velocity: Array = np.zeros((2, num_envs))
+
+    @vectorised
+    def begin(self, lane: int, rng: np.random.Generator) -> None:
+        """Start a new episode in one lane."""
+        self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
+        """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
+        seen = np.empty_like(pressures)
+        _lab(ticks, time, motion, pressures, self._keys, *self._numbers, self._queue, self._shown, self._velocity, seen)
+        shown = self._shown.copy()
+        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen, force, sampled=True)
+
+    def stage(self) -> Stage:
+        """``measure``, compiled into the closed loop."""
+        keys = self._keys.view(np.float64)
+        return Stage(_lab_stage, np.array(self._numbers), tables=(keys, self._queue, self._shown, self._velocity))
+
+
+class SensorModel(Protocol):
+    """What measures; ``sampled`` is True where it must look at every control instant."""
+
+    sampled: bool
+
+    def __init__(self, electronics: Electronics, num_envs: int) -> None: ...
+
+    def begin(self, lane: int, rng: np.random.Generator) -> None: ...
+
+    def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement: ...
+
+
+SENSORS: dict[str, type[SensorModel]] = {"ideal": IdealSensors, "lab": LabSensors, "honest": HonestSensors}
+"""A model that has ``drawn``, names of parameters, and ``vary(ranges)`` draws these for every episode where rigs are drawn;
+one that has ``board_stage()`` stands between a controller's openings and the valves too."""
+
+
+def drawn_by(sensors: str) -> tuple[str, ...]:
+    """Dotted names of the parameters that the sensor model ``sensors`` can draw for every episode."""
+    return getattr(SENSORS[sensors], "drawn", ())

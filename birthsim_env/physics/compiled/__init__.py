@@ -1,0 +1,1 @@
+"""How equations are compiled, over lanes, to the same bits everywhere."""

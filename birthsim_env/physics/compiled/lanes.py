@@ -1,0 +1,164 @@
+"""Row numbers of the arrays that kernels share: the state (18, N) and the parameters of every lane.
+
+A lane is one environment. Arrays are laid out quantity by quantity, (rows, N), so that a kernel's innermost loop walks
+over lanes with unit stride.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.physics import valves
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.rig.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+STATE_NAMES = (
+    *("y1", "v1", "y2", "v2", "z1", "z2"),
+    *("Pp1", "Tp1", "Pn1", "Tn1", "Pp2", "Tp2", "Pn2", "Tn2"),
+    *("s1P", "s1N", "s2P", "s2N"),
+)
+"""Rows of the state: piston positions (m) and speeds (m/s), bristle deflections (m), chamber pressures (Pa) and
+temperatures (K), spool openings (-)."""
+
+STATES = len(STATE_NAMES)
+Y1, V1, Y2, V2, Z1, Z2, PP1, TP1, PN1, TN1, PP2, TP2, PN2, TN2, S1P, S1N, S2P, S2N = range(STATES)
+PRESSURES = (PP1, PN1, PP2, PN2)
+TEMPERATURES = (TP1, TN1, TP2, TN2)
+SPOOLS = (S1P, S1N, S2P, S2N)
+
+PARAMETER_NAMES = (
+    *("d_squares", "d_product", "sin_gamma3", "cos_gamma3", "k1", "k2", "half_l1", "half_l2"),
+    *("mass", "gravity", "stop_stiffness", "stop_damping"),
+    *("lugre", "fc1", "fc2", "fs1", "fs2", "fv1", "fv2", "stribeck", "s0", "s1", "sign_speed"),
+    *("elasto_plastic", "breakaway", "steepness"),
+    *("area_p1", "area_n1", "area_p2", "area_n2", "perimeter1", "perimeter2", "dead_volume", "h_wall", "g12"),
+    *("conductance", "critical", "leakage", "tau", "supply", "atmosphere", "temperature"),
+    *("gas", "gamma", "index", "rho0", "t0"),
+    *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
+    *("deadband", "play", "opening_limit"),
+)
+PARAMETERS = len(PARAMETER_NAMES)
+(
+    D_SQUARES,
+    D_PRODUCT,
+    SIN_GAMMA3,
+    COS_GAMMA3,
+    K1,
+    K2,
+    HALF_L1,
+    HALF_L2,
+    MASS,
+    GRAVITY,
+    STOP_STIFFNESS,
+    STOP_DAMPING,
+    LUGRE,
+    FC1,
+    FC2,
+    FS1,
+    FS2,
+    FV1,
+    FV2,
+    STRIBECK,
+    BRISTLE_S0,
+    BRISTLE_S1,
+    SIGN_SPEED,
+    ELASTO_PLASTIC,
+    BREAKAWAY,
+    STEEPNESS,
+    AREA_P1,
+    AREA_N1,
+    AREA_P2,
+    AREA_N2,
+    PERIMETER1,
+    PERIMETER2,
+    DEAD_VOLUME,
+    H_WALL,
+    G12,
+    CONDUCTANCE,
+    CRITICAL,
+    LEAKAGE,
+    TAU,
+    SUPPLY,
+    ATMOSPHERE,
+    TEMPERATURE,
+    GAS,
+    GAMMA,
+    INDEX,
+    RHO0,
+    T0,
+    KNEE,
+    LAMINAR,
+    COLDNESS,
+    INVERSE_SUPPLY,
+    INVERSE_ATMOSPHERE,
+    SPOOL_RATE,
+    SIGN_SLOPE,
+    INVERSE_MASS,
+    DEADBAND,
+    PLAY,
+    OPENING_LIMIT,
+) = range(PARAMETERS)
+
+
+def parameter_column(parameters: Parameters) -> Array:
+    """One lane's column of the parameter array: (PARAMETERS,), SI units.
+
+    ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` and ``elasto_plastic`` are 1 for the friction law of that
+    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). Rows from ``knee`` to
+    ``inverse_mass`` spare divisions: ``knee`` is
+    1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
+    equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed.
+    """
+    return np.array(_rows(parameters), dtype=np.float64)
+
+
+def parameter_columns(parameters: Parameters, num_lanes: int) -> Array:
+    """``parameter_column`` of lanes (PARAMETERS, num_lanes); fields of ``parameters`` but geometry may be (num_lanes,)."""
+    columns = np.empty((PARAMETERS, num_lanes))
+    for row, value in zip(columns, _rows(parameters), strict=True):
+        row[:] = value
+    return columns
+
+
+def _rows(parameters: Parameters) -> tuple[Any, ...]:
+    g, c1, c2, m = parameters.geometry, parameters.cylinder1, parameters.cylinder2, parameters.mechanics
+    f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
+    fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction
+    conductance = v.sonic_conductance
+    return (
+        *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.number("sine", g.gamma3), exact.number("cosine", g.gamma3)),
+        *(g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
+        *(m.mass, m.gravity, m.stop_stiffness, m.stop_damping),
+        *(float(f.law == "lugre"), fc1, fc2, f.static_ratio * fc1, f.static_ratio * fc2),
+        *(c1.viscous_friction, c2.viscous_friction, f.stribeck_speed, f.bristle_stiffness, f.bristle_damping, f.sign_speed),
+        *(float(f.law == "elasto_plastic"), f.breakaway_ratio, 1 / (1 - f.breakaway_ratio)),
+        *(c1.area_p, c1.area_n, c2.area_p, c2.area_n, np.pi * c1.piston_diameter, np.pi * c2.piston_diameter),
+        *(ch.dead_volume, ch.wall_heat_transfer, ch.piston_conductance),
+        *(conductance, v.critical_ratio, v.leakage_ratio * conductance, v.time_constant),
+        *(a.supply_pressure, a.atmospheric_pressure, a.temperature),
+        *(a.gas_constant, a.heat_capacity_ratio, a.polytropic_index, a.reference_density, a.reference_temperature),
+        *(1 / (1 - v.critical_ratio), valves.laminar_slope(v.critical_ratio)),
+        *(a.reference_temperature / a.temperature, 1 / a.supply_pressure, 1 / a.atmospheric_pressure),
+        *(1 / v.time_constant, 1 / f.sign_speed, 1 / m.mass),
+        *(v.deadband, v.hysteresis, v.opening_limit),
+    )
+
+
+def parameter_array(parameters: Parameters | Sequence[Parameters], num_lanes: int) -> Array:
+    """Parameters of all lanes, (PARAMETERS, num_lanes): one rig for all, or a sequence with one per lane."""
+    if isinstance(parameters, Parameters):
+        return parameter_columns(parameters, num_lanes)
+    if len(parameters) != num_lanes:
+        raise ValueError(
+            f"parameters has {len(parameters)} entries; allowed: one Parameters, or one for each of {num_lanes} lanes"
+        )
+    for lane, rig in enumerate(parameters):
+        if not isinstance(rig, Parameters):
+            raise ValueError(f"parameters[{lane}] = {rig!r}; allowed: a Parameters")
+    return np.stack([parameter_column(p) for p in parameters], axis=1)
