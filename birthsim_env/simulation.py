@@ -39,7 +39,7 @@ from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
 from birthsim_env.parts.drawn.worlds import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
-from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
@@ -228,9 +228,10 @@ class Simulation:
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)
-        board = getattr(self.sensors, "board_stage", None)
         acts = [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
-        return [*acts, board()] if board else acts
+        if hasattr(self.sensors, "board_stage"):
+            return [*acts, self.sensors.board_stage()]
+        return [*acts, self._put_out] if hasattr(self.sensors, "put_out") else acts
 
     def _assemble(self) -> None:
         """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
@@ -275,6 +276,9 @@ class Simulation:
                 self._shown[:] = self.actuation.memory()
         # Anew in every period: the board of the sensors may have put out something else.
         self._openings[:] = self._wanted
+
+    def _put_out(self, _: int) -> None:
+        self._openings[:] = put_out(self.sensors, self.ticks, self._openings)
 
     def _follow(self, _: int) -> None:
         self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)

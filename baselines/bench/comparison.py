@@ -24,8 +24,8 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.rig.parameters import Parameters
 
 ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
-SENSORS = ("ideal", "lab")
-"""Sensor models of the bench. Its own test rigs lack the control board of ``honest`` sensors, which they leave out."""
+COMPARED = ("ideal", "lab")
+"""Sensor models of the bench's tables where none is named."""
 PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
 """Plant -> the environments' argument ``randomize``."""
 
@@ -84,7 +84,7 @@ def default_controllers() -> list[str]:
 
 
 def all_conditions(
-    environments: Sequence[str] = ENVIRONMENTS, sensors: Sequence[str] = SENSORS, plants: Sequence[str] = tuple(PLANTS)
+    environments: Sequence[str] = ENVIRONMENTS, sensors: Sequence[str] = COMPARED, plants: Sequence[str] = tuple(PLANTS)
 ) -> list[Conditions]:
     """Every combination, and the moving hands on rigs drawn at random where the circle is among them."""
     own = [Conditions(*chosen) for chosen in product(environments, sensors, plants)]

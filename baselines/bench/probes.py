@@ -14,7 +14,7 @@ from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS, put_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
@@ -93,17 +93,17 @@ def run_stiffness_test(
     impacts, rest, held = np.zeros(lanes), Window(lanes), Window(lanes)
     for tick in range(round((REST + RISE + HOLD) / period)):
         now = tick * period
-        clock = np.full(lanes, now)
+        clock, ticks = np.full(lanes, now), np.full(lanes, tick)
         force = probes.force * min(max((now - REST) / RISE, 0.0), 1.0)
         motion = plant.end_effector()
         if REST - WINDOW < now <= REST:
             rest.add(motion[:2])
         if now > REST + RISE + HOLD - WINDOW:
             held.add(motion[:2])
-        seen: Measurement = model.measure(np.full(lanes, tick), clock, motion, plant.pressures, force)
+        seen: Measurement = model.measure(ticks, clock, motion, plant.pressures, force)
         if not force_sensor:
             seen = replace(seen, user_force=np.zeros_like(force))
-        plant.advance_unchecked(controller.command(seen, reference), force[None], period)
+        plant.advance_unchecked(put_out(model, ticks, controller.command(seen, reference)), force[None], period)
         np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
     displacement = held.mean() - rest.mean()
     lost = ~np.isfinite(displacement).all(axis=0) | (impacts > board_limit(rigs))

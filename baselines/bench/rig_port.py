@@ -17,7 +17,7 @@ import numpy as np
 from baselines.controller import Controller
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS, put_out
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.equilibrium import balanced_state
@@ -98,7 +98,7 @@ class RigPort:
         seen: Measurement = self._model.measure(ticks, clock, self._motion, plant.pressures, self.force)
         if not self._force_sensor:
             seen = replace(seen, user_force=np.zeros_like(self.force))
-        openings = self._controller.command(seen, self._reference, **self._options)
+        openings = put_out(self._model, ticks, self._controller.command(seen, self._reference, **self._options))
         for answer in range(self._answers):
             place, speed = self._motion[:2], self._motion[2:]
             force = hand(now + (answer + 0.5) * step, place + 0.5 * step * speed, speed)

@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from baselines.bench.comparison import SENSORS
 from baselines.bench.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from baselines.bench.haptics.tables import page_with, report
 from baselines.bench.pieces import controller_settings
@@ -14,6 +13,7 @@ from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
 from baselines.work.files import finite, make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import run_tasks
+from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
 LAWS = ("backstepping", "backstepping-cartesian", "admittance-backstepping", "pid")
@@ -33,7 +33,7 @@ def main() -> None:
         "--controller", nargs="+", default=list(LAWS), metavar="NAME",
         help="names, or path/to/file.py:Class (default: " + " ".join(LAWS) + ")",
     )  # fmt: skip
-    parser.add_argument("--sensors", action="append", choices=SENSORS, help="may be repeated (default: ideal and lab)")
+    parser.add_argument("--sensors", action="append", choices=tuple(SENSORS), help="may be repeated (default: ideal and lab)")
     parser.add_argument("--subject", action="append", choices=SUBJECTS, help="may be repeated (default: all)")
     parser.add_argument("--rigs", type=whole_up_to(1000), default=RIGS, help="rigs drawn at random (default: %(default)s)")
     parser.add_argument("--nominal", action="store_true", help="the rig as the laws believe it, instead of rigs drawn")

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench import stability
-from baselines.bench.comparison import SENSORS
 from baselines.bench.pieces import controller_settings
 from baselines.bench.stability import MAPS, describe_map, stability_tasks
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole_up_to
 from baselines.work.files import make_folder, whole_results, write_json
 from baselines.work.tasks import run_tasks
+from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
@@ -29,7 +29,7 @@ def main() -> None:
         metavar="NAME",
         help="a name, or path/to/file.py:Class (default: %(default)s)",
     )
-    parser.add_argument("--sensors", default="ideal", choices=SENSORS, help="default: %(default)s")
+    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
     parser.add_argument("--map", action="append", choices=tuple(MAPS), help="may be repeated (default: all)")
     parser.add_argument(
         "--points", type=whole_up_to(200), help="values along each axis, at most 200 (default: those of the map)"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS, put_out
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
 
@@ -44,3 +44,7 @@ class ExchangeableSensors:
         begun = self._first * period
         seen = self._sensors.measure(since, since.astype(np.float64) * period, motion, pressures, force)
         return replace(seen, time=time, position_time=seen.position_time + begun)
+
+    def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
+        """What reaches the valves of ``openings`` (4, 1) behind the sensors' control board."""
+        return openings if self._first is None else put_out(self._sensors, ticks - self._first, openings)

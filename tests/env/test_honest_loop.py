@@ -8,7 +8,9 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
-from birthsim_env import Parameters
+from baselines.bench.haptics.worlds import no_hand, resting
+from baselines.bench.rig_port import RigPort
+from birthsim_env import ForceProfile, Hold, Parameters, StiffnessSchedule
 from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
@@ -67,18 +69,28 @@ class OwnHonest(HonestSensors):
         return super().measure(*seen)
 
 
+class AskedForAll:
+    """Sensors whose measurements and control board are asked in Python."""
+
+    sampled, drawn = True, HonestSensors.drawn
+
+    def __init__(self, *setting):
+        honest = HonestSensors(*setting)
+        self.begin, self.measure, self.put_out, self.vary = honest.begin, honest.measure, honest.put_out, honest.vary
+
+
 class OwnValves(ValveActuation):
     """Without stages the loop stops for it."""
 
     stages = None
 
 
-@pytest.mark.parametrize("own", ["sensors", "actuation"])
+@pytest.mark.parametrize("own", [OwnHonest, AskedForAll, "actuation"])
 def test_a_stop_for_python_changes_no_bit(own, monkeypatch):
-    monkeypatch.setitem(SENSORS, "own", OwnHonest)
+    monkeypatch.setitem(SENSORS, "own", own)
     rig = Parameters().replace({"electronics.missed_periods": 0.2})
     setting = {"num_envs": 3, "parameters": rig, "randomize": True}
-    changes = {"sensors": "own"} if own == "sensors" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}
+    changes = {"sensors": "own"} if own != "actuation" else {"actuation": OwnValves("two_valves"), "sensors": "honest"}
     one, other = (gymnasium.make_vec(CIRCLE, **{**setting, **more}) for more in ({"sensors": "honest"}, changes))
     assert_same(course(one), course(other))
 
@@ -103,6 +115,26 @@ def test_valves_are_commanded_in_steps_and_stay_in_missed_periods():
     assert fresh[0].all(), "the first period is never missed"
     missed = ~fresh
     assert missed.mean() == pytest.approx(0.3, abs=4.5 * np.sqrt(0.21 / missed.size))
+
+
+def test_a_rig_held_at_its_port_has_the_control_board_of_its_sensors():
+    """Nobody holds it: the rig of the bench and the environment's are one, to the last bit."""
+    rig = Parameters().replace({"electronics.dac_bits": 8.0, "electronics.missed_periods": 0.2})
+    law, reference = make_controller("backstepping", rig), resting([(0.5, 0.0)] * 2, [2000.0] * 2)
+    port = RigPort([rig] * 2, reference, law, "honest", seed=5)
+    pneumatic1, pneumatic2 = ((value,) for value in reference.pneumatic_stiffness[:, 0])
+    parts = {
+        "reference": Hold(),
+        "user_force": ForceProfile(),
+        "stiffness": StiffnessSchedule(pneumatic1=pneumatic1, pneumatic2=pneumatic2),
+    }
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, sensors="honest", parameters=rig, policy_period=0.001, **parts)
+    env.reset(seed=5)
+    simulation, same_law = env.unwrapped.simulation, make_controller("backstepping", rig)
+    for _ in range(200):
+        simulation.step(same_law.command(simulation.measurement, simulation.reference))
+        port.advance(no_hand)
+        np.testing.assert_array_equal(simulation.motion, port.motion())
 
 
 def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():

@@ -139,17 +139,22 @@ def _honest_stage(world: int, seen: int, memory: int, constants: int, tables: in
 
 
 @kernel
-def _board_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """The openings that the board puts out; in a missed period those of the period before."""
-    w, s = block(world, WORLD), block(seen, SEEN)
-    keys, e, last = table1(tables, 0).view(np.uint64), table2(tables, 1), table2(tables, 2)
-    for i in range(n):
-        tick, k = int(w[TICK, i]), lane + i
-        missed = tick > 0 and happens(keys[k], tick, MISSED, e[at.MISSED, k])
+def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Array, last: Array, openings: Array) -> None:
+    """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period."""
+    for i in range(ticks.shape[0]):
+        tick = int(ticks[i])
+        missed = tick > 0 and happens(keys[i], tick, MISSED, e[at.MISSED, i])
         for valve in range(4):
-            told = _converted(s[OPENING + valve, i], e[at.OPENING_STEP, k], -1.0, 1.0)
-            last[valve, k] = last[valve, k] if missed else told
-            s[OPENING + valve, i] = last[valve, k]
+            told = _converted(openings[valve, i], e[at.OPENING_STEP, i], -1.0, 1.0)
+            last[valve, i] = last[valve, i] if missed else told
+            openings[valve, i] = last[valve, i]
+
+
+@kernel
+def _board_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    w, s, mine = block(world, WORLD), block(seen, SEEN), slice(lane, lane + n)
+    keys, e, last = table1(tables, 0).view(np.uint64)[mine], table2(tables, 1)[:, mine], table2(tables, 2)[:, mine]
+    _put_out(w[TICK, :n], keys, e, last, s[OPENING : OPENING + 4, :n])
     return 0
 
 
@@ -227,6 +232,12 @@ class HonestSensors:
         )  # fmt: skip
         return Stage(_honest_stage, self._constants, tables=tables)
 
+    def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
+        """What reaches the valves of ``openings`` (4, N): through the converter, and not at all in a missed period."""
+        out = np.array(openings, dtype=np.float64)
+        _put_out(ticks, self._keys, self._errors, self._last, out)
+        return out
+
     def board_stage(self) -> Stage:
-        """What stands between a controller's openings and the valves: the converter, and periods that are missed."""
+        """``put_out``, compiled into the closed loop."""
         return Stage(_board_stage, tables=(self._keys.view(np.float64), self._errors, self._last))
