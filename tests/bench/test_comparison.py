@@ -71,7 +71,7 @@ def cell(controller, conditions=PROBE, episodes=3, seed=4):
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_every_controller_meets_the_same_worlds_and_every_episode_another(worlds, plant):
-    conditions = Conditions("BirthSIM/Circle-v1", "lab", plant)
+    conditions = Conditions("BirthSIM/Circle-v1", "honest" if plant == "drawn-sensors" else "lab", plant)
     law, weight = cell("backstepping", conditions), cell("backstepping-weight", conditions)
     assert law["seeds"] == weight["seeds"] == [4, 5, 6]
     for what in ("plant", "reference", "force"):
@@ -116,6 +116,9 @@ def test_the_grid_is_five_environments_two_sensor_models_and_two_plants():
         *("Circle", "Probe", "Descent", "Forceps", "Dystocia")
     ]
     assert str(PROBE) == "Probe, ideal sensors, nominal plant"
+    drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
+    assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
+    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal plant"
 
 
 def test_slow_controllers_are_left_out_unless_named(monkeypatch):

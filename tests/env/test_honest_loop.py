@@ -160,6 +160,25 @@ def test_a_nominal_rig_has_nominal_sensors_whose_errors_differ_by_episode():
     assert len(np.unique(errors[len(FIGURES)])) == 4
 
 
+def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sensors_drawn():
+    envs = {
+        what: gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize=what) for what in ("sensors", "scenario", True)
+    }
+    for env in envs.values():
+        env.reset(seed=5)
+    sensors, scenario, both = (env.unwrapped.simulation for env in envs.values())
+    np.testing.assert_array_equal(sensors.plant.lane_parameters, scenario.plant.lane_parameters)
+    np.testing.assert_array_equal(sensors.reference.rows, scenario.reference.rows)
+    np.testing.assert_array_equal(sensors.sensors._errors, both.sensors._errors)
+    assert not np.array_equal(sensors.sensors._errors, scenario.sensors._errors)
+    believed = envs["sensors"].unwrapped.simulation.parameters.electronics
+    assert believed == Parameters().electronics, "what a law is given"
+    assert described(Parameters(), "sensors", "honest").startswith("sensors drawn: position noise 5e-05 to 0.0003 m, ")
+    for kind in ("ideal", "lab"):
+        with pytest.raises(ValueError, match=f"randomize = 'sensors' with sensors = '{kind}'; allowed: .*'honest'"):
+            gymnasium.make(CIRCLE, sensors=kind, randomize="sensors")
+
+
 def test_sensors_are_drawn_only_where_the_model_can():
     ranges = {"electronics.force_bias": (0.0, 5.0)}
     gymnasium.make(CIRCLE, sensors="honest", randomize=ranges).reset(seed=0)
