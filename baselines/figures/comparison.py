@@ -109,8 +109,6 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
         log_ticks(axes.xaxis)
     panels[0, 0].set_ylabel("air used (normal l/min)")
     short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
-    figure.suptitle(
-        f"{short}, {'nominal' if plant == 'drawn-sensors' else plant} plant: medians with 95 % intervals", fontsize=9.5
-    )
+    figure.suptitle(f"{short}, {plant.replace('drawn-sensors', 'nominal')} plant: medians with 95 % intervals", fontsize=9.5)
     legend_below(figure, list(handles.values()), [label_of(name) for name in handles])
     return save(figure, folder, "air_against_error")
