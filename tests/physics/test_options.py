@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -17,7 +19,7 @@ from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ra
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, field_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 LINE = {"air.supply_conductance": 4e-9, "air.supply_volume": 1e-4}
@@ -223,6 +225,14 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
     assert not set(WORTH) & set(documented_ranges(nominal, "honest"))
     assert options.are_off(Plant().lane_parameters)
     assert Parameters.from_dict(nominal.replace(EACH["all"]).to_dict()) == nominal.replace(EACH["all"])
+
+
+def test_the_page_has_every_option_with_its_default_and_its_range():
+    page = (Path(__file__).parents[2] / "docs" / "plant_options.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\|[^|]*\| `([\w.]+)` \| ([^| ]+)[^|]*\| (\S+) to (\S+) \|", page, re.MULTILINE)
+    assert {name: (float(low), float(high)) for name, _, low, high in rows} == WORTH
+    for name, default, *_ in rows:
+        assert float(default) == field_of(name).default, name
 
 
 @pytest.mark.parametrize(
