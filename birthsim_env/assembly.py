@@ -17,10 +17,10 @@ from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn
-from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ranges
+from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
 from birthsim_env.parts.own_parts import hand_of, trajectory_of
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, shown
@@ -129,9 +129,12 @@ def assemble(
     if isinstance(randomize, Mapping):
         ranges, varied = checked_ranges(randomize, rig, sensors), False
     else:
-        one_of("randomize", randomize, (False, True, "plant", "scenario"))
-        ranges = checked_ranges(documented_ranges(rig, sensors), rig, sensors) if randomize in (True, "plant") else {}
-        varied = randomize in (True, "scenario")
+        one_of("randomize", randomize, RANDOMIZE)
+        ranges = checked_ranges(ranges_of(rig, randomize, sensors), rig, sensors)
+        varied = randomize in (True, "scenario", "sensors")
+        if randomize == "sensors" and not drawn_by(sensors):
+            able = ", ".join(repr(name) for name in SENSORS if drawn_by(name))
+            raise ValueError(f"randomize = 'sensors' with sensors = {sensors!r}; allowed: with sensors = {able}")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):
         raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")

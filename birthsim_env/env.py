@@ -89,8 +89,9 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
       (`birthsim_env.physics.electronics`).
     - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
-      (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
-      `{"mechanics.mass": (2, 5)}` draws just these parameters.
+      (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; `"sensors"` varies the
+      experiment and draws the figures of `honest` sensors alone; a mapping such as `{"mechanics.mass": (2, 5)}` draws just
+      these parameters.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
     - `user_force`: likewise: a `UserForce`, a function of time, or of time, position and velocity, that returns (Fx, Fy) in

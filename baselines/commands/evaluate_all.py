@@ -20,7 +20,7 @@ from baselines.work.tasks import Result, code_stamp, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
-NARROWED = {"scenario": "nominal", "all": "randomised"}
+NARROWED = {"scenario": "nominal", "all": "randomised", "sensors": "drawn-sensors"}
 """The option --randomize -> the one plant that is then compared."""
 
 
@@ -69,7 +69,10 @@ def _conditions(arguments: argparse.Namespace) -> list[Conditions]:
         if arguments.randomize not in NARROWED:
             raise ValueError(f"--randomize {arguments.randomize!r} with --all; allowed: {', '.join(NARROWED)}")
         narrowed["plants"] = (NARROWED[arguments.randomize],)
-    return all_conditions(**narrowed)
+    conditions = all_conditions(**narrowed)
+    if not conditions:
+        raise ValueError("--randomize 'sensors' with --all; allowed: with --sensors honest, whose figures can be drawn")
+    return conditions
 
 
 def _write(

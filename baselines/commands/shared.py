@@ -15,7 +15,7 @@ import gymnasium
 from baselines.commands.start import endings
 from birthsim_env.physics.rig.values import shown
 
-RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
+RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
 
 

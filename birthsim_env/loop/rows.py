@@ -13,7 +13,7 @@ STATE = PARAMETERS
 IMPACT = STATE + STATES
 """Fastest collision of each piston with an end stop in this policy step, m/s."""
 MOTION = IMPACT + 2
-"""True x, y (m), vx, vy (m/s) of the end effector."""
+"""True x, y (m), vx, vy (m/s) of the end effector, where hand and tracker are: of its handle where the structure bends."""
 FORCE = MOTION + 4
 """The hand's force Fx, Fy, N."""
 SINCE_JUMP = FORCE + 2

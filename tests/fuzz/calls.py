@@ -19,7 +19,7 @@ GOOD: dict[str, tuple[Any, ...]] = {
     "action_mode": ("valve", "flow"),
     "valves": ("two_valves", "one_valve"),
     "sensors": ("ideal", "lab"),
-    "randomize": (False, True, "plant", "scenario", {"mechanics.mass": (2, 5)}),
+    "randomize": (False, True, "plant", "scenario", "sensors", {"mechanics.mass": (2, 5)}),
     "reference": (None,),
     "user_force": (None, "steps", "sine", "noise", "guided"),
     "stiffness": (None,),
