@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,9 @@ class StagedController:
 
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
     """
+
+    TOLD: ClassVar[tuple[str, ...]] = ("feedforward_force", "feedforward_rate", "damping_factor")
+    """What ``command`` takes besides the signals."""
 
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
@@ -73,7 +77,7 @@ class StagedController:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         if lanes is None:
             self._lanes = 0
-        else:
+        elif self._lanes:
             for one, memory in zip(self._made, self._memories, strict=True):
                 memory[:, lanes] = one.fresh[:, None]
 
@@ -89,11 +93,14 @@ class StagedController:
 
         Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
         believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
-        the damping where the law has one to vary. Raises ``ValueError`` for signals over different numbers of lanes, and for
-        setpoints that the law cannot render.
+        the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``TOLD``, for signals over different
+        numbers of lanes, and for setpoints that the law cannot render.
         """
+        given = (feedforward_force, feedforward_rate, damping_factor)
+        for name, values in zip(StagedController.TOLD, given, strict=True):
+            if values is not None and name not in self.TOLD:
+                raise ValueError(f"{name} is given; allowed: None, since {type(self).__name__} has no use for it")
         if measurement.position.ndim == 1:
-            given = (feedforward_force, feedforward_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
@@ -103,7 +110,7 @@ class StagedController:
             self._openings: Array = np.zeros((4, lanes))
             placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._told[:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor)
+        self._told[:] = feedforward_rows(lanes, *given)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:ASKED] = self._seen[ASKED:] = reference.rows
         if self._loop.run():
