@@ -12,8 +12,8 @@ import numpy as np
 from baselines.controller import feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import (
+    ACTION,
     ASKED,
-    FEEDFORWARD,
     OPENING,
     REFERENCE,
     fill_measurement,
@@ -106,13 +106,15 @@ class StagedController:
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         if self._loop is None:
-            self._seen, self._told = np.zeros((ASKED + REFERENCES, lanes)), np.zeros((5, lanes))
+            self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))
-            placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
+            unchanged = self._seen.view()
+            unchanged.flags.writeable = False
+            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._told[:] = feedforward_rows(lanes, *given)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *given)
         fill_measurement(self._seen, measurement)
-        self._seen[REFERENCE:ASKED] = self._seen[ASKED:] = reference.rows
+        self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
         if self._loop.run():
             self.explain(measurement, reference)
         return self._openings.copy()
