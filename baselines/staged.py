@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import feedforward_rows, lanes_of
+from baselines.controller import TOLD, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import (
     ACTION,
@@ -39,7 +39,7 @@ class StagedController:
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = ("feedforward_force", "feedforward_rate", "damping_factor")
+    TOLD: ClassVar[tuple[str, ...]] = TOLD
     """What ``command`` takes besides the signals."""
 
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
@@ -96,11 +96,8 @@ class StagedController:
         the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``TOLD``, for signals over different
         numbers of lanes, and for setpoints that the law cannot render.
         """
-        given = (feedforward_force, feedforward_rate, damping_factor)
-        for name, values in zip(StagedController.TOLD, given, strict=True):
-            if values is not None and name not in self.TOLD:
-                raise ValueError(f"{name} is given; allowed: None, since {type(self).__name__} has no use for it")
         if measurement.position.ndim == 1:
+            given = (feedforward_force, feedforward_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
@@ -112,7 +109,7 @@ class StagedController:
             unchanged.flags.writeable = False
             placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, *given)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor, self.TOLD)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
         if self._loop.run():
