@@ -20,10 +20,10 @@ from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 
-ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
+ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 SENSORS = ("ideal", "lab")
 """Sensor models of the bench. Its own test rigs lack the control board of ``honest`` sensors, which they leave out."""
 PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
