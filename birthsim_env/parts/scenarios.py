@@ -86,8 +86,8 @@ def _forceps_varied() -> Parts:
 
 def _dystocia() -> Parts:
     # Clinicians pulled 84, 122 and 163 N in *simulated* routine, difficult and dystocia deliveries (Allen et al., AJOG
-    # 171:1621, 1994, doi 10.1016/0002-9378(94)90413-8). At births the peaks were 47, 69 and 100 N (Allen, Sorab, Gonik, Obstet Gynecol
-    # 77:352, 1991). A trainee pulls as in the simulation, so the scenario keeps those. The head draws back at once (assumed).
+    # 171:1621, 1994, doi 10.1016/0002-9378(94)90413-8). At births the peaks were 47, 69 and 100 N (Allen, Sorab, Gonik, Obstet
+    # Gynecol 77:352, 1991). A trainee pulls as in the simulation, so the scenario keeps those. The head draws back at once.
     reference = Path((0.5, 0.0), math.pi, 0.012, begins=1.0, ends=1.5)
     stiffness = StiffnessSchedule((0.0, 1.0), (2000.0, 4000.0), (4200.0,) * 2, (2000.0,) * 2)
     return reference, Pulls((84.0, 122.0, 163.0), 100.0, math.radians(-5), begins=2.5, hold=1.5), stiffness

@@ -142,7 +142,7 @@ def test_values_of_a_wrong_kind_are_refused_too(tmp_path, text, message):
 
 @pytest.mark.parametrize("name", ["square", "circle.toml", "nowhere/circle", ""])
 def test_a_configuration_that_is_not_there_is_refused_with_those_that_are(name):
-    with pytest.raises(ValueError, match=r"is no file; allowed: circle, .*probe, or a TOML file") as caught:
+    with pytest.raises(ValueError, match=r"is no file; allowed: circle, .*vacuum, or a TOML file") as caught:
         load_configuration(name)
     assert repr(name or ".") in str(caught.value) or repr(name) in str(caught.value)
 
