@@ -37,7 +37,7 @@ def measured(scenario, law, sensors, episodes, seed):
     ]  # fmt: skip
     air = [np.array(one.metrics["air"]) for one in found]
     saved = 100 * (1 - air[1] / air[0])
-    errors = [f"{np.median(one.metrics['settled_rms']):.3g}, {np.quantile(one.metrics['settled_rms'], 0.95):.3g}" for one in found]
+    errors = [", ".join(f"{q:.3g}" for q in np.quantile(one.metrics["settled_rms"], (0.5, 0.95))) for one in found]
     spread = f"{np.median(saved):.1f} ({np.quantile(saved, 0.05):.1f} to {np.quantile(saved, 0.95):.1f})"
     cells = (*(f"{np.median(one):.3g}" for one in air), spread, *errors, f"{sum(found[0].lost)}, {sum(found[1].lost)}")
     return f"| {scenario} | `{law}` | {sensors} | {' | '.join(cells)} |"
