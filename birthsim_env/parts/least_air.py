@@ -67,10 +67,10 @@ def least_air(
     columns = [stiffness.closed_loop, stiffness.closed_loop_y, stiffness.closed_loop_xy]
     if any(isinstance(setpoint, tuple) for column in columns for setpoint in column or ()):
         raise ValueError(f"closed_loop = {shown(stiffness.closed_loop)}; allowed: numbers, not ranges")
-    starts: Array = np.unique([*stiffness.times, *np.arange(0.0, duration, phase)]).astype(np.float64)
+    instants = np.unique([*stiffness.times, *np.arange(0.0, duration, phase)])
     # A change that begins before another has ended would step.
-    apart = np.abs(starts[:, None] - np.asarray(stiffness.times)).min(axis=1)
-    starts = starts[(apart == 0.0) | (apart >= stiffness.transition)]
+    apart = np.abs(instants[:, None] - np.asarray(stiffness.times)).min(axis=1)
+    starts: Array = instants[(apart == 0.0) | (apart >= stiffness.transition)].astype(np.float64)
     times: Array = GRID * np.arange(round(duration / GRID) + 1)
     piston, load = _along(reference, times, rig)
     chosen = []
