@@ -71,7 +71,7 @@ def least_air(
     # A change that begins before another has ended would step.
     apart = np.abs(instants[:, None] - np.asarray(stiffness.times)).min(axis=1)
     starts: Array = instants[(apart == 0.0) | (apart >= stiffness.transition)].astype(np.float64)
-    times: Array = GRID * np.arange(round(duration / GRID) + 1)
+    times = np.linspace(0.0, GRID * round(duration / GRID), round(duration / GRID) + 1)
     piston, load = _along(reference, times, rig)
     chosen = []
     for k in range(2):
