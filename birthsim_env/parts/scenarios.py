@@ -56,8 +56,9 @@ def _probe_varied() -> Parts:
 
 
 def _descent() -> Parts:
-    # Station -5 to +5 cm (ACOG's scale) is 100 mm of straight descent; the arc stands for the curve of Carus, its radius and
-    # angle are assumed. Compressed in time: a contraction of 60 to 90 s lasts 12 s here, and five pushes of 10 s share 24 s.
+    # Station -5 to +5 cm is 100 mm of straight descent; the arc stands for the curve of Carus, its radius and angle are
+    # assumed. Compressed in time: a contraction of 60 to 90 s lasts 12 s, and five pushes share its middle 6 s; at a birth
+    # three or four of 10 s do.
     reference = Path((0.42, -0.04), 0.0, 0.10, 0.07, math.radians(80), begins=1.0, ends=23.0)
     stiffness = StiffnessSchedule((0.0, 8.0, 16.0), (2000.0, 4000.0, 3000.0), (4200.0,) * 3, (2100.0,) * 3)
     return reference, Contractions(pushes=(5, 5)), stiffness
