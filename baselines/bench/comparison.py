@@ -20,11 +20,11 @@ from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 
-ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
+ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")
 """Sensor models of the bench's tables where none is named."""
 PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True, "drawn-sensors": "sensors"}

@@ -163,5 +163,6 @@ def check_world(environment: str, **arguments: Any) -> None:
 
 
 def policy_of(environment: str) -> str:
-    """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v1`` -> ``forceps``."""
-    return environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
+    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v1`` ->
+    ``forceps``."""
+    return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()

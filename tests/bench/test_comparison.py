@@ -106,15 +106,15 @@ def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
     assert "1 of 2 episodes" in capsys.readouterr().out
 
 
-def test_the_grid_is_five_environments_two_sensor_models_and_two_plants():
-    assert len(all_conditions()) == 26
+def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
+    assert len(all_conditions()) == 30
     moving = [conditions for conditions in all_conditions() if conditions.hand]
     assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
     assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
     assert str(moving[0]) == "Circle, ideal sensors, randomised plant, moving hand: sine"
     assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
     assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
-        *("Circle", "Probe", "Descent", "Forceps", "Dystocia")
+        *("Circle", "Probe", "Descent", "Forceps", "Dystocia", "Vacuum")
     ]
     assert str(PROBE) == "Probe, ideal sensors, nominal plant"
     drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]

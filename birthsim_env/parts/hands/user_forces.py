@@ -243,12 +243,16 @@ class Pulls(ForceProfile):
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 
+    def peak(self, size: Range, rng: np.random.Generator) -> Any:
+        """Force of a pull, N, from its entry in ``sizes``."""
+        return draw(size, rng)
+
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         now = self.begins
         for sizes in self.sizes:
-            size, rate = draw(sizes, rng), draw(self.rate, rng)
+            size, rate = self.peak(sizes, rng), draw(self.rate, rng)
             along, across = exact.direction(draw(self.angle, rng))
             x, y, top = size * along, size * across, now + size / rate
             knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
