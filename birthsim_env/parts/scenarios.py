@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, Contractions, Pulls, Ramp, UserForce
+from birthsim_env.parts.hands.contractions import Contractions
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp, UserForce
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule

@@ -16,8 +16,9 @@ from birthsim_env.parts.drawn.randomization import draw_columns, draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.drawn.worlds import TOGETHER, begin, worlds
+from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.hands.user_forces import Contractions, ForceProfile, Ramp
+from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, LabSensors
 from birthsim_env.physics.compiled.lanes import parameter_column

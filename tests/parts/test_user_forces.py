@@ -11,7 +11,8 @@ import pytest
 from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import ForceProfile
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, Contractions, Pulls, Ramp
+from birthsim_env.parts.hands.contractions import Contractions
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import SCENARIOS
 
