@@ -103,22 +103,25 @@ def backdriving_table(runs: Runs) -> str:
 
 
 def stability_table(runs: Runs) -> str:
-    """Fractions of hands with which the law rests, and the stiffest setpoint that is stable against all of ``HANDS``."""
+    """Hands with which the law rests, the largest of motion, force (peak to peak) and energy, and the stiffest setpoint that is
+    stable against all of ``HANDS``."""
     rows = []
     for run in runs:
         if not ("hands" in run or "z_width" in run):
             continue
         cells = []
         for piece in run.get("hands", ()):
-            stable, energy = np.array(piece["stable"], dtype=bool), _numbers(piece["energy"])
-            cells += [f"{100 * stable.mean():.0f} %", number(float(np.max(np.where(np.isfinite(energy), energy, np.inf))))]
+            cells.append(f"{100 * np.array(piece['stable'], dtype=bool).mean():.0f} %")
+            for name in ("motion_mm", "force", "energy"):
+                values = _numbers(piece[name])
+                cells.append(number(float(np.where(np.isfinite(values), values, np.inf).max())))
         for piece in run.get("z_width", ()):
             cells += list(_z_width(piece))
         rows.append([*_who(run), *cells])
     held = next((run["hands"] for run in runs if "hands" in run), ())
     columns = [*WHO]
     for piece in held:
-        columns += [f"hands of {piece['damping']:g} N s/m: stable", "most energy given, J"]
+        columns += [f"hands of {piece['damping']:g} N s/m: stable", "motion, mm", "force, N", "energy given, J"]
     if any("z_width" in run for run in runs):
         columns += ["stable up to, N/m", "with the best damping, N/m"]
     title = f"### Held by hands of 0.1 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
