@@ -10,6 +10,7 @@ import numpy as np
 from baselines.admittance import adaptive_stage as at
 from baselines.admittance import law as admittance_law
 from baselines.admittance.controller import LEAST_FRACTION, AdmittanceBackstepping
+from baselines.admittance.stage import MEASURED_ROWS
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.observers import FRESH, memory_rows
@@ -41,7 +42,7 @@ class AdaptiveAdmittance(AdmittanceBackstepping):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         g, rig = self._gains["lab" if sampled else "ideal"], self.parameters
-        period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else at.MEASURED_ROWS
+        period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else MEASURED_ROWS
         cells = exact.number("exp", -(g["pressure_bandwidth"] if sampled else math.inf) * period)
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},

@@ -19,7 +19,7 @@ TIME = 0.25
 
 @kernel
 def tare(memory: Array, time: Array, measured: Array, most: float, period: float, force: Array) -> None:
-    """Writes ``force`` (2, N), N: ``measured`` (2, N) less its mean until ``TIME``, of which at most +-``most`` N is taken off."""
+    """Writes ``force`` (2, N), N: ``measured`` (2, N) less its mean until ``TIME``, of which +-``most`` N count."""
     for i in range(time.shape[0]):
         samples = time[i] / period + 1.0
         for axis in range(2):

@@ -1,15 +1,15 @@
 """The hand's force without a force sensor: what the force balance of the pistons leaves once friction is taken off.
 
     J^T F = R + friction,   friction = a s0 z,   z = clip(z + dy, -Fc/s0, Fc/s0)
-R is what pressures, weight and motion leave unexplained. Friction is an elastic-plastic element (Prandtl) on the measured motion:
-unlike LuGre's it does not creep under noise. A piston that rests tells the hand by its bristles alone, some 20 um for 1 N; one
-that slides, up to the error of the friction believed. The fraction a < 1 keeps the loop from feeding itself where less friction
-is there than believed. What is left at the start, before a hand comes, is taken for an error of the mass and the cells.
+R is what pressures, weight and motion leave unexplained. Friction is an elastic-plastic element (Prandtl) on the measured
+motion: unlike LuGre's it does not creep under noise. A resting piston tells the hand by its bristles alone, which give way by
+20 um for 1 N. A sliding one tells it up to the error of the friction believed. The fraction a < 1 keeps the loop from feeding
+itself where less friction is there than believed. What is left at the start, before a hand comes, is taken for an error of the
+mass and of the pressure cells.
 """
 
 from __future__ import annotations
 
-from baselines.backstepping.cartesian_law import cartesian
 from baselines.estimation import force_bias
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
@@ -20,7 +20,7 @@ ROWS = 8
 """Deflections of both pistons' bristles, m, their positions a period ago, m, the force low-passed and its bias, N."""
 BRISTLE, BEFORE, FORCE, BIAS = 0, 2, 4, 6
 
-FRICTION_FRACTION = 0.8
+FRICTION_FRACTION = 0.9
 """a; assumed."""
 
 QUICKNESS = 40.0
@@ -51,7 +51,8 @@ def observe(
             memory[BRISTLE + cylinder, i], memory[BEFORE + cylinder, i] = bristle, joints[cylinder, i]
         f1 = unexplained[0, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * memory[BRISTLE, i]
         f2 = unexplained[1, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * memory[BRISTLE + 1, i]
-        x, y = cartesian(-f1 / kappa, f2, sine, cosine)
+        across, along = -f1 / kappa, f2
+        x, y = across * cosine + along * sine, across * sine - along * cosine
         memory[FORCE, i] = 0.0 if fresh[i] > 0.0 else memory[FORCE, i] + share * (x - memory[FORCE, i])
         memory[FORCE + 1, i] = 0.0 if fresh[i] > 0.0 else memory[FORCE + 1, i] + share * (y - memory[FORCE + 1, i])
     force_bias.tare(memory[BIAS:], time, memory[FORCE:BIAS], MOST_BIAS, period, force)

@@ -2,8 +2,8 @@
 
 Three samples at times t1 < t2 < t3 of a motion without acceleration are on one line: with q = (t3 - t2)/(t2 - t1),
     e = x3 - x2 - q (x2 - x1)   has the variance   s^2 (1 + (1 + q)^2 + q^2).
-So the samples tell s without a model of the rig, wherever the noise comes from. Accelerations below 2 m/s2 add less than a fifth
-of 0.1 mm at 240 Hz; larger ones are clipped.
+So the samples tell s without a model of the rig, wherever the noise comes from. An acceleration of 2 m/s2 at 240 Hz is an e of
+35 um; larger ones are clipped.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ ROWS = 8
 BEFORE, LAST, VARIANCE, COUNT = 0, 3, 6, 7
 
 SAMPLES = 100.0
-"""assumed: samples over which the variance is averaged, 0.4 s at 240 Hz; at first what is believed counts as ``FIRST`` samples."""
+"""assumed: samples over which the variance is averaged, 0.4 s at 240 Hz."""
 
 FIRST = 10.0
-"""assumed, see ``SAMPLES``."""
+"""assumed: so many samples what is believed counts for at first."""
 
 CLIP = 9.0
 """assumed: no e^2 counts for more than so many times its expectation; of normal noise 0.3 % are clipped."""
