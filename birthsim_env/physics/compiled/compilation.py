@@ -35,7 +35,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 BLOCK = 32
 """Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise."""
 
-_ROOT = Path(__file__).resolve().parent.parent.parent
+_ROOT = Path(__file__).resolve().parents[3]
 _PACKAGES = ("birthsim_env", "baselines", "agents")
 _DIGEST = hashlib.sha256().digest_size
 
