@@ -1,8 +1,8 @@
 """What the errors of ``honest`` sensors leave to the best law: one that puts the place shown where the force shown asks for it.
 
-Scale and distortion of the tracker, gain and crosstalk of the force sensor are not observable by a law: no other sensor of the rig
-tells position to a millimetre, or a hand's force from friction. Noise, delays and converters, which time averages, are switched off,
-and so is the bias of the force, which a law may tare.
+Scale and distortion of the tracker, gain and crosstalk of the force sensor are not observable by a law: no other sensor of the
+rig tells position to a millimetre, or a hand's force from friction. Noise, delays and converters, which time averages, are
+switched off, and so is the bias of the force, which a law may tare.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ STEPS = 12
 
 
 def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
-    """Of the worlds of ``BirthSIM/Probe-v1`` that are drawn for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance
-    from the compliant target while the push is held; (episodes,) each."""
+    """Of the worlds of ``BirthSIM/Probe-v1`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
+    the compliant target while the push is held; (episodes,) each."""
     env: Any = gymnasium.make_vec(
         "BirthSIM/Probe-v1", num_envs=episodes, policy_period=HELD, parameters=rig, sensors="honest", randomize=True
     )
@@ -44,18 +44,24 @@ def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
     static = _static_sensors(rig, episodes, seed)
 
     def place(pushed: Array) -> Array:
-        found = target + np.stack(displacement(*pushed, *stiffness, 0.0))
+        found: Array = target + _spring(pushed, stiffness)
         for _ in range(STEPS):
             shown, felt = _shown(static, found, pushed)
-            found = found - (shown - target - np.stack(displacement(*felt, *stiffness, 0.0)))
+            found = found - (shown - target - _spring(felt, stiffness))
         return found
 
-    moved, wanted = place(force) - place(np.zeros_like(force)), np.stack(displacement(*force, *stiffness, 0.0))
+    moved, wanted = place(force) - place(np.zeros_like(force)), _spring(force, stiffness)
     direction = force / np.hypot(*force)
     along, asked = (np.einsum("in,in->n", way, direction) for way in (moved, wanted))
     return {
         "stiffness_error": 100 * (asked / along - 1), "held_error": 1e3 * np.hypot(*(place(force) - target - wanted))
     }  # fmt: skip
+
+
+def _spring(force: Array, stiffness: Array) -> Array:
+    """Displacement (2, N), m, of springs (2, N), N/m, along x and y under a force (2, N), N."""
+    x, y = displacement(force[0], force[1], stiffness[0], stiffness[1], 0.0)
+    return np.stack([x, y])
 
 
 def _static_sensors(rig: Parameters, episodes: int, seed: int) -> HonestSensors:

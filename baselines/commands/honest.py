@@ -44,7 +44,7 @@ def as_described(rig: Parameters) -> Parameters:
 def _honest(arguments: argparse.Namespace) -> None:
     folder, believed = make_folder(arguments.out), Parameters()
     lines = [
-        f"Rigs and scenarios drawn, {arguments.episodes} episodes a cell from seed {arguments.seed}; median, 95 % and worst.", "",
+        f"Rigs and scenarios drawn, {arguments.episodes} episodes from seed {arguments.seed}; median, 95 % and worst.", "",
         "| law | sensors | Probe: stiffness error, % | hunting, mm | settled error, mm | Circle: settled error, mm | lost |",
         "|---|---|---|---|---|---|---|",
     ]  # fmt: skip
