@@ -9,7 +9,9 @@ import pytest
 from baselines.admittance import adaptive_stage as at
 from baselines.bench.evaluation import evaluate
 from baselines.bench.sensor_floor import probe_floor
+from baselines.commands.honest import as_described
 from baselines.registry import make_controller
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 
 NAMES = ("admittance-adaptive", "admittance-sensorless")
@@ -66,6 +68,14 @@ def test_floor_of_a_scale_error_is_that_error():
     rig = Parameters().replace({**off, "electronics.position_scale_error": 0.01})
     floor = np.abs(probe_floor(rig, 16, 0)["stiffness_error"])
     assert 0.6 < floor.max() <= 1.2  # drawn within 20 % of 1 %, times a number in [-1, 1)
+
+
+def test_sensors_as_described_are_the_same_in_all_worlds():
+    rig = as_described(Parameters().replace({"electronics.force_bias": 0.5}))
+    drawn = documented_ranges(rig, "honest")
+    assert drawn["electronics.force_bias"] == (0.5, 0.5)
+    assert drawn["electronics.position_noise"] == (1e-4, 1e-4)
+    assert drawn["mechanics.mass"] == documented_ranges(Parameters(), "honest")["mechanics.mass"]
 
 
 def test_nothing_wrong_leaves_nothing():
