@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -61,16 +61,24 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
     return lanes
 
 
-def feedforward_rows(lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None) -> Array:
+TOLD = ("feedforward_force", "feedforward_rate", "damping_factor")
+"""What a law may be told besides the signals."""
+
+
+def feedforward_rows(
+    lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None, taken: Sequence[str] = TOLD
+) -> Array:
     """What a law is told besides, (5, lanes), zero where nothing: forces to believe in along cylinders 1 and 2, N, their
-    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape."""
+    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
     told = np.zeros((5, lanes))
     for name, rows, given in (
-        ("feedforward_force", told[:2], force),
-        ("feedforward_rate", told[2:4], rate),
-        ("damping_factor", told[4], factor),
+        (TOLD[0], told[:2], force),
+        (TOLD[1], told[2:4], rate),
+        (TOLD[2], told[4], factor),
     ):
         if given is not None:
+            if name not in taken:
+                raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
             if np.shape(given) != rows.shape:
                 raise ValueError(
                     f"{name} has shape {np.shape(given)}; allowed: {rows.shape}, with the lanes of measurement.position"

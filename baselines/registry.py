@@ -16,6 +16,7 @@ from baselines.admittance.controller import AdmittanceBackstepping
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
+from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
@@ -23,6 +24,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import problem, shown
 
 Factory = Callable[..., Controller]
+
+LIMITED = "limited:"
+"""Before a controller's name: the controller in a ``PortLimiter``."""
 
 ENTRY_POINTS = "birthsim.controllers"
 """Entry point group by which a package that builds on this one adds controllers."""
@@ -76,6 +80,11 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
     return plain, options
 
 
+def bare_name(name: str) -> str:
+    """A controller's name without options and limits: what the table, or a file, calls it."""
+    return split_options(name)[0].removeprefix(LIMITED)
+
+
 def _factory(name: str) -> Factory:
     """What makes the controller ``name``, which has no options; ``ValueError`` names what is unknown and what there is."""
     if name in CONTROLLERS or name in UNCONTROLLED:
@@ -91,7 +100,7 @@ def _factory(name: str) -> Factory:
 
 def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
-    factory: Any = _factory(split_options(name)[0])
+    factory: Any = _factory(bare_name(name))
     kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
     if tunable := getattr(kind, "TUNABLE", None):
         return list(tunable)
@@ -105,8 +114,14 @@ def known_options(name: str) -> list[str] | None:
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
     """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
 
-    A name may carry options: ``pid[bandwidth=60]``. Raises ``ValueError`` naming what is unknown and what there is.
+    A name may carry options, ``pid[bandwidth=60]``. ``limited:`` before it puts the law behind the limits of ``PortLimiter``.
+    Raises ``ValueError`` naming what is unknown and what there is.
     """
+    if name.startswith(LIMITED):
+        try:
+            return PortLimiter(make_controller(name.removeprefix(LIMITED), parameters, **options), parameters)
+        except ValueError as error:
+            raise ValueError(str(error).replace("controller = '", f"controller = '{LIMITED}")) from error
     plain, named = split_options(name)
     factory = _factory(plain)
     known = known_options(plain)

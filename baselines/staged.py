@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import feedforward_rows, lanes_of
+from baselines.controller import TOLD, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import (
+    ACTION,
     ASKED,
-    FEEDFORWARD,
     OPENING,
     REFERENCE,
     fill_measurement,
@@ -37,6 +38,9 @@ class StagedController:
 
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
     """
+
+    TOLD: ClassVar[tuple[str, ...]] = TOLD
+    """What ``command`` takes besides the signals."""
 
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
@@ -73,7 +77,7 @@ class StagedController:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         if lanes is None:
             self._lanes = 0
-        else:
+        elif self._lanes:
             for one, memory in zip(self._made, self._memories, strict=True):
                 memory[:, lanes] = one.fresh[:, None]
 
@@ -89,8 +93,8 @@ class StagedController:
 
         Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
         believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
-        the damping where the law has one to vary. Raises ``ValueError`` for signals over different numbers of lanes, and for
-        setpoints that the law cannot render.
+        the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``TOLD``, for signals over different
+        numbers of lanes, and for setpoints that the law cannot render.
         """
         if measurement.position.ndim == 1:
             given = (feedforward_force, feedforward_rate, damping_factor)
@@ -99,13 +103,15 @@ class StagedController:
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         if self._loop is None:
-            self._seen, self._told = np.zeros((ASKED + REFERENCES, lanes)), np.zeros((5, lanes))
+            self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))
-            placed = [(self._seen, 0), (self._told, FEEDFORWARD), (self._openings, OPENING), *self.more_rows(lanes)]
+            unchanged = self._seen.view()
+            unchanged.flags.writeable = False
+            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._told[:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor, self.TOLD)
         fill_measurement(self._seen, measurement)
-        self._seen[REFERENCE:ASKED] = self._seen[ASKED:] = reference.rows
+        self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
         if self._loop.run():
             self.explain(measurement, reference)
         return self._openings.copy()

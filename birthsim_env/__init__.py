@@ -1,7 +1,7 @@
 """BirthSIM: a pneumatic haptic interface as Gymnasium environments.
 
-Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v1``, ``Descent-v1``, ``Forceps-v1`` and ``Dystocia-v1``, and
-their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
+Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v1``, ``Descent-v1``, ``Forceps-v1``, ``Dystocia-v1`` and
+``Vacuum-v0``, and their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 """
 
 from gymnasium.envs.registration import register, registry
@@ -9,7 +9,7 @@ from gymnasium.envs.registration import register, registry
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -40,6 +40,6 @@ _KINDS = {
 }
 for _scenario in SCENARIOS:
     for _kind, (_single, _vector) in _KINDS.items():
-        _id = f"BirthSIM/{_scenario.capitalize()}{_kind}-v1"
+        _id = environment_id(_scenario, _kind)
         if _id not in registry:
             register(_id, entry_point=_single, vector_entry_point=_vector, kwargs={"scenario": _scenario})

@@ -17,11 +17,10 @@ from birthsim_env.loop.loop import available_threads
 from birthsim_env.loop.rows import MOST_ACTIONS, MOST_SHOWN
 from birthsim_env.parts.actuation import ACTUATIONS, VALVE_LAYOUTS, Actuation
 from birthsim_env.parts.courses import check_drawn
-from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ranges
-from birthsim_env.parts.own_parts import hand_of, trajectory_of
+from birthsim_env.parts.drawn.randomization import RANDOMIZE, checked_ranges, ranges_of
+from birthsim_env.parts.own_parts import hand_of, stiffness_of, trajectory_of
 from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import is_within, shown
 from birthsim_env.simulation import Simulation
@@ -46,15 +45,6 @@ def one_of(name: str, value: Any, allowed: tuple[Any, ...]) -> Any:
     """``value`` if it is allowed, else a ``ValueError`` that lists what is."""
     if not any(value is option or (isinstance(value, str) and value == option) for option in allowed):
         raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(repr(option) for option in allowed)}")
-    return value
-
-
-def instance_of(name: str, value: Any, kind: type, default: Any) -> Any:
-    """``value`` if it is of ``kind``, ``default`` if it is None."""
-    if value is None:
-        return default
-    if not isinstance(value, kind):
-        raise ValueError(f"{name} = {shown(value)}; allowed: None or a {kind.__module__}.{kind.__name__}")
     return value
 
 
@@ -104,7 +94,7 @@ def assemble(
     randomize: Randomize = False,
     reference: Any = None,
     user_force: Any = None,
-    stiffness: StiffnessSchedule | None = None,
+    stiffness: Any = None,
     parameters: Parameters | str | Path | None = None,
     policy_period: float = 0.01,
     duration: float | None = None,
@@ -129,9 +119,12 @@ def assemble(
     if isinstance(randomize, Mapping):
         ranges, varied = checked_ranges(randomize, rig, sensors), False
     else:
-        one_of("randomize", randomize, (False, True, "plant", "scenario"))
-        ranges = checked_ranges(documented_ranges(rig, sensors), rig, sensors) if randomize in (True, "plant") else {}
-        varied = randomize in (True, "scenario")
+        one_of("randomize", randomize, RANDOMIZE)
+        ranges = checked_ranges(ranges_of(rig, randomize, sensors), rig, sensors)
+        varied = randomize in (True, "scenario", "sensors")
+        if randomize == "sensors" and not drawn_by(sensors):
+            able = ", ".join(repr(name) for name in SENSORS if drawn_by(name))
+            raise ValueError(f"randomize = 'sensors' with sensors = {sensors!r}; allowed: with sensors = {able}")
     default_reference, default_force, default_stiffness = (table.varied if varied else table.nominal)()
     if duration is not None and not is_within(duration, above=0.0, most=LONGEST):
         raise ValueError(f"duration = {shown(duration)}; allowed: None or a positive number, at most {LONGEST:g} (s)")
@@ -143,7 +136,7 @@ def assemble(
         ranges,
         trajectory,
         default_force if user_force is None else hand_of(user_force, varied),
-        instance_of("stiffness", stiffness, StiffnessSchedule, default_stiffness),
+        default_stiffness if stiffness is None else stiffness_of(stiffness),
         sensors,
         chosen,
         policy_periods(policy_period, rig),

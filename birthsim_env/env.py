@@ -36,6 +36,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     | `BirthSIM/Descent-v1` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
     | `BirthSIM/Forceps-v1` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
     | `BirthSIM/Dystocia-v1` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
+    | `BirthSIM/Vacuum-v0` | the head comes 40 mm, vacuum tractions of 176, 225 and 241 N | 24 |
 
     ## Action space
     `Box(-1, 1, (n,), float32)`, held for one policy period (10 ms):
@@ -89,14 +90,15 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
       (`birthsim_env.physics.electronics`).
     - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
-      (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; a mapping such as
-      `{"mechanics.mass": (2, 5)}` draws just these parameters.
+      (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; `"sensors"` varies the
+      experiment and draws the figures of `honest` sensors alone; a mapping such as `{"mechanics.mass": (2, 5)}` draws just
+      these parameters.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
     - `user_force`: likewise: a `UserForce`, a function of time, or of time, position and velocity, that returns (Fx, Fy) in
       N, a CSV file of time, Fx, Fy, or `"file.py:Name"`; or a hand that comes with the package: `"steps"`, and the moving
       ones `"sine"`, `"noise"` and `"guided"`, which holds the end effector and has mass, damper and spring.
-    - `stiffness`: a `StiffnessSchedule` of your own.
+    - `stiffness`: a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which `reference` takes too.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
     - `num_threads`: that share the lanes of a vector environment, the same bits with any number; default: one in a single

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from birthsim_env.assembly import one_of
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 FILE = Path(__file__).with_name("scores.json")
 
@@ -41,17 +40,17 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     """What is known of an environment: role (``ROLES``) -> its ``controller``, mean ``return`` of an episode, undiscounted,
     ``error`` (mm, median over episodes of the settled error; None where most are lost), fractions ``lost`` and ``success``.
 
+    An environment for which no policy comes with the package, ``Vacuum-v0``, has no "best learned policy".
     Of the id with its default arguments apart from ``sensors`` and ``randomize`` (rig and scenario together, or neither); an
     environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no scores.
     """
-    names = {scenario.capitalize(): scenario for scenario in SCENARIOS}
-    found = re.fullmatch(r"BirthSIM/([A-Za-z]+?)(?:Residual)?-v1", environment) if isinstance(environment, str) else None
-    if found is None or found.group(1) not in names:
-        allowed = ", ".join(f"BirthSIM/{name}-v1" for name in names)
+    names = {environment_id(scenario, kind): scenario for scenario in SCENARIOS for kind in ("", "Residual")}
+    if not isinstance(environment, str) or environment not in names:
+        allowed = ", ".join(environment_id(scenario) for scenario in SCENARIOS)
         raise ValueError(f"environment = {environment!r}; allowed: {allowed}, and their siblings with a law inside")
     one_of("sensors", sensors, SENSORS)
     one_of("randomize", randomize, tuple(RIGS))
-    return _scores()[found.group(1)][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
+    return _scores()[names[environment].capitalize()][sensors][RIGS[randomize]]  # type: ignore[no-any-return]
 
 
 def normalized_score(

@@ -43,7 +43,7 @@ from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import end_effector_motion, inverse_geometry
+from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -174,7 +174,7 @@ class Simulation:
             begin(self.sensors, block, streams["sensors"])
         self.actuation.begin(lanes)
         self._tick[:, lanes], self._seen[TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
-        self.impacts[:, lanes], self._openings[:, lanes], self.plant.inner_commands[:, lanes] = 0.0, 0.0, 0.0
+        self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
         rows = checked_start(
             self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters, self.nominal
         )  # fmt: skip
@@ -190,7 +190,8 @@ class Simulation:
         pistons_at(np.concatenate([start, speed]), self.nominal, joints)
         own = self.plant.lane_parameters.take(chosen, axis=1)
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
-        end_effector_motion(self.plant.state, self.plant.lane_parameters, self._motion)
+        self.plant.begin(chosen)
+        self._motion[:] = self.plant.end_effector()
         self._assemble()
         self._samples = self._samples[:0]
         self._run(self._look, 1)

@@ -16,6 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 import birthsim_env
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = {"Stable-Baselines3": "sb3_ppo.py", "CleanRL": "cleanrl_ppo.py"}
@@ -40,7 +41,7 @@ def run(job):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--env", nargs="+", default=[f"BirthSIM/{s.capitalize()}-v1" for s in birthsim_env.SCENARIOS])
+    parser.add_argument("--env", nargs="+", default=[environment_id(name) for name in SCENARIOS])
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)

@@ -68,8 +68,8 @@ def main() -> None:
     parser.add_argument(
         "--randomize",
         choices=tuple(RANDOMIZE),
-        help="what differs between episodes: the plant, the scenario, both (default) or nothing; with --all the default is "
-        "first the scenario and then both",
+        help="what differs between episodes: the plant, the scenario, both (default) or nothing; sensors: the scenario and the "
+        "figures of honest sensors; with --all the default is the scenario, then both, then sensors where they are honest",
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)

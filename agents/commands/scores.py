@@ -15,7 +15,7 @@ from baselines.bench.comparison import ENVIRONMENTS, default_controllers
 from baselines.bench.evaluation import DISCOUNTS, evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import number, penalize_lost, summarize
-from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, whole_up_to
+from baselines.commands.shared import EPISODES, JOBS, add_processes, policy_of, run, seed_number, whole_up_to
 from baselines.registry import UNCONTROLLED, make_controller
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, code_stamp, run_tasks
@@ -61,7 +61,7 @@ def _scores(arguments: argparse.Namespace) -> None:
     for where in conditions:
         name, sensors, rig = where
         rows = {controller: done[task.name] for (place, controller), task in tasks.items() if place == where}
-        short = name.removeprefix("BirthSIM/").removesuffix("-v1")
+        short = name.removeprefix("BirthSIM/").rpartition("-v")[0]
         known = _roles(rows)
         scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
         lines.append(f"## {short}, {sensors} sensors, {RIGS[rig]} rig\n\n{_table(rows, known)}")
@@ -84,9 +84,8 @@ def _contestants(environment: str) -> Iterable[tuple[str, str]]:
     """Names and policy folders ("" for a law) of whatever is measured in an environment."""
     for law in (*UNCONTROLLED, *default_controllers()):
         yield law, ""
-    short = environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
     for name in shipped_names():
-        if name.partition("_")[0] == short:
+        if name.partition("_")[0] == policy_of(environment):
             for folder in policy_folders(name):
                 yield f"{name} {folder.name}", f"{name}/{folder.name}"
 
@@ -122,20 +121,23 @@ def score_cell(
 
 
 def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
-    """Who plays which of ``ROLES``: the best are chosen by one half of the episodes, all are measured by the other."""
+    """Who plays which of ``ROLES``: the best are chosen by one half of the episodes, all are measured by the other.
+
+    Without policies there is no best one.
+    """
 
     def best(names: Iterable[str]) -> str:
         return max(names, key=lambda name: float(rows[name]["halves"][0]))
 
     laws = default_controllers()
     learned = [name for name in rows if name not in laws and name not in UNCONTROLLED]
-    chosen = ("shut-valves", "random-valves", "backstepping", best(laws), best(learned))
+    chosen = ("shut-valves", "random-valves", "backstepping", best(laws), *([best(learned)] if learned else []))
     return {
         role: {
             "controller": name, "return": rows[name]["halves"][1],
             **{key: rows[name][key] for key in ("error", "lost", "success")},
         }
-        for role, name in zip(ROLES, chosen, strict=True)
+        for role, name in zip(ROLES, chosen, strict=False)
     }  # fmt: skip
 
 

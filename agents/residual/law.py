@@ -254,12 +254,12 @@ class ResidualLaw(StagedController):
     @property
     def asked(self) -> Reference:
         """What the law inside was asked for in the last ``command``."""
-        return Reference(self._seen[ASKED:FEEDFORWARD].copy())
+        return Reference(self._asked[:REFERENCES].copy())
 
     @property
     def told(self) -> Array:
         """What it was told besides: forces along the cylinders, N, their rates, N/s, and a damping factor; (5, N)."""
-        return self._told.copy()
+        return self._asked[REFERENCES:].copy()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         return [(self.action, ACTION), (self.shown, SHOWN)]

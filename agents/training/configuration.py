@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from agents.residual.settings import ResidualSettings
 from birthsim_env.assembly import one_of
+from birthsim_env.parts.drawn.randomization import RANDOMIZE
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, shown
@@ -62,7 +63,7 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         for name, allowed in (
-            ("algorithm", ALGORITHMS), ("sensors", tuple(SENSORS)), ("randomize", (False, True, "plant", "scenario")),
+            ("algorithm", ALGORITHMS), ("sensors", tuple(SENSORS)), ("randomize", RANDOMIZE),
         ):  # fmt: skip
             one_of(name, getattr(self, name), allowed)
         if not isinstance(self.environment, str):

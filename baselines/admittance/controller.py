@@ -20,6 +20,7 @@ from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_gains, require_stiffness
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.estimation.observers import FRESH, memory_rows
+from baselines.estimation.stages import compliant_motion
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
@@ -99,7 +100,7 @@ class AdmittanceBackstepping(StagedController):
     @property
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
-        return self._memories[0][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
+        return self._memories[-1][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
@@ -110,14 +111,15 @@ class AdmittanceBackstepping(StagedController):
         period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else at.MEASURED_ROWS
         cells = exact.number("exp", -(g["pressure_bandwidth"] if sampled else math.inf) * period)
         constants = {
-            **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
+            **{"sampled": sampled, "rows": rows, "period": period},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
             **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_FRACTION, **g},
         }
         fresh = np.zeros(at.PISTONS + rows)
-        fresh[[at.ADMITTANCE + 4, at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0
+        fresh[[at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0
         fresh[[at.LAW + row for row in admittance_law.GAIN_SHARES]] = 1.0
-        return [LawStage(at.control, np.array([*(constants[name] for name in at.CONSTANTS), *self._p]), fresh)]
+        law = LawStage(at.control, np.array([*(constants[name] for name in at.CONSTANTS), *self._p]), fresh)
+        return [compliant_motion(rig), law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose stiffness is not positive definite."""

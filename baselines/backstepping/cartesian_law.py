@@ -1,4 +1,4 @@
-"""Backstepping in Cartesian coordinates: a stiffness matrix rendered at any pose, as kernels over lanes.
+"""Backstepping in Cartesian coordinates: a stiffness matrix rendered at any pose, as a stage of the closed loop.
 
 The end effector is a point of mass m, so with J = (u1, u2) of (16) and L_i = F_i - Fext_i - friction_i along the pistons
     m a = P + m g,  P = J^-T L,   and a wanted jerk j asks for   L' = J'^T P + m J^T j.
@@ -13,17 +13,16 @@ friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever 
 
 from __future__ import annotations
 
-import numpy as np
-
 from baselines.backstepping.law import smooth_sign
-from baselines.estimation.admittance import square_root
+from baselines.estimation.admittance import is_stiffer, square_root
+from baselines.estimation.stages import JOINTS, OWN
 from baselines.valve_inverse import force_first_openings
-from birthsim_env.loop.signals import REFERENCES
+from birthsim_env.loop.rows import ASKED, FEEDFORWARD, OPENING, PRESSURE, SEEN, SHOWN, USER_FORCE
+from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.dynamics import load, store
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 
 
 @helper
@@ -114,14 +113,17 @@ def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, wid
         )
 
 
+PNEUMATIC_GAIN, SIGN_WIDTH, LEAST_STIFFNESS, RIG = range(4)
+"""Constants of the stage: c4, 1/s; width, m/s, of the smoothed sign; least stiffness setpoint, N/m. The rig follows."""
+
+
 @kernel
-def command(joints: Array, pressures: Array, reference: Array, p: Array, c4: float, width: float, openings: Array) -> None:
-    """Writes ``openings`` (4, N); arguments as in ``law``, with N lanes and one rig's parameters (PARAMETERS,)."""
-    x, air, r, u = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((REFERENCES, BLOCK)), np.empty((4, BLOCK))
-    for first in range(0, joints.shape[1], BLOCK):
-        n = min(BLOCK, joints.shape[1] - first)
-        load(joints, first, n, x)
-        load(pressures, first, n, air)
-        load(reference, first, n, r)
-        law(x, air, r, p, c4, width, u, n)
-        store(u, first, n, openings)
+def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """One control period of a block; returns how many stiffness setpoints are too soft."""
+    s, about, missed = block(seen, SEEN), numbers(constants, RIG + PARAMETERS), 0
+    target = s[ASKED:FEEDFORWARD]
+    for i in range(n):
+        missed += 0 if is_stiffer(target[8, i], target[9, i], target[14, i], about[LEAST_STIFFNESS]) else 1
+    joints, pressures, openings = s[JOINTS:OWN], s[PRESSURE:USER_FORCE], s[OPENING:SHOWN]
+    law(joints, pressures, target, about[RIG:], about[PNEUMATIC_GAIN], about[SIGN_WIDTH], openings, n)
+    return missed

@@ -12,7 +12,8 @@ from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
 from baselines.controller import feedforward_rows, lanes_of
-from baselines.estimation.observers import BANDWIDTH, FRESH, PistonObserver, measured_joints, memory_rows, observe
+from baselines.estimation.observers import PistonObserver, measured_joints
+from baselines.estimation.stages import JOINTS, OWN, pistons
 from baselines.impedance import Impedance
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import (
@@ -20,22 +21,17 @@ from birthsim_env.loop.rows import (
     ASKED,
     FEEDFORWARD,
     OPENING,
-    POSITION,
-    POSITION_TIME,
     PRESSURE,
     SEEN,
     SHOWN,
-    TIME,
     USER_FORCE,
-    VELOCITY,
 )
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.loop.stage import block, numbers, scratch
+from birthsim_env.loop.stage import block, numbers
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
 
@@ -67,27 +63,11 @@ class LawTerms:
 
 @kernel
 def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: rows of the observer's memory, or 0 where speeds are measured; control period, s; bandwidth, 1/s, and position
-    noise, m; options of the law; the rig."""
-    s, about = block(seen, SEEN), numbers(constants, 4 + backstepping_law.OPTIONS + PARAMETERS)
-    options, p = about[4 : 4 + backstepping_law.OPTIONS], about[4 + backstepping_law.OPTIONS :]
-    joints, rows = scratch(4), int(about[0])
-    if rows > 0:
-        nothing = scratch(3)
-        for i in range(n):
-            nothing[0, i], nothing[1, i], nothing[2, i] = 0.0, 0.0, 1.0
-        m = block(memory, rows)
-        observe(
-            m[:, :n], s[TIME, :n], s[POSITION:VELOCITY, :n], s[POSITION_TIME, :n], s[VELOCITY:POSITION_TIME, :n],
-            s[PRESSURE:USER_FORCE, :n], p, about[1], about[2], about[3], nothing[:2, :n], nothing[:2, :n], nothing[2, :n],
-        )  # fmt: skip
-        for row in range(4):
-            for i in range(n):
-                joints[row, i] = m[row, i]
-    else:
-        piston_motion(s[POSITION:POSITION_TIME], p, joints, n)
+    """Constants: options of the law; the rig."""
+    s, about = block(seen, SEEN), numbers(constants, backstepping_law.OPTIONS + PARAMETERS)
+    options, p = about[: backstepping_law.OPTIONS], about[backstepping_law.OPTIONS :]
     return backstepping_law.command(
-        joints[:, :n], s[PRESSURE:USER_FORCE, :n], s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], p, options,
+        s[JOINTS:OWN, :n], s[PRESSURE:USER_FORCE, :n], s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], p, options,
         s[OPENING:SHOWN, :n],
     )  # fmt: skip
 
@@ -162,11 +142,8 @@ class BacksteppingController(StagedController):
         return paper_impedance(reference, self.parameters, self.damping_ratio)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        board, rows = self.parameters.electronics, memory_rows(self.parameters) if sampled else 0
-        numbers = (rows, board.control_period, BANDWIDTH, board.position_noise)
-        fresh = np.zeros(rows)
-        fresh[FRESH : FRESH + 1] = 1.0
-        return [LawStage(_stage, np.array([*numbers, *self._options, *self._p]), fresh)]
+        law = LawStage(_stage, np.array([*self._options, *self._p]), np.zeros(0))
+        return [pistons(self.parameters, sampled, informed=False), law]
 
     def reset(self, lanes: Mask | None = None) -> None:
         super().reset(lanes)

@@ -20,14 +20,16 @@ from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from baselines.work.tasks import Result, Task
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 
-ENVIRONMENTS = tuple(f"BirthSIM/{scenario.capitalize()}-v1" for scenario in SCENARIOS)
+ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")
 """Sensor models of the bench's tables where none is named."""
-PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True}
-"""Plant -> the environments' argument ``randomize``."""
+PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True, "drawn-sensors": "sensors"}
+"""Plant -> the environments' argument ``randomize``. The law believes the rig as described: what is ``randomised`` differs from
+that in rig and sensors, ``drawn-sensors`` in the figures of its sensors alone, where the sensor model can draw them."""
 
 MOVING = ("sine", "noise", "guided")
 """Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
@@ -50,12 +52,19 @@ class Conditions:
     hand: str = ""
 
     def __str__(self) -> str:
-        return f"{self.short}, {self.sensors} sensors, {self.plant} plant{f', moving hand: {self.hand}' if self.hand else ''}"
+        return f"{self.short}, {known(self.sensors, self.plant)}{f', moving hand: {self.hand}' if self.hand else ''}"
 
     @property
     def short(self) -> str:
         """The environment without prefix and version."""
         return re.sub(r"^BirthSIM/|-v\d+$", "", self.environment)
+
+
+def known(sensors: str, plant: str) -> str:
+    """Sensor model and plant in words: ``honest sensors, nominal plant``."""
+    return (
+        f"{sensors} sensors, figures drawn, nominal plant" if plant == "drawn-sensors" else f"{sensors} sensors, {plant} plant"
+    )
 
 
 @dataclass(frozen=True)
@@ -86,8 +95,11 @@ def default_controllers() -> list[str]:
 def all_conditions(
     environments: Sequence[str] = ENVIRONMENTS, sensors: Sequence[str] = COMPARED, plants: Sequence[str] = tuple(PLANTS)
 ) -> list[Conditions]:
-    """Every combination, and the moving hands on rigs drawn at random where the circle is among them."""
-    own = [Conditions(*chosen) for chosen in product(environments, sensors, plants)]
+    """Every combination that there is, and the moving hands on rigs drawn at random where the circle is among them."""
+    own = [
+        Conditions(*chosen) for chosen in product(environments, sensors, plants)
+        if chosen[2] != "drawn-sensors" or drawn_by(chosen[1])
+    ]  # fmt: skip
     where = [name for name in environments if name == ENVIRONMENTS[0]]
     moving = product(where, sensors, [name for name in plants if name == "randomised"], MOVING)
     return [*own, *(Conditions(*chosen) for chosen in moving)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.bench.comparison import METRICS, REFERENCE
+from baselines.bench.comparison import METRICS, REFERENCE, known
 from baselines.bench.statistics import number
 
 Figures = Sequence[dict[str, Any]]
@@ -109,7 +109,7 @@ def full(figures: Figures) -> str:
         for cell in here:
             rows.append(["lost episodes", cell["controller"], f"{cell['lost']} of {cell['episodes']}", "", "", ""])
         hand = f", moving hand: {where[3]}" if where[3] else ""
-        sections.append("## {}, {} sensors, {} plant".format(*where) + f"{hand}\n\n{markdown(rows)}")
+        sections.append(f"## {where[0]}, {known(*where[1:3])}{hand}\n\n{markdown(rows)}")
     return "\n\n".join(sections)
 
 

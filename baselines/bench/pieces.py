@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate, merged
-from baselines.registry import SLOW, make_controller, split_options
+from baselines.registry import SLOW, bare_name, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -33,7 +33,7 @@ def controller_settings(name: str, rig: Parameters) -> dict[str, Any]:
     Raises ``ValueError`` for a name that is no controller.
     """
     make_controller(name, rig)
-    return {"controller": name, "source": file_hash(split_options(name)[0]), "rig": rig.to_dict()}
+    return {"controller": name, "source": file_hash(bare_name(name)), "rig": rig.to_dict()}
 
 
 def file_stem(name: str) -> str:
@@ -51,7 +51,7 @@ def evaluation_tasks(
     ``world`` holds the environment's arguments as JSON takes them, the rig only where it is not as believed;
     ``work`` is ``evaluate_piece`` or what calls it.
     """
-    every = SLOW_EPISODES if split_options(settings["controller"])[0] in SLOW else EPISODES
+    every = SLOW_EPISODES if bare_name(settings["controller"]) in SLOW else EPISODES
     hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
     return [
         Task(

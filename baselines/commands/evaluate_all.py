@@ -14,13 +14,13 @@ from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
 from baselines.commands.parts import with_options
 from baselines.commands.shared import JOBS, shown_arguments
-from baselines.registry import CONTROLLERS, SLOW, split_options
+from baselines.registry import CONTROLLERS, SLOW, bare_name
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, code_stamp, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
-NARROWED = {"scenario": "nominal", "all": "randomised"}
+NARROWED = {"scenario": "nominal", "all": "randomised", "sensors": "drawn-sensors"}
 """The option --randomize -> the one plant that is then compared."""
 
 
@@ -30,7 +30,7 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
     names = with_options(names, arguments.set)
     for name in names:
-        plain = split_options(name)[0]
+        plain = bare_name(name)
         if plain not in CONTROLLERS and not plain.rpartition(":")[0].endswith(".py"):
             raise ValueError(f"--controller {name!r} with --all; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
     settings = [controller_settings(name, rig) for name in names]
@@ -40,7 +40,7 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
         (own["controller"], where): cell_task(own, where, arguments.episodes, arguments.seed)
         for own in settings for where in conditions
     }  # fmt: skip
-    quick = [own for own in settings if split_options(own["controller"])[0] not in SLOW]
+    quick = [own for own in settings if bare_name(own["controller"]) not in SLOW]
     studies = {} if arguments.no_studies else study_tasks(quick, rig)
     print(f"randomised plant: {described(rig, True)}")
     done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison", arguments.cluster)
@@ -69,7 +69,10 @@ def _conditions(arguments: argparse.Namespace) -> list[Conditions]:
         if arguments.randomize not in NARROWED:
             raise ValueError(f"--randomize {arguments.randomize!r} with --all; allowed: {', '.join(NARROWED)}")
         narrowed["plants"] = (NARROWED[arguments.randomize],)
-    return all_conditions(**narrowed)
+    conditions = all_conditions(**narrowed)
+    if not conditions:
+        raise ValueError("--randomize 'sensors' with --all; allowed: with --sensors honest, whose figures can be drawn")
+    return conditions
 
 
 def _write(

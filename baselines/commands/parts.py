@@ -11,12 +11,18 @@ from birthsim_env.parts.hands.moving_hands import HANDS
 
 
 def add_parts(parser: argparse.ArgumentParser) -> None:
-    """Add ``--reference`` and ``--user-force``."""
+    """Add ``--reference``, ``--stiffness`` and ``--user-force``."""
     parser.add_argument(
         "--reference",
         metavar="PART",
         help="your own instead of the environment's: a CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a "
         "birthsim_env.Trajectory or of a function of time that returns (x, y)",
+    )
+    parser.add_argument(
+        "--stiffness",
+        metavar="FILE",
+        help="setpoints of your own instead of the environment's: a CSV file of time, x, y, stiffness (s, m, m, N/m); "
+        "--reference takes the same file",
     )
     parser.add_argument(
         "--user-force",
@@ -28,7 +34,7 @@ def add_parts(parser: argparse.ArgumentParser) -> None:
 
 def environment_parts(arguments: argparse.Namespace) -> dict[str, Any]:
     """The environments' arguments that ``add_parts`` reads, as far as they are given."""
-    parts = {"reference": arguments.reference, "user_force": arguments.user_force}
+    parts = {"reference": arguments.reference, "stiffness": arguments.stiffness, "user_force": arguments.user_force}
     return {name: part for name, part in parts.items() if part is not None}
 
 

@@ -15,7 +15,7 @@ import gymnasium
 from baselines.commands.start import endings
 from birthsim_env.physics.rig.values import shown
 
-RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "all": True}
+RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
 
 
@@ -163,5 +163,6 @@ def check_world(environment: str, **arguments: Any) -> None:
 
 
 def policy_of(environment: str) -> str:
-    """Name of the policy that comes with the package for an environment id: ``BirthSIM/Forceps-v1`` -> ``forceps``."""
-    return environment.removeprefix("BirthSIM/").removesuffix("-v1").lower()
+    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v1`` ->
+    ``forceps``."""
+    return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()

@@ -22,6 +22,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""
 
+MOVING_SPEED = 1e-3
+"""m/s; assumed: a slower reference lets the pistons rest."""
+
 
 @helper
 def square_root(xx: float, yy: float, xy: float) -> tuple[float, float, float]:
@@ -36,6 +39,12 @@ def damping(kxx: float, kyy: float, kxy: float, ratio: float) -> tuple[float, fl
     """B/m, 1/s, of the spring K/m (1/s2): entries xx, yy, xy."""
     bxx, byy, bxy = square_root(kxx, kyy, kxy)
     return 2.0 * ratio * bxx, 2.0 * ratio * byy, 2.0 * ratio * bxy
+
+
+@helper
+def is_stiffer(kxx: float, kyy: float, kxy: float, least: float) -> bool:
+    """Whether the stiffness [[kxx, kxy], [kxy, kyy]] is more than ``least`` in every direction, N/m."""
+    return kxx > least and (kxx - least) * (kyy - least) - kxy * kxy > 0.0
 
 
 @helper
@@ -67,22 +76,26 @@ def advance(
 
 @kernel
 def give_way(
-    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, fresh: Array,
-    motion: Array,
+    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, motion: Array
 ) -> None:  # fmt: skip
-    """``offset`` (4, N): xr - xt and its rate, carried on by one period where ``fresh`` (N,) is 0; ``factor`` (N,) of the
+    """``offset`` (4, N): xr - xt and its rate, zero at a new start, carried on by one period; ``factor`` (N,) of the
     damping, at least 1. ``motion`` (8, N)."""
     for i in range(offset.shape[1]):
         kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
         bxx, byy, bxy = damping(kxx, kyy, kxy, ratio * max(1.0, factor[i]))
-        if fresh[i] > 0.0:
-            offset[0, i], offset[1, i], offset[2, i], offset[3, i] = 0.0, 0.0, 0.0, 0.0
         ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
         motion[0, i], motion[1, i] = reference[0, i] + offset[0, i], reference[1, i] + offset[1, i]
         motion[2, i], motion[3, i] = reference[2, i] + offset[2, i], reference[3, i] + offset[3, i]
         motion[4, i], motion[5, i] = reference[4, i] + ax, reference[5, i] + ay
         motion[6, i], motion[7, i] = reference[6, i] + jx, reference[7, i] + jy
         advance(offset, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+
+
+@kernel
+def mark_moving(motion: Array, moving: Array) -> None:
+    """``moving`` (N,) gets 1 where the velocity of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0."""
+    for i in range(motion.shape[1]):
+        moving[i] = 1.0 if motion[2, i] * motion[2, i] + motion[3, i] * motion[3, i] > MOVING_SPEED * MOVING_SPEED else 0.0
 
 
 @kernel
@@ -131,7 +144,7 @@ class Admittance:
         if lanes is None:
             self._offset = np.empty((4, 0))
         elif self._offset.shape[1]:
-            self._fresh[lanes] = 1.0
+            self._offset[:, lanes] = 0.0
 
     def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
         """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
@@ -142,10 +155,9 @@ class Admittance:
         require_stiffness(reference, 0.0)
         lanes = reference.rows.shape[1]
         if self._offset.shape[1] != lanes:
-            self._offset, self._fresh = np.zeros((4, lanes)), np.zeros(lanes)
+            self._offset = np.zeros((4, lanes))
         motion, factor = np.empty((8, lanes)), feedforward_rows(lanes, None, None, damping_factor)[4]
-        give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, self._fresh, motion)
-        self._fresh[:] = 0.0
+        give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, motion)
         return motion
 
     def forecast(self, reference: Reference, force: Array, ticks: NDArray[np.int64]) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.controller import lanes_of
-from baselines.estimation.admittance import Admittance
+from baselines.estimation.admittance import Admittance, mark_moving
 from baselines.estimation.chamber_observer import ChamberObserver
 from baselines.estimation.disturbance_observer import DisturbanceObserver
 from baselines.estimation.observers import PistonObserver
@@ -26,10 +26,6 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
-
-MOVING_SPEED = 1e-3
-"""m/s; assumed: a slower reference lets the pistons rest."""
-
 
 BELIEVED_LIMIT = 120.0
 """N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
@@ -66,12 +62,6 @@ class Estimate:
     disturbance_force: Array
     moving: Array
     rest: Array
-
-
-def is_moving(motion: Array) -> Array:
-    """1 where a motion's velocity, rows 2 and 3 of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0; (N,)."""
-    square = motion[2] * motion[2] + motion[3] * motion[3]
-    return np.asarray(square > MOVING_SPEED * MOVING_SPEED, dtype=np.float64)
 
 
 class StateEstimator:
@@ -111,7 +101,8 @@ class StateEstimator:
         measurement = replace(measurement, pressures=pressures)
         force = np.ascontiguousarray(measurement.user_force)
         believed = -self._friction_fraction * self._friction.update(motion)
-        moving = is_moving(motion)
+        moving = np.empty(lanes)
+        mark_moving(motion, moving)
         pistons = self._pistons
         if isinstance(pistons, PistonObserver):
             self._joints, rest = np.ascontiguousarray(pistons.update(measurement, force, believed, moving)), pistons.rest

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot as plt
 
+from baselines.bench.comparison import known
 from baselines.bench.comparison_tables import CIRCLE, Figures, controllers_of
 from baselines.figures.runs import DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
 
@@ -20,6 +21,7 @@ CONDITIONS = {
     ("lab", "randomised"): {"marker": "^", "color": MIDDLE, "mfc": "white"},
     ("honest", "nominal"): {"marker": "s", "color": MIDDLE, "mfc": MIDDLE},
     ("honest", "randomised"): {"marker": "s", "color": MIDDLE, "mfc": "white"},
+    ("honest", "drawn-sensors"): {"marker": "D", "color": DARK, "mfc": "white"},
 }
 """Sensors and plant -> how they look."""
 
@@ -49,7 +51,7 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
             row = names.index(cell["controller"]) + 0.17 * (list(CONDITIONS).index(key) - 1.5)
             if np.isfinite(found["median"]):
                 axes.hlines(row, found["low"], min(found["high"], high), color=style["color"], lw=0.9)
-                shown["{} sensors, {} plant".format(*key)] = axes.plot(found["median"], row, ls="", ms=4, **style)[0]
+                shown[known(*key)] = axes.plot(found["median"], row, ls="", ms=4, **style)[0]
             elif np.isinf(found["median"]):
                 axes.text(high / 1.05, row, "lost", ha="right", va="center", fontsize=6, color=style["color"])
         axes.set(xscale="log", xlim=(low, high), title=re.sub(r"^BirthSIM/|-v\d+$", "", environment))
@@ -107,6 +109,6 @@ def air_figure(figures: Figures, folder: Path) -> list[Path]:
         log_ticks(axes.xaxis)
     panels[0, 0].set_ylabel("air used (normal l/min)")
     short = re.sub(r"^BirthSIM/|-v\d+$", "", environment)
-    figure.suptitle(f"{short}, {plant} plant: medians with 95 % intervals", fontsize=9.5)
+    figure.suptitle(f"{short}, {plant.replace('drawn-sensors', 'nominal')} plant: medians with 95 % intervals", fontsize=9.5)
     legend_below(figure, list(handles.values()), [label_of(name) for name in handles])
     return save(figure, folder, "air_against_error")

@@ -11,19 +11,27 @@ import math
 
 import numpy as np
 
+from baselines.estimation.stages import MOTION, MOVING, OWN
+from baselines.staged import LawStage
+from birthsim_env.loop.rows import REFERENCE, SEEN, USER_FORCE
+from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.dynamics import load, store
-from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, parameter_column
+from birthsim_env.physics.inverse_kinematics import piston_reference
+from birthsim_env.physics.rig.parameters import Parameters
 
 SIGN_WIDTH = 0.01
 """m/s; assumed: over this REFERENCE speed the Coulomb feedforward goes from rest to sliding, slowly enough for the valves."""
 
+WANTED = OWN
+"""Where the pistons should be: y1, y2 (m) and three derivatives."""
+NEEDED = WANTED + 8
 FORCE1, FORCE2, RATE1, RATE2, KAPPA = range(5)
-NEEDED = 5
-"""Rows of what the motion needs: F* (N) and dF*/dt (N/s) of cylinders 1 and 2, and kappa, all at the reference pose."""
+"""What the motion needs, in rows from ``NEEDED`` on: F* (N) and dF*/dt (N/s) of cylinders 1 and 2, and kappa, all at the
+reference pose."""
+END = NEEDED + 5
 
 
 @helper
@@ -37,7 +45,7 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 @helper
 def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, fraction: float, needed: Array, n: int) -> None:
-    """Writes ``needed`` (NEEDED, n) for the motion (8, n), its pistons ``wanted`` (8, n) and the user's force (2, n)."""
+    """Writes ``needed`` (5, n) for the motion (8, n), its pistons ``wanted`` (8, n) and the user's force (2, n)."""
     for i in range(n):
         v1, v2 = wanted[2, i], wanted[3, i]
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
@@ -60,35 +68,19 @@ def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, fraction
         needed[KAPPA, i] = kappa
 
 
-@kernel
-def prepare(
-    seen: Array,
-    sampled: bool,
-    motion: Array,
-    force: Array,
-    p: Array,
-    fraction: float,
-    joints: Array,
-    wanted: Array,
-    needed: Array,
-) -> None:
-    """Writes the pistons' ``joints`` (4, N): y1, y2, v1, v2, their reference ``wanted`` (8, N), and ``needed`` (NEEDED, N).
+FRACTION, RIG = 0, 1
+"""Constants of the stage: how much of the Coulomb friction is fed forward. The rig follows."""
 
-    ``seen`` (4, N) holds the joints themselves where ``sampled`` (an observer's estimate), else the end effector: x, y, vx, vy.
-    """
-    x, y, r = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((8, BLOCK))
-    f, w, d = np.empty((2, BLOCK)), np.empty((8, BLOCK)), np.empty((NEEDED, BLOCK))
-    for first in range(0, seen.shape[1], BLOCK):
-        n = min(BLOCK, seen.shape[1] - first)
-        load(seen, first, n, x)
-        load(motion, first, n, r)
-        load(force, first, n, f)
-        if sampled:
-            y[:] = x
-        else:
-            piston_motion(x, p, y, n)
-        piston_reference(r, p, w, n)
-        needed_forces(w, r, f, p, fraction, d, n)
-        store(y, first, n, joints)
-        store(w, first, n, wanted)
-        store(d, first, n, needed)
+
+@kernel
+def _look_ahead(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s, about = block(seen, SEEN), numbers(constants, RIG + PARAMETERS)
+    p, motion, wanted = about[RIG:], s[MOTION:MOVING], s[WANTED:NEEDED]
+    piston_reference(motion, p, wanted, n)
+    needed_forces(wanted, motion, s[USER_FORCE:REFERENCE], p, about[FRACTION], s[NEEDED:END], n)
+    return 0
+
+
+def feedforward(rig: Parameters, fraction: float) -> LawStage:
+    """Finds ``WANTED`` and ``NEEDED`` of the motion, with a ``fraction`` of the Coulomb friction that is believed."""
+    return LawStage(_look_ahead, np.array([fraction, *parameter_column(rig)]), np.zeros(0))

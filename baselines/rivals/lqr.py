@@ -15,19 +15,21 @@ second started from what the first had found:
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
+from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
 from baselines.valve_inverse import two_valve_openings
+from birthsim_env.loop.rows import SEEN
+from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 RATE_TOLERANCE = 1000.0
@@ -83,27 +85,31 @@ def scheduled(table: Array, row: int, place: float) -> float:
     return entry
 
 
-@kernel
-def command(
-    joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, table: Array,
-    lowest: float, step: float, zone: float, c4: float, integral: Array, fresh: Array, openings: Array,
-) -> None:  # fmt: skip
-    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on.
+PERIOD, LOWEST, STEP, ZONE, STIFFNESS_GAIN, TABLE = range(6)
+RIG = TABLE + 8 * SCHEDULE
+"""Constants of the stage: control period, s; dead zone, m; c4, 1/s; the table (8, SCHEDULE), with the gains of cylinder 1 over
+kappa = ``LOWEST`` + ``STEP`` j, and those of cylinder 2. The rig follows."""
 
-    ``table`` (8, SCHEDULE): the gains of cylinder 1 over kappa = ``lowest`` + ``step`` j, and those of cylinder 2.
-    """
+
+@kernel
+def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Carries the integrals, m s, on. The signals are those of ``tracking``."""
+    s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
+    (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
+    lowest, step, zone, c4 = about[LOWEST], about[STEP], about[ZONE], about[STIFFNESS_GAIN]
+    table = about[TABLE:RIG].reshape((8, SCHEDULE))
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
-        for i in range(joints.shape[1]):
+        for i in range(n):
             y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
             scale = needed[KAPPA, i] if cylinder == 0 else 1.0
             place = (needed[KAPPA, i] - lowest) / step
             k1, k2 = scheduled(table, gain, place), scheduled(table, gain + 1, place)
             k3, k4 = scheduled(table, gain + 2, place), scheduled(table, gain + 3, place)
             error, excess = y - wanted[cylinder, i], pp * ap - pn * an - needed[FORCE1 + cylinder, i]
-            summed = -k4 * excess / k1 if fresh[i] > 0.0 else integral[cylinder, i]
+            summed = held(m, cylinder, i, -k4 * excess / k1)
             wish = k1 * summed + k2 * error + k3 * (v - wanted[2 + cylinder, i]) + k4 * excess
             lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
             stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
@@ -111,7 +117,8 @@ def command(
             rate = needed[RATE1 + cylinder, i] - wish
             two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
             slope = beyond(error, zone / scale)
-            integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
+            carry_on(m, cylinder, i, summed, slope, about[PERIOD], openings)
+    return 0
 
 
 class LinearQuadratic(TrackingController):
@@ -122,7 +129,7 @@ class LinearQuadratic(TrackingController):
     friction_fraction; dead_zone.
     """
 
-    KERNEL = staticmethod(command)
+    LAW = staticmethod(control)
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
         "integral_tolerance": (1e-6, 1e-3),
         "position_tolerance": (3e-4, 1e-1),
@@ -150,11 +157,11 @@ class LinearQuadratic(TrackingController):
         },
     }
 
-    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
+    def _design(self, gains: dict[str, float]) -> list[float]:
         mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.TUNABLE)[:4]])
         low, high = kappa_range(self.parameters)
         grid = np.linspace(low, high, SCHEDULE)
         first = [regulator(mass, self.parameters.cylinder1.viscous_friction, kappa, tolerances) for kappa in grid]
         second = regulator(mass, self.parameters.cylinder2.viscous_friction, 1.0, tolerances)
         table = np.concatenate([np.array(first).T, np.repeat(second[:, None], SCHEDULE, axis=1)])
-        return table, low, float(grid[1] - grid[0]), gains["dead_zone"], PNEUMATIC_GAIN
+        return [low, float(grid[1] - grid[0]), gains["dead_zone"], PNEUMATIC_GAIN, *table.ravel()]

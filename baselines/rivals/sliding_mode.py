@@ -15,36 +15,41 @@ These commands found the gains (with ideal, then with lab) by the search that bi
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.tracking import LEAST_LENGTH, TrackingController, beyond, carried_on
+from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
 from baselines.valve_inverse import two_valve_openings
+from birthsim_env.loop.rows import SEEN
+from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import PARAMETERS
+
+PERIOD, SURFACE, REACHING, LAYER, ZONE, STIFFNESS_GAIN, RIG = range(7)
+"""Constants of the stage: control period, s; r, 1/s; h, m/s3; b, 1/s; dead zone, m; c4, 1/s. The rig follows."""
 
 
 @kernel
-def command(
-    joints: Array, wanted: Array, needed: Array, pressures: Array, target: Array, p: Array, period: float, r: float,
-    reaching: float, inside: float, zone: float, c4: float, integral: Array, fresh: Array, openings: Array,
-) -> None:  # fmt: skip
-    """Writes ``openings`` (4, N) and carries ``integral`` (2, N), m s, on. The signals are those of ``TrackingController``."""
+def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Carries the integrals, m s, on. The signals are those of ``tracking``."""
+    s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
+    (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
+    r, reaching, inside, zone, c4 = about[SURFACE], about[REACHING], about[LAYER], about[ZONE], about[STIFFNESS_GAIN]
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         half, viscous = (p[at.HALF_L1], p[at.FV1]) if cylinder == 0 else (p[at.HALF_L2], p[at.FV2])
-        for i in range(joints.shape[1]):
+        for i in range(n):
             y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
             scale = needed[KAPPA, i] if cylinder == 0 else 1.0
             mass = p[at.MASS] * scale * scale
             excess = pp * ap - pn * an - needed[FORCE1 + cylinder, i]
             error, error_rate = y - wanted[cylinder, i], v - wanted[2 + cylinder, i]
             second = (excess - viscous * error_rate) / mass
-            summed = -excess / (mass * r * r * r) if fresh[i] > 0.0 else integral[cylinder, i]
+            summed = held(m, cylinder, i, -excess / (mass * r * r * r))
             slope = beyond(error, zone / scale)
             surface = scale * (second + r * (3.0 * error_rate + r * (3.0 * error + r * summed)))
             switched = max(-reaching, min(reaching, inside * surface)) / scale
@@ -54,7 +59,8 @@ def command(
             stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
             stiffness_rate = target[12 + cylinder, i] - c4 * (stiffness - target[10 + cylinder, i])
             two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
-            integral[cylinder, i] = carried_on(summed, slope, period, openings[row, i], openings[row + 1, i])
+            carry_on(m, cylinder, i, summed, slope, about[PERIOD], openings)
+    return 0
 
 
 class SlidingMode(TrackingController):
@@ -65,7 +71,7 @@ class SlidingMode(TrackingController):
     the layer is h/b thick; friction_fraction; dead_zone.
     """
 
-    KERNEL = staticmethod(command)
+    LAW = staticmethod(control)
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
         "surface_rate": (10.0, 100.0),
         "reaching_rate": (100.0, 10000.0),
@@ -90,5 +96,5 @@ class SlidingMode(TrackingController):
         },
     }
 
-    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
+    def _design(self, gains: dict[str, float]) -> tuple[float, ...]:
         return gains["surface_rate"], gains["reaching_rate"], gains["layer_rate"], gains["dead_zone"], PNEUMATIC_GAIN

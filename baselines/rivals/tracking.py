@@ -1,27 +1,31 @@
-"""What the rivals share: signals in, the motion to follow, the memory of the lanes."""
+"""What the rivals share: the stages before the law, its signals, and the memory of its integrals."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import check_gains, lanes_of
-from baselines.estimation.admittance import DAMPING_RATIO, Admittance
-from baselines.estimation.observers import PistonObserver
-from baselines.estimation.state_estimator import is_moving
+from baselines.controller import check_gains, require_stiffness
+from baselines.estimation.admittance import DAMPING_RATIO
+from baselines.estimation.stages import JOINTS, OWN, compliant_motion, pistons
 from baselines.impedance import Impedance, mass_spring_damper
-from baselines.rivals.feedforward import NEEDED, prepare
-from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
+from baselines.rivals.feedforward import END, NEEDED, WANTED, feedforward
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import ASKED, FEEDFORWARD, OPENING, PRESSURE, SHOWN, USER_FORCE
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
 
 LEAST_LENGTH = 0.002
 """m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""
+
+INTEGRAL, FRESH, MEMORY = 0, 2, 4
+"""Rows of a law's memory: integrals of cylinders 1 and 2, and 1 where they start; the number of rows."""
 
 
 @helper
@@ -31,13 +35,28 @@ def beyond(error: float, zone: float) -> float:
 
 
 @helper
-def carried_on(integral: float, rate: float, period: float, opening_p: float, opening_n: float) -> float:
-    """The integral after one period; held while a valve of the cylinder saturates (conditional integration)."""
-    return integral if max(abs(opening_p), abs(opening_n)) >= 1.0 else integral + period * rate
+def signals(s: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """What a law reads of what is seen: joints (4, N), ``WANTED`` (8, N), ``NEEDED`` (5, N), pressures (4, N) and the reference
+    (15, N); and the openings (4, N) that it writes."""
+    target, pressures, openings = s[ASKED:FEEDFORWARD], s[PRESSURE:USER_FORCE], s[OPENING:SHOWN]
+    return s[JOINTS:OWN], s[WANTED:NEEDED], s[NEEDED:END], pressures, target, openings
 
 
-class TrackingController(ABC):
-    """A loop round each piston that follows the compliant motion of ``Admittance`` and knows the forces that it needs.
+@helper
+def held(memory: Array, cylinder: int, i: int, first: float) -> float:
+    """The integral of a cylinder, or ``first`` where it starts."""
+    return first if memory[FRESH + cylinder, i] > 0.0 else memory[INTEGRAL + cylinder, i]
+
+
+@helper
+def carry_on(memory: Array, cylinder: int, i: int, integral: float, rate: float, period: float, openings: Array) -> None:
+    """Takes the integral to the next period; it rests while a valve of the cylinder saturates (conditional integration)."""
+    full = max(abs(openings[2 * cylinder, i]), abs(openings[2 * cylinder + 1, i])) >= 1.0
+    memory[INTEGRAL + cylinder, i], memory[FRESH + cylinder, i] = integral if full else integral + period * rate, 0.0
+
+
+class TrackingController(StagedController, ABC):
+    """A loop round each piston that follows ``stages.compliant_motion`` and knows the forces that it needs.
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
@@ -48,68 +67,37 @@ class TrackingController(ABC):
     of the reference speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The
     integrals start from the forces that the chambers hold (bumpless start). From sampled positions an observer estimates
     the speeds.
-    ``KERNEL`` is the law: (joints (4, N), wanted (8, N), needed (NEEDED, N) as in ``prepare``, pressures (4, N), reference rows
-    (15, N), parameters (PARAMETERS,), period, the arguments of ``_design``, integrals (2, N), fresh (N,), openings (4, N)). It
-    writes the openings and carries the integrals on, which it starts where fresh is 1.
+    ``LAW`` is the law as a stage. It reads and writes ``signals``, carries the integrals on, and has as constants the control
+    period, s, what ``_design`` gives, and the rig.
     Raises ``ValueError`` for unknown gains and for gains that are not positive (zero where the lowest to try is zero).
     """
 
-    KERNEL: ClassVar[Callable[..., None]]
+    LAW: ClassVar[Callable[..., int]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
     TUNED: ClassVar[dict[str, dict[str, float]]]
+    TOLD: ClassVar[tuple[str, ...]] = ("damping_factor",)
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)
-        self.parameters = load_parameters(parameters)
-        self._p = parameter_column(self.parameters)
-        self._period = self.parameters.electronics.control_period
+        super().__init__(parameters)
         chosen = {kind: {name: float({**tuned, **gains}[name]) for name in self.TUNABLE} for kind, tuned in self.TUNED.items()}
         self._fractions = {kind: values["friction_fraction"] for kind, values in chosen.items()}
         self._designs = {kind: self._design(values) for kind, values in chosen.items()}
-        self._admittance = Admittance(self.parameters)
-        self._observer = PistonObserver(self.parameters, self._p)
-        self._integral: Array = np.empty((2, 0))
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     @abstractmethod
-    def _design(self, gains: dict[str, float]) -> tuple[Any, ...]:
-        """The arguments of ``KERNEL`` that come from the gains, all those of ``TUNABLE``."""
+    def _design(self, gains: dict[str, float]) -> Sequence[float]:
+        """The constants of ``LAW`` that come from the gains, all those of ``TUNABLE``."""
 
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        self._admittance.reset(lanes)
-        self._observer.reset(lanes)
-        if lanes is None:
-            self._integral = np.empty((2, 0))
-        elif self._integral.shape[1]:
-            self._fresh[lanes] = 1.0
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        rig, kind, fresh = self.parameters, "lab" if sampled else "ideal", np.zeros(MEMORY)
+        fresh[FRESH:] = 1.0
+        law = LawStage(self.LAW, np.array([rig.electronics.control_period, *self._designs[kind], *self._p]), fresh)
+        return [compliant_motion(rig), pistons(rig, sampled, informed=True), feedforward(rig, self._fractions[kind]), law]
 
-    def command(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
-        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
-
-        Called once per control period. ``damping_factor`` (N,) multiplies the damping that the hand feels; below 1 it is 1.
-        Raises ``ValueError`` for signals over different numbers of lanes.
-        """
-        if measurement.position.ndim == 1:
-            factor = None if damping_factor is None else np.asarray(damping_factor, dtype=np.float64)[..., None]
-            return self.command(*one_lane(measurement, reference), factor)[:, 0]
-        lanes = lanes_of(measurement, reference)
-        if self._integral.shape[1] != lanes:
-            self._integral, self._fresh = np.zeros((2, lanes)), np.ones(lanes)
-        force = np.ascontiguousarray(measurement.user_force)
-        motion = self._admittance.update(measurement, reference, damping_factor)
-        if measurement.sampled:
-            seen = np.ascontiguousarray(self._observer.update(measurement, force, moving=is_moving(motion)))
-        else:
-            seen = np.concatenate([measurement.position, measurement.velocity])
-        joints, wanted, needed = np.empty((4, lanes)), np.empty((8, lanes)), np.empty((NEEDED, lanes))
-        kind = "lab" if measurement.sampled else "ideal"
-        prepare(seen, measurement.sampled, motion, force, self._p, self._fractions[kind], joints, wanted, needed)
-        openings = np.empty((4, lanes))
-        law = (*self._designs[kind], self._integral, self._fresh, openings)
-        self.KERNEL(joints, wanted, needed, measurement.pressures, reference.rows, self._p, self._period, *law)
-        self._fresh[:] = 0.0
-        return openings
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the first lane whose stiffness is not positive definite."""
+        require_stiffness(reference, 0.0)

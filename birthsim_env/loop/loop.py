@@ -41,10 +41,9 @@ def _run(
     for start in range(first, last, BLOCK):
         n = min(BLOCK, last - start)
         for m in range(moves.shape[0]):
-            array = carray(pointer(moves[m, 0], np.float64), (moves[m, 1], lanes))
-            for row in range(moves[m, 1]):
-                for i in range(n):
-                    space[moves[m, 2] + row, i] = array[row, start + i]
+            count, row = moves[m, 1], moves[m, 2]
+            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+            space[row : row + count, :n] = array[:, start : start + n]
         for period in range(periods):
             for s in range(stages.shape[0]):
                 if stages[s, 6] == 0 or period == periods - 1:
@@ -55,10 +54,10 @@ def _run(
                     )
                     missed += call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
         for m in range(moves.shape[0]):
-            array = carray(pointer(moves[m, 0], np.float64), (moves[m, 1], lanes))
-            for row in range(moves[m, 1] if moves[m, 3] else 0):
-                for i in range(n):
-                    array[row, start + i] = space[moves[m, 2] + row, i]
+            count, row = moves[m, 1], moves[m, 2]
+            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+            if moves[m, 3]:
+                array[:, start : start + n] = space[row : row + count, :n]
     return missed
 
 

@@ -13,7 +13,7 @@ STATE = PARAMETERS
 IMPACT = STATE + STATES
 """Fastest collision of each piston with an end stop in this policy step, m/s."""
 MOTION = IMPACT + 2
-"""True x, y (m), vx, vy (m/s) of the end effector."""
+"""True x, y (m), vx, vy (m/s) of the end effector, where hand and tracker are: of its handle where the structure bends."""
 FORCE = MOTION + 4
 """The hand's force Fx, Fy, N."""
 SINCE_JUMP = FORCE + 2
@@ -23,8 +23,8 @@ TICK = SINCE_JUMP + 1
 WORLD = TICK + 1
 """Rows of the world."""
 
-MOST_ACTIONS, MOST_SHOWN = 64, 64
-"""Longest action, and most that an actuation shows of its memory."""
+MOST_ACTIONS, MOST_SHOWN, MOST_HANDED = 64, 64, 32
+"""Longest action, most that an actuation shows of its memory, and most rows that a law's stages hand on."""
 
 TIME = 0
 """s since the episode began."""
@@ -44,13 +44,17 @@ ASKED = REFERENCE + REFERENCES
 """What a law is asked for: the reference, or what a residual has made of it."""
 FEEDFORWARD = ASKED + REFERENCES
 """What a law is told besides: forces along cylinders 1 and 2 (N), their rates (N/s), a damping factor."""
+DAMPING = FEEDFORWARD + 4
+"""That damping factor."""
 ACTION = FEEDFORWARD + 5
 """The policy's action."""
 OPENING = ACTION + MOST_ACTIONS
 """Commanded openings of the valves of chambers P1, N1, P2, N2."""
 SHOWN = OPENING + 4
 """What an actuation shows of its memory to a policy."""
-SEEN = SHOWN + MOST_SHOWN
+HANDED = SHOWN + MOST_SHOWN
+"""What the stages of a law hand on to the next ones within a control period; the law names its rows."""
+SEEN = HANDED + MOST_HANDED
 """Rows of what is seen."""
 
 

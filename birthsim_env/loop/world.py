@@ -18,11 +18,18 @@ from birthsim_env.loop.rows import (
     WORLD,
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
-from birthsim_env.physics import dynamics, spools
+from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.plant import Plant
+
+
+@helper
+def _tick(w: Array, s: Array, period: float, n: int) -> None:
+    for i in range(n):
+        w[TICK, i] += 1.0
+        s[TIME, i] = w[TICK, i] * period
 
 
 @helper
@@ -32,9 +39,7 @@ def _move(w: Array, s: Array, u: Array, about: Array, dx: Array, total: Array, t
     steps = int(about[1])
     dynamics.integrate(x, u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, hit, dx, total, trial, n)
     dynamics.settle(x, n)
-    for i in range(n):
-        w[TICK, i] += 1.0
-        s[TIME, i] = w[TICK, i] * about[0]
+    _tick(w, s, about[0], n)
     end_effector_motion(x[:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
 
 
@@ -57,9 +62,26 @@ def _worn_plant(world: int, seen: int, memory: int, constants: int, tables: int,
     return 0
 
 
+@kernel
+def _optional_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """As ``_worn_plant``, with the options of ``physics.options``; memory: inner commands and further states."""
+    w, s, m, about = block(world, WORLD), block(seen, SEEN), block(memory, 4 + options.FURTHER), numbers(constants, 2)
+    u, own, p, x = scratch(4), scratch(PARAMETERS), w[:PARAMETERS], w[STATE : STATE + STATES]
+    spools.admit(s[OPENING : OPENING + 4], p, m[:4], u, n)
+    steps = int(about[1])
+    options.integrate(
+        x, m[4:], u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, w[IMPACT : IMPACT + 2], own, n
+    )  # fmt: skip
+    _tick(w, s, about[0], n)
+    options.port_motion(x[:, :n], m[4:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
+    return 0
+
+
 def plant_stage(plant: Plant, period: float) -> Stage:
     """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand."""
     about = np.array([period, dynamics.steps_in(period)])
+    if not options.are_off(plant.lane_parameters):
+        return Stage(_optional_plant, about, plant.memory)
     perfect = spools.are_perfect(plant.lane_parameters)
     return Stage(_plant, about) if perfect else Stage(_worn_plant, about, plant.inner_commands)
 

@@ -19,6 +19,7 @@ from scipy.interpolate import make_interp_spline
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.reading import read
@@ -61,8 +62,8 @@ def from_file(kind: str, text: str) -> Any:
     return getattr(module, attribute)
 
 
-def _numbers(kind: str, path: Path, columns: str) -> Array:
-    """The lines (M, 3) of a CSV file, less a heading."""
+def _numbers(kind: str, path: Path, columns: str, widths: tuple[int, ...] = (3,)) -> Array:
+    """The lines (M, C) of a CSV file, less a heading; each has the first line's number of numbers, one of ``widths``."""
     rows: list[list[float]] = []
     expected = f"allowed: lines of {columns}, with increasing times"
     try:
@@ -76,7 +77,11 @@ def _numbers(kind: str, path: Path, columns: str) -> Array:
                 if not rows and number == 1:
                     continue  # the heading
                 row = []
-            if len(row) != 3 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
+            if (
+                len(row) not in (widths if not rows else (len(rows[0]),))
+                or not all(map(math.isfinite, row))
+                or (rows and row[0] <= rows[-1][0])
+            ):
                 raise ValueError(f"{kind} = {str(path)!r}, line {number}: {shown(','.join(line))}; {expected}")
             rows.append(row)
     except (UnicodeDecodeError, csv.Error) as error:
@@ -131,6 +136,25 @@ class Through(Trajectory):
         rows = np.empty((8, time.shape[0]))
         _spline(time, self._breaks, self._pieces, rows)
         return rows
+
+
+STEPPED = 250.0
+"""N/m: a stiffness that differs by so much from the present setpoint becomes the next one; assumed, a twelfth of 3000 N/m."""
+
+
+def stepped(times: Array, stiffness: Array) -> StiffnessSchedule:
+    """Setpoints in steps of ``STEPPED`` or more that follow ``stiffness`` (M,), N/m, at ``times`` (M,), s.
+
+    A step restarts the count of settled time, as where a user changes the setpoint. The pneumatic stiffness stays at 4200 and
+    2100 N/m, as in ``BirthSIM/Descent-v1``.
+    """
+    chosen = [0]
+    for k, value in enumerate(stiffness):
+        if abs(value - stiffness[chosen[-1]]) >= STEPPED:
+            chosen.append(k)
+    starts = (0.0, *(float(times[k]) for k in chosen[1:]))
+    setpoints = tuple(float(stiffness[k]) for k in chosen)
+    return StiffnessSchedule(starts, setpoints, (4200.0,) * len(chosen), (2100.0,) * len(chosen))
 
 
 def _pair(kind: str, call: str, value: Any, expected: str) -> Array:
@@ -193,8 +217,8 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
     if isinstance(reference, (str, Path)):
         if Path(reference).suffix.lower() == ".csv":
-            rows = _numbers("reference", Path(reference), "time, x, y (s, m, m)")
-            return Through(rows[:, 0], rows[:, 1:])
+            rows = _numbers("reference", Path(reference), "time, x, y (s, m, m), with or without stiffness (N/m)", (3, 4))
+            return Through(rows[:, 0], rows[:, 1:3])
         if ".py:" not in str(reference):
             raise ValueError(f"reference = {shown(str(reference))}; allowed: {expected}")
         reference = from_file("reference", str(reference))
@@ -206,6 +230,22 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     times = np.linspace(0.0, duration, max(7, round(duration / GRID) + 1))
     wanted = "a function of time (s) that returns (x, y) in m"
     return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
+
+
+def stiffness_of(stiffness: Any) -> StiffnessSchedule:
+    """What the environments' argument ``stiffness`` says, as a ``StiffnessSchedule``.
+
+    Raises ``ValueError`` in one line for what is neither such a schedule nor a CSV file of time, x, y, stiffness.
+    """
+    if isinstance(stiffness, (str, Path)) and Path(stiffness).suffix.lower() == ".csv":
+        rows = _numbers("stiffness", Path(stiffness), "time, x, y, stiffness (s, m, m, N/m)", (4,))
+        return stepped(rows[:, 0], rows[:, 3])
+    if not isinstance(stiffness, StiffnessSchedule):
+        raise ValueError(
+            f"stiffness = {shown(stiffness)}; allowed: None or a birthsim_env.StiffnessSchedule, or file.csv of time, x, y, "
+            "stiffness"
+        )
+    return stiffness
 
 
 def hand_of(user_force: Any, varied: bool) -> UserForce:

@@ -59,12 +59,22 @@ def chamber_rates(
     length: float, length_rate: float,
 ) -> None:  # fmt: skip
     """Writes dP/dt and dT/dt of one chamber; ``length`` is that of its air column, m."""
-    t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
+    t = x[temperature, i]
     volume = p[at.DEAD_VOLUME, i] + p[area, i] * length
     # One division serves the chamber: 1/(P V) = T inverse, 1/P = V T inverse, 1/T = P V inverse.
     energy = x[pressure, i] * volume
     inverse = 1.0 / (energy * t)
     supplied, exhausted = orifice_flows(x, p, i, pressure, spool, volume * (t * inverse), p[at.T0, i] * (energy * inverse))
+    exchange(x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, supplied, exhausted, inverse)
+
+
+@helper
+def exchange(
+    x: Array, p: Array, dx: Array, i: int, pressure: int, temperature: int, other: int, area: int, perimeter: int,
+    length: float, length_rate: float, supplied: float, exhausted: float, inverse: float,
+) -> None:  # fmt: skip
+    """``chamber_rates`` under given flows from the supply and to the atmosphere, kg/s; ``inverse`` is 1/(P V T)."""
+    t, wall, gas = x[temperature, i], p[at.TEMPERATURE, i], p[at.GAS, i]
     carried = chambers.enthalpy_temperature_flow(supplied, exhausted, t, wall)
     heat = chambers.heat_flow(t, x[other, i], wall, length, p[area, i], p[perimeter, i], p[at.H_WALL, i], p[at.G12, i])
     expansion = x[pressure, i] * (p[area, i] * length_rate)

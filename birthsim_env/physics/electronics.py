@@ -100,6 +100,11 @@ class Electronics(Part):
         randomized=(0, 0.01), option=True,
     )  # fmt: skip
 
+    clock_jitter: float = quantity(
+        0.0, "-", "0 is a steady clock; the valves' voltages are late by up to this fraction of a period, up to 0.5 assumed of "
+        "boards without a real-time system", least=0, most=1, option=True, worth=(0, 0.5),
+    )  # fmt: skip
+
     def _check_together(self) -> None:
         if (self.transmitter_x, self.transmitter_y) == (self.registration_x, self.registration_y):
             raise ValueError(

@@ -48,7 +48,7 @@ def _balance(state: Array, stiffness: Array, p: Array) -> None:
             # F = a - b and K/k = a/Lp + b/Ln, (3) and (9), are linear in a = Pp Sp and b = Pn Sn.
             length_p, length_n = half + y, half - y
             a = (stiffness[cylinder, i] / p[at.INDEX, i] + force / length_n) / (1.0 / length_p + 1.0 / length_n)
-            low, high = p[at.ATMOSPHERE, i], p[at.SUPPLY, i]
+            low, high = p[at.ATMOSPHERE, i], p[at.SOURCE, i]
             a = max(max(low * ap, low * an + force), min(min(high * ap, high * an + force), a))
             state[z, i] = bristle
             state[pp, i] = a / ap

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from birthsim_env.physics import dynamics, geometry, spools
+from birthsim_env.physics import dynamics, options, spools
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, V1, V2, Y1, Y2, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -52,22 +53,41 @@ class Plant:
         self._state = balanced_state(self.lane_parameters, np.zeros((2, self.num_envs)))
         self.impacts: Array = np.zeros((2, self.num_envs))
         """Largest speed at which each piston ran into an end stop during the last ``advance``, m/s, (2, num_envs)."""
-        self.inner_commands: Array = np.zeros((4, self.num_envs))
+        self.memory: Array = np.zeros((4 + options.FURTHER, self.num_envs))
+        """Where the play of valves with hysteresis is, and the further states of ``physics.options``."""
+        self.begin(np.arange(self.num_envs))
+
+    def begin(self, lanes: NDArray[np.intp]) -> None:
+        """Forget the past of ``lanes`` (L,): their valves have not moved, and their options begin at rest with the state."""
+        self.memory[:, lanes] = 0.0
+        if not options.are_off(self.lane_parameters):
+            own = self.lane_parameters.take(lanes, axis=1)
+            own[at.SUPPLY], own[at.INVERSE_SUPPLY] = own[at.SOURCE], 1.0 / own[at.SOURCE]
+            self.lane_parameters[:, lanes] = own
+            self.memory[4:, lanes] = options.at_rest(self._state.take(lanes, axis=1), own)
+
+    @property
+    def inner_commands(self) -> Array:
         """Where the play of valves with hysteresis is, (4, num_envs)."""
+        return self.memory[:4]
 
     @property
     def state(self) -> Array:
-        """The state, (18, num_envs), with the rows of ``STATE_NAMES``, SI units; assigning to it checks and copies."""
+        """The state, (18, num_envs), with the rows of ``STATE_NAMES``, SI units.
+
+        Assigning to it checks, copies and forgets the past of valves, tubes, supply and handle."""
         return self._state
 
     @state.setter
     def state(self, state: ArrayLike) -> None:
         self._state[:] = checked("state", state, (STATES, self.num_envs), "SI")
+        self.begin(np.arange(self.num_envs))
 
     def derivatives(self, state: ArrayLike, opening_command: ArrayLike, user_force: ArrayLike) -> Array:
         """d(state)/dt, (18, num_envs), for a state (18, num_envs), openings (4, num_envs) and forces (2, num_envs), N.
 
-        The openings are those that spools go to: deadband, hysteresis and limit of the valves are ``advance``'s.
+        The openings are those that spools go to: deadband, hysteresis and limit of the valves are ``advance``'s, and so are
+        tubes and the handle (``physics.options``).
         """
         rates = np.empty((STATES, self.num_envs))
         dynamics.derivatives(*self._arguments(state, opening_command, user_force), self.lane_parameters, rates)
@@ -94,7 +114,11 @@ class Plant:
             command = opening
         held = duration / forces.shape[0]
         steps = dynamics.steps_in(held)
-        dynamics.advance(self.state, command, forces, self.lane_parameters, steps, held / steps, self.impacts)
+        how = forces, self.lane_parameters, steps, held / steps, self.impacts
+        if options.are_off(self.lane_parameters):
+            dynamics.advance(self.state, command, *how)
+        else:
+            options.advance(self.state, self.memory[4:], command, *how)
 
     def mass_flows(self) -> Array:
         """Flows of chambers P1, N1, P2, N2 now, kg/s, (8, num_envs): rows 0-3 from the supply, 4-7 to the atmosphere."""
@@ -123,9 +147,11 @@ class Plant:
         return self._state.take(TEMPERATURES, axis=0)
 
     def end_effector(self) -> Array:
-        """Position and velocity of the end effector, (4, num_envs): x, y (m), vx, vy (m/s)."""
+        """Position and velocity of the end effector, (4, num_envs): x, y (m), vx, vy (m/s).
+
+        Where the structure bends it is that of the handle."""
         motion = np.empty((4, self.num_envs))
-        geometry.end_effector_motion(self.state, self.lane_parameters, motion)
+        options.port_motion(self.state, self.memory[4:], self.lane_parameters, motion)
         return motion
 
     def _openings(self, opening_command: ArrayLike) -> Array:

@@ -43,7 +43,7 @@ def test_the_scripts_of_the_package_are_these_commands():
                     "jobs",
                     "cluster",
                 ),
-                *("reference", "user-force", "set", "no-studies", "studies-only", "out"),
+                *("reference", "stiffness", "user-force", "set", "no-studies", "studies-only", "out"),
             ),
         ),
         ("figure4", ("controller", "set", "sensors", "parameters", "out")),

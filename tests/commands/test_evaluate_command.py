@@ -227,3 +227,19 @@ def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monke
     status, _, complained = call("evaluate", monkeypatch, capsys, "--out", tmp_path)
     assert status == 130
     assert complained == "birthsim-evaluate: interrupted\n"
+
+
+def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
+    case = ("--all", "--randomize", "sensors", "--no-studies", "--out", tmp_path / "out")
+    status, _, complained = call("evaluate", monkeypatch, capsys, *case, "--sensors", "lab")
+    assert status == 2
+    assert "--randomize 'sensors' with --all; allowed: with --sensors honest" in complained
+    own = ("--env", "BirthSIM/Probe-v1", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
+    status, _, complained = call("evaluate", monkeypatch, capsys, *case, *own)
+    assert status == 0, complained
+    assert "## BirthSIM/Probe-v1, honest sensors, figures drawn, nominal plant" in (tmp_path / "out/comparison.md").read_text()
+    (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]
+    assert (cell["sensors"], cell["plant"]) == ("honest", "drawn-sensors")
+    status, _, complained = call("evaluate", monkeypatch, capsys, "--randomize", "sensors", "--out", tmp_path / "one")
+    assert status == 2
+    assert "randomize = 'sensors' with sensors = 'ideal'; allowed: with sensors = 'honest'" in complained

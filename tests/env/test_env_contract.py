@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import birthsim_env
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 WORLDS = st.fixed_dictionaries(
     {
@@ -40,7 +40,7 @@ WORLDS = st.fixed_dictionaries(
 
 def walked(world: dict[str, Any]) -> list[Any]:
     """What an environment returns under random actions, checked as it comes."""
-    env = gymnasium.make_vec(f"BirthSIM/{world['scenario'].capitalize()}-v1", num_envs=world["num_envs"], **world["arguments"])
+    env = gymnasium.make_vec(environment_id(world["scenario"]), num_envs=world["num_envs"], **world["arguments"])
     observation, info = env.reset(seed=world["seed"])
     rng, returned = np.random.default_rng(world["seed"]), [observation]
     for _ in range(world["steps"]):

@@ -16,6 +16,8 @@ from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.plant import Plant
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {
@@ -137,6 +139,41 @@ def test_a_rig_held_at_its_port_has_the_control_board_of_its_sensors():
         np.testing.assert_array_equal(simulation.motion, port.motion())
 
 
+def test_a_clock_that_jitters_puts_out_the_mean_of_both_openings_over_the_period():
+    rig = Parameters().replace({**OFF, "electronics.clock_jitter": 0.4})
+    env = gymnasium.make_vec(CIRCLE, num_envs=20, sensors="honest", parameters=rig, policy_period=0.001)
+    env.reset(seed=0)
+    rng, before, late = np.random.default_rng(1), np.zeros((4, 20)), []
+    for _ in range(300):
+        action = rng.uniform(-1, 1, (20, 4)).astype(np.float32)
+        env.step(action)
+        late.append((env.unwrapped.simulation.openings - action.T) / (before - action.T))
+        before = action.T.astype(float)
+    late = np.array(late)
+    assert not late[0].any(), "the first period is on time"
+    late = late[1:]
+    np.testing.assert_allclose(late, np.broadcast_to(late[:, :1], late.shape), atol=1e-9)
+    fractions = late[:, 0].ravel()
+    assert fractions.min() >= -1e-12
+    assert fractions.max() <= 0.4 + 1e-12
+    # Kolmogorov's bound at one in a thousand.
+    apart = np.abs(np.sort(fractions) / 0.4 - (np.arange(fractions.size) + 0.5) / fractions.size).max()
+    assert apart < 1.95 / np.sqrt(fractions.size)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.25, 0.5, 1.0])
+def test_the_mean_moves_a_spool_as_an_opening_that_comes_late(late):
+    rig = Parameters()
+    period, lag = rig.electronics.control_period, rig.valves.time_constant
+    exact, mean = Plant(rig), Plant(rig)
+    for opening, seconds in ((0.0, late * period), (0.8, (1 - late) * period)):
+        if seconds:
+            exact.advance(np.full((4, 1), opening), np.zeros((2, 1)), seconds)
+    mean.advance(np.full((4, 1), 0.8 * (1 - late)), np.zeros((2, 1)), period)
+    spools = list(at.SPOOLS)
+    assert np.abs(exact.state[spools] - mean.state[spools]).max() <= 0.8 * (period / lag) ** 2 / 8 + 1e-8
+
+
 def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
     envs = {kind: gymnasium.make_vec(CIRCLE, num_envs=50, sensors=kind, randomize=True) for kind in ("ideal", "lab", "honest")}
     for env in envs.values():
@@ -144,8 +181,10 @@ def test_what_sensors_draw_changes_no_rig_and_follows_the_seed():
     rigs = [env.unwrapped.simulation.plant.lane_parameters for env in envs.values()]
     assert_same(rigs[1:], rigs[:1] * 2)
     drawn = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)].copy()
-    for row, name in zip(drawn, FIGURES, strict=True):
-        low, high = documented_ranges(Parameters(), "honest")[f"electronics.{name}"]
+    ranges = documented_ranges(Parameters(), "honest")
+    assert {f"electronics.{name}" for name in FIGURES} - set(ranges) == {"electronics.clock_jitter"}, "an option"
+    for row, name in zip(drawn, FIGURES[:-1], strict=False):
+        low, high = ranges[f"electronics.{name}"]
         assert low <= row.min() < low + 0.2 * (high - low) < high - 0.2 * (high - low) < row.max() <= high, name
     envs["honest"].reset(seed=6)
     again = envs["honest"].unwrapped.simulation.sensors._errors[: len(FIGURES)]
@@ -158,6 +197,25 @@ def test_a_nominal_rig_has_nominal_sensors_whose_errors_differ_by_episode():
     errors = env.unwrapped.simulation.sensors._errors
     np.testing.assert_array_equal(errors[: len(FIGURES)], np.broadcast_to(errors[: len(FIGURES), :1], (len(FIGURES), 4)))
     assert len(np.unique(errors[len(FIGURES)])) == 4
+
+
+def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sensors_drawn():
+    envs = {
+        what: gymnasium.make_vec(CIRCLE, num_envs=4, sensors="honest", randomize=what) for what in ("sensors", "scenario", True)
+    }
+    for env in envs.values():
+        env.reset(seed=5)
+    sensors, scenario, both = (env.unwrapped.simulation for env in envs.values())
+    np.testing.assert_array_equal(sensors.plant.lane_parameters, scenario.plant.lane_parameters)
+    np.testing.assert_array_equal(sensors.reference.rows, scenario.reference.rows)
+    np.testing.assert_array_equal(sensors.sensors._errors, both.sensors._errors)
+    assert not np.array_equal(sensors.sensors._errors, scenario.sensors._errors)
+    believed = envs["sensors"].unwrapped.simulation.parameters.electronics
+    assert believed == Parameters().electronics, "what a law is given"
+    assert described(Parameters(), "sensors", "honest").startswith("sensors drawn: position noise 5e-05 to 0.0003 m, ")
+    for kind in ("ideal", "lab"):
+        with pytest.raises(ValueError, match=f"randomize = 'sensors' with sensors = '{kind}'; allowed: .*'honest'"):
+            gymnasium.make(CIRCLE, sensors=kind, randomize="sensors")
 
 
 def test_sensors_are_drawn_only_where_the_model_can():

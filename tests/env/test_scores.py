@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import birthsim_env
+from agents.policy.seeds import shipped_names
 from baselines.bench.evaluation import DISCOUNTS, evaluate
+from baselines.commands.shared import policy_of
 from baselines.registry import make_controller
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
 
-IDS = [f"BirthSIM/{name.capitalize()}-v1" for name in SCENARIOS]
+IDS = [environment_id(name) for name in SCENARIOS]
 
 
 @pytest.mark.parametrize("environment", IDS)
@@ -54,13 +56,13 @@ def test_returns_are_the_sums_of_rewards():
 @pytest.mark.parametrize("randomize", [False, True])
 def test_every_id_and_condition_has_scores_in_order(environment, sensors, randomize):
     known = reference_scores(environment, sensors, randomize)
-    assert tuple(known) == ROLES
+    assert tuple(known) == (ROLES if policy_of(environment) in shipped_names() else ROLES[:-1])
     paid = {role: entry["return"] for role, entry in known.items()}
     assert paid["random valves"] < paid["shut valves"] < paid["paper's law"] < paid["best classical law"]
     assert known["shut valves"]["error"] > known["paper's law"]["error"] > known["best classical law"]["error"]
     for role, score in (("shut valves", 0.0), ("best classical law", 100.0)):
         assert normalized_score(environment, paid[role], sensors, randomize) == pytest.approx(score)
-    residual = environment.replace("-v1", "Residual-v1")
+    residual = environment.replace("-v", "Residual-v")
     assert reference_scores(residual, sensors, randomize) is known
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.estimation.state_estimator import BELIEVED_LIMIT, MOVING_SPEED, Estimate, StateEstimator
+from baselines.estimation.admittance import MOVING_SPEED
+from baselines.estimation.state_estimator import BELIEVED_LIMIT, Estimate, StateEstimator
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state

@@ -19,7 +19,7 @@ GOOD: dict[str, tuple[Any, ...]] = {
     "action_mode": ("valve", "flow"),
     "valves": ("two_valves", "one_valve"),
     "sensors": ("ideal", "lab"),
-    "randomize": (False, True, "plant", "scenario", {"mechanics.mass": (2, 5)}),
+    "randomize": (False, True, "plant", "scenario", "sensors", {"mechanics.mass": (2, 5)}),
     "reference": (None,),
     "user_force": (None, "steps", "sine", "noise", "guided"),
     "stiffness": (None,),
@@ -123,7 +123,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
     from baselines.uncontrolled import RandomValves
     from birthsim_env.parts import references, stiffness_schedules
-    from birthsim_env.parts.hands import moving_hands, user_forces
+    from birthsim_env.parts.hands import contractions, moving_hands, user_forces
     from birthsim_env.physics.plant import Plant
 
     parts = (
@@ -133,7 +133,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
             user_forces.AlternatingSteps,
             user_forces.Ramp,
             user_forces.Pulls,
-            user_forces.Contractions,
+            contractions.Contractions,
         ),
         *(moving_hands.Sine, moving_hands.Noise, moving_hands.Guided),
     )

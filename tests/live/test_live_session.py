@@ -11,7 +11,7 @@ import pytest
 
 import birthsim_env
 from baselines.registry import make_controller
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
@@ -44,7 +44,7 @@ def part(one: Session, name: str) -> Array:
 )
 def test_without_a_person_it_is_the_environment_bit_for_bit(scenario: str, controller: str, sensors: str) -> None:
     one = session(scenario=scenario, controller=controller, sensors=sensors, scenario_force=True)
-    env: Any = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v1", num_envs=1, policy_period=0.001, sensors=sensors)
+    env: Any = gymnasium.make_vec(environment_id(scenario), num_envs=1, policy_period=0.001, sensors=sensors)
     env.reset(seed=[0])
     law = make_controller(controller, RIG)
     for _ in range(12):

@@ -8,7 +8,7 @@ import pytest
 
 from birthsim_env import Circle, Hold, Parameters, Path
 from birthsim_env.parts.courses import check_drawn
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from tests.odd_rigs import odd_rig
 
 LATE = (116, 243)
@@ -28,7 +28,7 @@ def made(name, seed):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_an_odd_rig_that_is_taken_reaches_every_later_episode(scenario):
-    found = [made(f"BirthSIM/{scenario.capitalize()}-v1", seed) for seed in (*LATE, *range(24))]
+    found = [made(environment_id(scenario), seed) for seed in (*LATE, *range(24))]
     words = [one for one in found if isinstance(one, str)]
     assert all("of one that can be drawn: position" in one or "can carry" in one for one in words)
     taken = [one for one in found if not isinstance(one, str)]

@@ -16,9 +16,10 @@ from birthsim_env.parts.drawn.randomization import draw_columns, draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
 from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.parts.drawn.worlds import TOGETHER, begin, worlds
+from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.hands.user_forces import Contractions, ForceProfile, Ramp
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, LabSensors
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.simulation import Simulation
@@ -144,7 +145,7 @@ def said(case):
 
 @pytest.mark.parametrize("case", CASES, ids=said)
 def test_lanes_begin_together_as_they_begin_one_by_one(case):
-    name, lanes = f"BirthSIM/{case['scenario'].capitalize()}-v1", 9
+    name, lanes = environment_id(case["scenario"]), 9
     arguments = {key: value for key, value in case.items() if key != "scenario"}
     together, single = (
         gymnasium.make_vec(name, num_envs=lanes, **copy.deepcopy(arguments)).unwrapped.simulation for _ in range(2)

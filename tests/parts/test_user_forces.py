@@ -8,9 +8,12 @@ import gymnasium
 import numpy as np
 import pytest
 
+from baselines.bench.feasibility import required_strength_ratio
 from birthsim_env import ForceProfile
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.hands.user_forces import AlternatingSteps, Contractions, Pulls, Ramp
+from birthsim_env.parts.hands.contractions import Contractions
+from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
+from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import SCENARIOS
 
 PROBE = "BirthSIM/Probe-v1"
@@ -112,6 +115,33 @@ def test_dystocia_pulls_are_those_of_clinicians():
         assert len(tops) == 3
         assert 75 <= min(tops) <= max(tops) <= 163
         assert size[-1] == 0.0
+
+
+def tops_of(hand, duration, seed=0):
+    times, rows = course(hand, duration, seed)
+    size = np.hypot(*rows.T)
+    assert size[-1] == 0.0
+    return [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
+
+
+def test_vacuum_pulls_are_those_of_births_as_far_as_the_rig_holds_them():
+    np.testing.assert_allclose(tops_of(SCENARIOS["vacuum"].nominal()[1], 24.0), (176, 225, 241))
+    tops = np.array([tops_of(SCENARIOS["vacuum"].varied()[1], 24.0, seed) for seed in range(100)])
+    assert tops.shape == (100, 3)
+    assert 5 <= tops.min() < 20
+    assert tops.max() == pytest.approx(225.0)
+    # 34 % of 300 pulls are above 216 N: within three standard deviations of a binomial draw.
+    assert abs(np.mean(tops > 216) - 0.34) < 3 * np.sqrt(0.34 * 0.66 / 300)
+    fractions = np.array([0.0, 0.33, 0.66, 0.67, 1.0])
+    expected = (5.0, 110.5, 216.0, 216 + 236 * 0.01 / 0.34, 225.0)
+    np.testing.assert_allclose([VacuumPulls((f,), 70.0).peak(f, None) for f in fractions], expected)
+
+
+@pytest.mark.parametrize("randomize", [False, True])
+def test_the_rig_can_hold_every_vacuum_pull(randomize):
+    env = gymnasium.make_vec("BirthSIM/Vacuum-v0", num_envs=200, randomize=randomize)
+    env.reset(seed=0)
+    assert required_strength_ratio(env).max() < (0.95 if randomize else 0.98)
 
 
 def test_contractions_peak_between_40_and_125_newtons_with_4_or_5_pushes():

@@ -39,16 +39,14 @@ def package(tmp_path):
     folder = tmp_path / "birthsim_env"
     folder.mkdir()
     for name in (
-        "physics/compilation",
         "loop/signals",
-        *(
-            f"physics/{part}"
-            for part in ("lanes", "parameters", "electronics", "quantities", "reading", "values", "exact", "valves")
-        ),
+        *(f"physics/{part}" for part in ("electronics", "valves")),
+        *(f"physics/compiled/{part}" for part in ("compilation", "lanes", "exact")),
+        *(f"physics/rig/{part}" for part in ("parameters", "quantities", "reading", "sections", "values")),
     ):
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "birthsim_env" / f"{name}.py", (folder / name).parent)
-    for room in (folder, folder / "physics", folder / "loop"):
+    for room in (folder, *(path for path in folder.rglob("*") if path.is_dir())):
         (room / "__init__.py").touch()
     (folder / "probe.py").write_text(PROBE)
     return folder

@@ -9,7 +9,7 @@ import pytest
 from baselines.bench.accuracy.motions import PERIOD, PERIODS, strong
 from baselines.bench.accuracy.second_model import SecondModel
 from birthsim_env.physics import spools
-from birthsim_env.physics.compiled.lanes import parameter_array
+from birthsim_env.physics.compiled.lanes import DEADBAND, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -96,7 +96,7 @@ def test_a_perfect_lane_among_worn_ones_has_the_bits_of_a_perfect_rig():
     np.testing.assert_array_equal(run(2, 3, randomize=ranges), run(2, 3))
     env = gymnasium.make_vec(CIRCLE, num_envs=2)
     env.reset(seed=3)
-    env.unwrapped.simulation.plant.lane_parameters[-3, 1] = 0.05
+    env.unwrapped.simulation.plant.lane_parameters[DEADBAND, 1] = 0.05
     env.unwrapped.simulation.forget_loops()
     rng = np.random.default_rng(0)
     for _ in range(40):

@@ -16,7 +16,7 @@ from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from tests.oracles import closed_loop
@@ -225,7 +225,7 @@ def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
 def test_whatever_a_policy_says_there_are_gains(scenario: str) -> None:
     """All entries at their limits, in all combinations: a law without gains would refuse by an exception."""
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 5)).reshape(5, -1).T.astype(np.float32)
-    name = f"BirthSIM/{scenario.capitalize()}Residual-v1"
+    name = environment_id(scenario, "Residual")
     env = gymnasium.make_vec(name, num_envs=len(corners), impedance="variable", randomize=True)
     env.reset(seed=0)
     rng = np.random.default_rng(0)

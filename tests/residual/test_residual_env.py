@@ -18,11 +18,11 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES, SIZE
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from tests.oracles.residual_parts import UnexplainedForceObserver
 
 assert birthsim_env  # importing it registers the ids
-IDS = tuple(f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS)
+IDS = tuple(environment_id(name, "Residual") for name in SCENARIOS)
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
 RIG = Parameters()
 

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from baselines.estimation.stages import MOTION
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
-from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, prepare
+from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, WANTED, feedforward
 from baselines.rivals.tracking import TrackingController
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.rows import USER_FORCE
 from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
@@ -29,15 +33,15 @@ TILTED = Parameters().replace(
 
 
 def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, force_rate: Array | float = 0.0) -> Array:
-    """``needed`` of ``prepare`` for a motion of the joints (8, N), whose jerk lacks the user's ``force_rate`` / m."""
+    """What the stage finds needed, (5, N), for a motion of the joints (8, N); its jerk lacks the user's ``force_rate`` / m."""
     motion = derived.cartesian(joints, rig).rows[:8].copy()
     motion[6:8] -= force_rate / rig.mechanics.mass
-    lanes = joints.shape[1]
-    out = np.empty((4, lanes)), np.empty((8, lanes)), np.empty((NEEDED, lanes))
-    prepare(motion[:4].copy(), False, motion, force, parameter_column(rig), fraction, *out)
-    np.testing.assert_allclose(out[0], joints[:4], atol=1e-12)
-    np.testing.assert_allclose(out[1][:6], joints[:6], atol=1e-10)
-    return out[2]
+    stage, lanes = feedforward(rig, fraction), joints.shape[1]
+    wanted, needed = np.empty((8, lanes)), np.empty((5, lanes))
+    placed = [(motion, MOTION), (force.copy(), USER_FORCE), (wanted, WANTED), (needed, NEEDED)]
+    Loop(lanes, [], placed, [Stage(stage.function, stage.constants, sees_world=False)]).run()
+    np.testing.assert_allclose(wanted[:6], joints[:6], atol=1e-10)
+    return needed
 
 
 @pytest.mark.parametrize("rig", [Parameters(), TILTED], ids=["default", "tilted"])
@@ -173,7 +177,8 @@ def test_the_linear_model_is_the_control_model_about_rest() -> None:
 def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
     rig, tolerances = TILTED, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)))
-    table, low, step, *_ = law._designs["lab"]
+    design = np.array([0.0, *law._designs["lab"]])
+    low, step, table = design[lqr.LOWEST], design[lqr.STEP], design[lqr.TABLE :].reshape(8, lqr.SCHEDULE)
     high = low + step * (lqr.SCHEDULE - 1)
     strokes = np.array(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 5))).reshape(2, -1)
     kappa = np.hypot(*geometry.jacobian(strokes * [[rig.cylinder1.stroke], [rig.cylinder2.stroke]], rig)[:, 0])

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
+from baselines.estimation.observers import PistonObserver
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-from baselines.rivals.tracking import TrackingController, beyond
+from baselines.rivals.tracking import INTEGRAL, TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
@@ -48,6 +49,11 @@ def rivals(kind: type[TrackingController], count: int) -> list[TrackingControlle
     for rival in found:
         rival.reset()
     return found
+
+
+def integrals(law: TrackingController) -> Array:
+    """Of cylinders 1 and 2, (2, N)."""
+    return law._memories[-1][INTEGRAL : INTEGRAL + 2].copy()
 
 
 def circle_error(command: Callable[..., Array], rig: Parameters, lab: bool) -> tuple[float, float]:
@@ -184,25 +190,29 @@ def test_the_integral_of_the_pid_rests_while_the_supply_gives_no_more() -> None:
         changes = {"position": start.position + offset * np.array([[1.0], [1.0]]), "pressures": np.array(pressures)[:, None]}
         law.reset()
         law.command(dataclasses.replace(start, position=changes["position"]), reference)
-        before = law._integral.copy()
+        before = integrals(law)
         for _ in range(10):
             openings = law.command(dataclasses.replace(start, **changes), reference)
         assert np.abs(openings).max() < 1
-        assert np.array_equal(law._integral, before)
+        assert np.array_equal(integrals(law), before)
 
 
 @every_rival
-def test_the_observer_is_told_what_is_known(rival: type[TrackingController], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_observer_is_told_what_is_known(rival: type[TrackingController]) -> None:
     """The measured force, and in which lanes the compliant motion is faster than 1 mm/s."""
-    told, (law,) = [], rivals(rival, 1)
-    update = law._observer.update
-    monkeypatch.setattr(law._observer, "update", lambda m, f, moving: told.append((f, moving)) or update(m, f, moving=moving))
-    ((measured, reference),) = signals(2, 1, True)
-    reference.rows[2] = [2e-3, 5e-4]
-    law.command(measured, reference)
-    force, moving = told[0]
-    assert np.array_equal(force, measured.user_force)
-    assert moving.tolist() == [1, 0]
+    (law,), rig = rivals(rival, 1), Parameters()
+    told = PistonObserver(rig, parameter_column(rig))
+    for measured, reference in signals(2, 40, True):
+        measured = dataclasses.replace(measured, user_force=np.zeros((2, 2)))
+        reference.rows[2] = [2e-3, 5e-4]
+        law.command(measured, reference)
+        told.update(measured, measured.user_force, moving=np.array([1.0, 0.0]))
+    assert np.array_equal(law._memories[1], told._memory)
+    assert told.rest[0, 0] == 0 < told.rest[0, 1]
+    pushed = dataclasses.replace(measured, user_force=np.full((2, 2), 3.0))
+    law.command(pushed, reference)
+    told.update(pushed, pushed.user_force, moving=np.ones(2))
+    assert np.array_equal(law._memories[1][:, 0], told._memory[:, 0])
 
 
 def test_the_dead_zone_is_continuous() -> None:
@@ -241,6 +251,22 @@ def test_signals_over_different_lanes_are_refused(rival: type[TrackingController
             law.command(mixed, reference)
     with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
         law.command(measured, fewer_wanted)
+
+
+@every_rival
+def test_what_a_rival_has_no_use_for_is_refused(rival: type[TrackingController]) -> None:
+    (law,), ((measured, reference),) = rivals(rival, 1), signals(2, 1, False)
+    for name in ("feedforward_force", "feedforward_rate"):
+        with pytest.raises(ValueError, match=f"{name} is given; allowed: damping_factor besides the signals"):
+            law.command(measured, reference, **{name: np.zeros((2, 2))})
+
+
+@every_rival
+def test_a_spring_that_pushes_is_refused(rival: type[TrackingController]) -> None:
+    (law,), ((measured, reference),) = rivals(rival, 1), signals(3, 1, False)
+    reference.rows[[8, 9, 14], 1] = 2000.0, 2000.0, 2500.0
+    with pytest.raises(ValueError, match=r"N/m in lane 1; allowed: more than 0 N/m in every direction"):
+        law.command(measured, reference)
 
 
 def test_rivals_go_by_name() -> None:

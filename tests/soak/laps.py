@@ -18,7 +18,7 @@ from agents.residual.settings import IMPEDANCES, LAWS, NO_LAW
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.hands.moving_hands import HANDS
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -135,7 +135,7 @@ def run(number: int, seed: int, lanes: int = LANES, steps: int = STEPS, progress
     rig = Parameters().replace({**world.corner, "friction.law": world.friction})
     residual = "law" in world.arguments
     env: Any = gymnasium.make_vec(
-        f"BirthSIM/{world.scenario.capitalize()}{'Residual' if residual else ''}-v1", num_envs=lanes, parameters=rig,
+        environment_id(world.scenario, "Residual" if residual else ""), num_envs=lanes, parameters=rig,
         sensors=world.sensors, randomize=world.randomize, user_force=world.hand, num_threads=1,
         autoreset_mode=AutoresetMode.SAME_STEP, **world.arguments,
     )  # fmt: skip

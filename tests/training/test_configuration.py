@@ -14,7 +14,7 @@ import yaml
 import agents
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import FOLDER, TrainingSettings, configuration_names, load_configuration, override
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 assert agents  # importing it registers the ids
 
@@ -22,7 +22,7 @@ assert agents  # importing it registers the ids
 def test_there_is_a_configuration_for_every_scenario():
     assert set(SCENARIOS) <= set(configuration_names())
     for name in SCENARIOS:
-        assert load_configuration(name)[0].environment == f"BirthSIM/{name.capitalize()}Residual-v1"
+        assert load_configuration(name)[0].environment == environment_id(name, "Residual")
 
 
 @pytest.mark.parametrize("name", configuration_names())
@@ -142,7 +142,7 @@ def test_values_of_a_wrong_kind_are_refused_too(tmp_path, text, message):
 
 @pytest.mark.parametrize("name", ["square", "circle.toml", "nowhere/circle", ""])
 def test_a_configuration_that_is_not_there_is_refused_with_those_that_are(name):
-    with pytest.raises(ValueError, match=r"is no file; allowed: circle, .*probe, or a TOML file") as caught:
+    with pytest.raises(ValueError, match=r"is no file; allowed: circle, .*vacuum, or a TOML file") as caught:
         load_configuration(name)
     assert repr(name or ".") in str(caught.value) or repr(name) in str(caught.value)
 
@@ -170,7 +170,7 @@ RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))
 
 
 def test_rl_zoos_file_has_every_scenario():
-    assert set(RL_ZOO) == {f"BirthSIM/{name.capitalize()}Residual-v1" for name in SCENARIOS}
+    assert set(RL_ZOO) == {environment_id(name, "Residual") for name in SCENARIOS}
 
 
 @pytest.mark.parametrize("name", sorted(SCENARIOS))

@@ -12,7 +12,7 @@ from moviepy import VideoFileClip
 
 import birthsim_env
 
-IDS = [f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia")]
+IDS = [*(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia")), "BirthSIM/Vacuum-v0"]
 STEPS = 40
 
 

@@ -18,6 +18,10 @@ from birthsim_env.physics.rig.values import is_finite, shown
 
 Ranges = Mapping[str, tuple[float, float]]
 
+RANDOMIZE = (False, True, "plant", "scenario", "sensors")
+"""Words of the environments' argument ``randomize``. With ``"sensors"`` the rig is the one described, and what a law believes
+about its sensors is wrong: their figures are drawn, and the scenario varies."""
+
 SHARED = ("geometry", "electronics", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed")
 """Sections and fields in which lanes cannot differ: workspace, clock and the limit of an episode are those of the nominal rig,
 and sensors too where their model does not draw them (``sensors.drawn_by``)."""
@@ -60,16 +64,25 @@ def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, 
     return {name: pair for name, pair in ranges.items() if name not in left_out}
 
 
+def ranges_of(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
+    """The ``documented_ranges`` that a word of the environments' argument ``randomize`` draws from, one of ``RANDOMIZE``."""
+    if randomize in (False, "scenario"):
+        return {}
+    ranges = documented_ranges(nominal, sensors)
+    return {name: ranges[name] for name in ranges if randomize != "sensors" or name in drawn_by(sensors)}
+
+
 def described(nominal: Parameters, randomize: Any, sensors: str = "ideal") -> str:
     """What the environments' argument ``randomize`` draws of the rig, in words: ``rigs drawn: mass 2 to 5 kg, ...``."""
     if not isinstance(randomize, Mapping):
-        randomize = documented_ranges(nominal, sensors) if randomize in (True, "plant") else {}
+        randomize = ranges_of(nominal, randomize, sensors)
     named = []
     for name, (low, high) in randomize.items():
         section, _, own = name.partition(".")
         words = f"{own} of {section}" if section.startswith("cylinder") else own
         named.append(f"{words.replace('_', ' ')} {low:.4g} to {high:.4g} {field_of(name).metadata['unit']}")
-    return f"rigs drawn: {', '.join(named)}" if named else "the rig as described"
+    drawn = "rigs" if set(randomize) - set(drawn_by(sensors)) else "sensors"
+    return f"{drawn} drawn: {', '.join(named)}" if named else "the rig as described"
 
 
 def checked_ranges(ranges: Ranges, nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:

@@ -9,7 +9,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import FORCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
@@ -243,105 +242,18 @@ class Pulls(ForceProfile):
         self.sizes, self.rate, self.angle = sizes, rate, angle
         self.begins, self.hold, self.release, self.pause = begins, hold, release, pause
 
+    def peak(self, size: Range, rng: np.random.Generator) -> Any:
+        """Force of a pull, N, from its entry in ``sizes``."""
+        return draw(size, rng)
+
     @vectorised
     def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
         knots = [(0.0, 0.0, 0.0)]
         now = self.begins
         for sizes in self.sizes:
-            size, rate = draw(sizes, rng), draw(self.rate, rng)
+            size, rate = self.peak(sizes, rng), draw(self.rate, rng)
             along, across = exact.direction(draw(self.angle, rng))
             x, y, top = size * along, size * across, now + size / rate
             knots += [(now, 0.0, 0.0), (top, x, y), (top + self.hold, x, y), (top + self.hold + self.release, 0.0, 0.0)]
             now = top + self.hold + self.release + self.pause
         return knots
-
-
-@kernel
-def _contraction(
-    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
-    knots: Array,
-) -> None:  # fmt: skip
-    """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
-
-    It carries 1 - ``fraction``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
-    a unit vector.
-    """
-    least = bumps.min()
-    pushes = np.empty(bumps.max() - least + 1)
-    for k in range(time.shape[0]):
-        middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
-        contraction = exact.sine(math.pi * time[k] / lasts)
-        for more in range(pushes.shape[0]):
-            pushes[more] = exact.sine(math.pi * (least + more) * middle)
-        for i in range(lanes.shape[0]):
-            push = pushes[bumps[i] - least]
-            force = size[i] * ((1.0 - fraction[i]) * contraction * contraction + fraction[i] * push * push)
-            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
-
-
-class Contractions(ForceProfile):
-    """Uterine contractions: sin^2 of ``lasts`` s and ``amplitude`` N, with maternal pushes on top, along ``heading``.
-
-    Each contraction carries ``pushes`` sin^2 bumps of ``push`` times its amplitude over its middle half (assumed).
-    """
-
-    GRID = 0.05
-    """s between knots: below 0.2 % of the amplitude in error."""
-
-    def __init__(
-        self,
-        amplitude: Range = 80.0,
-        count: int = 2,
-        lasts: float = 12.0,
-        pushes: tuple[int, int] = (4, 5),
-        push: Range = 0.25,
-        heading: float = 0.0,
-    ) -> None:
-        super().__init__()
-        self.amplitude, self.count, self.lasts, self.pushes, self.push = amplitude, count, lasts, pushes, push
-        self.heading = heading
-        checked_range("amplitude", amplitude, "N", least=-STRONGEST, most=STRONGEST)
-        checked_count("count", count, 1, MOST)
-        checked_number("lasts", lasts, "s", least=2 * self.GRID, most=3600.0)
-        if not (isinstance(pushes, tuple) and len(pushes) == 2):
-            raise ValueError(f"pushes = {shown(pushes)}; allowed: the least and the most pushes of a contraction")
-        checked_count("pushes, the most", pushes[1], checked_count("pushes, the least", pushes[0], 0, MOST), MOST)
-        checked_range("push", push, "1", least=0.0, most=1.0)
-        checked_number("heading", heading, "rad", least=-TURNED, most=TURNED)
-
-    def knots(self, rng: np.random.Generator) -> list[tuple[float, float, float]]:
-        table = self._table(1)
-        self._contract(table, np.zeros(1, dtype=np.int64), rng)
-        return [tuple(knot) for knot in table[:, :, 0].tolist()]
-
-    def prepare(self, num_envs: int) -> None:
-        self._knots = self._table(num_envs)
-        self._counts = np.full(num_envs, float(len(self._knots)))
-
-    @vectorised
-    def begin(self, lane: int, rng: np.random.Generator) -> None:
-        if type(self).knots is Contractions.knots:
-            self._contract(self._knots, np.atleast_1d(lane), rng)
-        else:
-            super().begin(lane, rng)
-
-    @property
-    def _time(self) -> Array:
-        """Since a contraction began, s, (M,)."""
-        return np.arange(0.0, self.lasts, self.GRID)
-
-    def _table(self, lanes: int) -> Array:
-        """Knots (M, 3, N) without forces; their times are the same in all lanes and episodes."""
-        times = [begins + self._time for begins in self.lasts * np.arange(self.count)]
-        table = np.zeros((self.count * len(self._time) + 1, 3, lanes))
-        table[:, 0] = np.concatenate([*times, [self.count * self.lasts]])[:, None]
-        return table
-
-    def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
-        """Draw the forces of the lanes (L,) of a table of knots."""
-        time, along = self._time, np.array(exact.direction(self.heading))
-        for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
-            size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
-            bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
-            drawn = (np.full(len(lanes), number) for number in (size, fraction, bumps))
-            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]

@@ -33,13 +33,13 @@ from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, tabl
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import sensor_errors as at
 from birthsim_env.parts.sensors import tracker
-from birthsim_env.parts.sensors.noise import happens, normal
+from birthsim_env.parts.sensors.noise import happens, normal, uniform
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.electronics import Electronics
 
-TRACKED, NOISE_OF_FORCE, LOST, MISSED = 4, 6, 8, 9
+TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
 """Channels of random numbers; the pressures have the first four, all as the sensor model ``lab``."""
 
 SHOWN = 11
@@ -140,14 +140,21 @@ def _honest_stage(world: int, seen: int, memory: int, constants: int, tables: in
 
 @kernel
 def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Array, last: Array, openings: Array) -> None:
-    """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period."""
+    """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period.
+
+    A clock that jitters is late by a fraction of the period, drawn uniformly. What is put out is then the mean of both openings
+    over the period: the spool, with a lag of ``tau``, misses what it would do by at most (T/tau)^2/8 of the change.
+    """
     for i in range(ticks.shape[0]):
         tick = int(ticks[i])
         missed = tick > 0 and happens(keys[i], tick, MISSED, e[at.MISSED, i])
+        jitters = tick > 0 and e[at.JITTER, i] > 0.0
+        late = e[at.JITTER, i] * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if jitters else 0.0
         for valve in range(4):
             told = _converted(openings[valve, i], e[at.OPENING_STEP, i], -1.0, 1.0)
-            last[valve, i] = last[valve, i] if missed else told
-            openings[valve, i] = last[valve, i]
+            told = last[valve, i] if missed else told
+            openings[valve, i] = told + late * (last[valve, i] - told)
+            last[valve, i] = told
 
 
 @kernel
@@ -233,7 +240,8 @@ class HonestSensors:
         return Stage(_honest_stage, self._constants, tables=tables)
 
     def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
-        """What reaches the valves of ``openings`` (4, N): through the converter, and not at all in a missed period."""
+        """What reaches the valves of ``openings`` (4, N): converted, late by the clock's jitter, and not at all in a missed
+        period."""
         out = np.array(openings, dtype=np.float64)
         _put_out(ticks, self._keys, self._errors, self._last, out)
         return out

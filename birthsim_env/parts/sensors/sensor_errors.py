@@ -16,11 +16,13 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.electronics import Electronics
 
-FIGURES = tuple(field.name for field in dataclasses.fields(Electronics) if field.metadata["randomized"])
+FIGURES = tuple(
+    field.name for field in dataclasses.fields(Electronics) if field.metadata["randomized"] or field.metadata["worth"]
+)
 """Figures in which lanes may differ, in the order of their fields."""
 (
     POSITION_NOISE, POSITION_LATENCY, PRESSURE_NOISE, FORCE_NOISE, FORCE_BIAS, FORCE_GAIN, FORCE_CROSSTALK, FORCE_BANDWIDTH,
-    FORCE_LATENCY, GROWTH, DISTORTION, LENGTH, SCALE, DROPOUT, PRESSURE_BIAS, ADC_BITS, DAC_BITS, MISSED,
+    FORCE_LATENCY, GROWTH, DISTORTION, LENGTH, SCALE, DROPOUT, PRESSURE_BIAS, ADC_BITS, DAC_BITS, MISSED, JITTER,
 ) = range(len(FIGURES))  # fmt: skip
 
 WAVES = 3

@@ -32,6 +32,9 @@ PRESSURES = (PP1, PN1, PP2, PN2)
 TEMPERATURES = (TP1, TN1, TP2, TN2)
 SPOOLS = (S1P, S1N, S2P, S2N)
 
+SHORTEST_TUBE = 0.05
+"""m. A shorter tube has the lag of one of this length, 0.15 ms, which steps of 0.25 ms follow."""
+
 PARAMETER_NAMES = (
     *("d_squares", "d_product", "sin_gamma3", "cos_gamma3", "k1", "k2", "half_l1", "half_l2"),
     *("mass", "gravity", "stop_stiffness", "stop_damping"),
@@ -42,6 +45,7 @@ PARAMETER_NAMES = (
     *("gas", "gamma", "index", "rho0", "t0"),
     *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
     *("deadband", "play", "opening_limit"),
+    *("source", "line", "line_gain", "mode_rate", "mode_damping", "handle", "tube_rate"),
 )
 PARAMETERS = len(PARAMETER_NAMES)
 (
@@ -103,6 +107,13 @@ PARAMETERS = len(PARAMETER_NAMES)
     DEADBAND,
     PLAY,
     OPENING_LIMIT,
+    SOURCE,
+    LINE,
+    LINE_GAIN,
+    MODE_RATE,
+    MODE_DAMPING,
+    HANDLE,
+    TUBE_RATE,
 ) = range(PARAMETERS)
 
 
@@ -113,7 +124,10 @@ def parameter_column(parameters: Parameters) -> Array:
     name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). Rows from ``knee`` to
     ``inverse_mass`` spare divisions: ``knee`` is
     1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
-    equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed.
+    equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed. Rows from ``source`` on are those of ``physics.options``:
+    ``supply`` is the pressure at the valves now, ``source`` what it begins with and what stands before the line, ``line`` the
+    line's conductance, ``line_gain`` r T/V of the reservoir, ``mode_rate`` 2 pi f, ``handle`` the handle's share of the mass,
+    ``tube_rate`` c/L; the dead volume has that of the tube in it.
     """
     return np.array(_rows(parameters), dtype=np.float64)
 
@@ -131,6 +145,9 @@ def _rows(parameters: Parameters) -> tuple[Any, ...]:
     f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
     fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction
     conductance = v.sonic_conductance
+    tube = np.pi / 4 * ch.tube_diameter * ch.tube_diameter * ch.tube_length
+    sound = np.sqrt(a.heat_capacity_ratio * a.gas_constant * a.temperature)
+    tube_rate = np.where(np.greater(ch.tube_length, 0.0), sound / np.maximum(ch.tube_length, SHORTEST_TUBE), 0.0)
     return (
         *(g.d3 * g.d3 + g.d6 * g.d6, 2 * g.d3 * g.d6, exact.number("sine", g.gamma3), exact.number("cosine", g.gamma3)),
         *(g.k1, g.k2, c1.stroke / 2, c2.stroke / 2),
@@ -139,7 +156,7 @@ def _rows(parameters: Parameters) -> tuple[Any, ...]:
         *(c1.viscous_friction, c2.viscous_friction, f.stribeck_speed, f.bristle_stiffness, f.bristle_damping, f.sign_speed),
         *(float(f.law == "elasto_plastic"), f.breakaway_ratio, 1 / (1 - f.breakaway_ratio)),
         *(c1.area_p, c1.area_n, c2.area_p, c2.area_n, np.pi * c1.piston_diameter, np.pi * c2.piston_diameter),
-        *(ch.dead_volume, ch.wall_heat_transfer, ch.piston_conductance),
+        *(ch.dead_volume + tube, ch.wall_heat_transfer, ch.piston_conductance),
         *(conductance, v.critical_ratio, v.leakage_ratio * conductance, v.time_constant),
         *(a.supply_pressure, a.atmospheric_pressure, a.temperature),
         *(a.gas_constant, a.heat_capacity_ratio, a.polytropic_index, a.reference_density, a.reference_temperature),
@@ -147,6 +164,8 @@ def _rows(parameters: Parameters) -> tuple[Any, ...]:
         *(a.reference_temperature / a.temperature, 1 / a.supply_pressure, 1 / a.atmospheric_pressure),
         *(1 / v.time_constant, 1 / f.sign_speed, 1 / m.mass),
         *(v.deadband, v.hysteresis, v.opening_limit),
+        *(a.supply_pressure, a.supply_conductance, a.gas_constant * a.temperature / a.supply_volume),
+        *(2 * np.pi * m.mode_frequency, m.mode_damping, m.mode_mass_fraction, tube_rate),
     )
 
 

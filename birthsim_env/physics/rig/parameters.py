@@ -1,9 +1,8 @@
-"""The rig as data: frozen, validated dataclasses with the unit and the basis of every figure, and their TOML file."""
+"""The rig as data: a frozen, validated dataclass of sections, what they must fulfil together, and its TOML file."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,143 +10,20 @@ from typing import Any
 import tomli_w
 
 from birthsim_env.physics.electronics import Electronics
-from birthsim_env.physics.rig.quantities import Part, quantity
 from birthsim_env.physics.rig.reading import read_toml
+from birthsim_env.physics.rig.sections import Air, Chambers, Cylinder, Friction, Geometry, Mechanics, Valves
 from birthsim_env.physics.rig.values import in_line, is_finite, shown
+
+__all__ = [
+    "Air", "Chambers", "Cylinder", "Electronics", "Friction", "Geometry", "Mechanics", "Parameters", "Valves", "field_of",
+    "follow", "least_dead_volume", "load_parameters",
+]  # fmt: skip
 
 STOP_DEPTH = 0.01
 """m of piston travel that every chamber must keep as dead volume; collisions seen in tests go 5 mm deep."""
 
 FASTEST_RATE = 7000.0
 """1/s. Runge-Kutta steps of 0.25 ms are stable up to 11000; the spring of the bristles takes its share."""
-
-
-@dataclass(frozen=True)
-class Geometry(Part):
-    """Planar linkage of the paper's Fig. 1 and Table II; frame 0 at the pivot of cylinder 2, x forward, y up."""
-
-    d3: float = quantity(0.35, "m", "assumed", least=1e-3, most=10)
-    d6: float = quantity(0.25, "m", "assumed", least=1e-3, most=10)
-    gamma3: float = quantity(math.pi / 2, "rad", "assumed", least=-math.pi, most=math.pi)
-    k1: float = quantity(0.430, "m", "assumed; r4 = y1 + k1 (2)", least=1e-3, most=10)
-    k2: float = quantity(0.500, "m", "assumed; r2 = y2 + k2 (2)", least=1e-3, most=10)
-
-
-@dataclass(frozen=True)
-class Cylinder(Part):
-    """One double-acting, single-rod pneumatic cylinder."""
-
-    piston_diameter: float = quantity(0.025, "m", "Table I", least=1e-3, most=1)
-    rod_diameter: float = quantity(0.010, "m", "Table I, from its 295 and 247 N", least=0)
-    stroke: float = quantity(0.200, "m", "Table I", least=1e-3, most=10)
-    coulomb_friction: float = quantity(12.0, "N", "assumed, 4-5 % of the rated force", least=0, most=1e5, randomized=(6, 25))
-    viscous_friction: float = quantity(35.0, "N s/m", "assumed", least=0, most=1e5, randomized=(10, 60))
-
-    def _check_together(self) -> None:
-        if self.rod_diameter >= self.piston_diameter:
-            raise ValueError(
-                f"Cylinder.rod_diameter = {self.rod_diameter!r} is impossible; "
-                f"allowed: less than piston_diameter = {self.piston_diameter!r} (m)"
-            )
-
-    @property
-    def area_p(self) -> float:
-        """Piston area of chamber P, the full bore, m2."""
-        return math.pi / 4 * self.piston_diameter * self.piston_diameter
-
-    @property
-    def area_n(self) -> float:
-        """Piston area of chamber N, the bore less the rod, m2."""
-        return math.pi / 4 * (self.piston_diameter * self.piston_diameter - self.rod_diameter * self.rod_diameter)
-
-
-@dataclass(frozen=True)
-class Mechanics(Part):
-    """The point mass at the end effector and the end stops of the cylinders."""
-
-    mass: float = quantity(3.0, "kg", "assumed", above=0, most=1e20, randomized=(2, 5))
-    gravity: float = quantity(9.81, "m/s2", "standard", least=0, most=100)
-    stop_stiffness: float = quantity(5e6, "N/m", "assumed, rigid end caps", above=0, most=1e7)
-    stop_damping: float = quantity(1.0, "s/m", "assumed; force k p (1 + c dp/dt), Hunt and Crossley 1975", least=0, most=2)
-    impact_speed: float = quantity(0.1, "m/s", "assumed; a faster collision with an end stop is reported", above=0, most=100)
-
-
-@dataclass(frozen=True)
-class Friction(Part):
-    """Friction law of both pistons; the Coulomb and viscous levels belong to each cylinder."""
-
-    law: str = quantity(
-        "lugre",
-        "-",
-        "LuGre (Canudas de Wit 1995), the paper's (4), or elasto-plastic without presliding drift (Dupont 2002)",
-        choices=("lugre", "coulomb", "elasto_plastic"),
-    )
-    static_ratio: float = quantity(1.33, "-", "assumed; Fs/Fc", least=1, most=10)
-    stribeck_speed: float = quantity(0.015, "m/s", "assumed", least=1e-6, most=10)
-    bristle_stiffness: float = quantity(5e4, "N/m", "assumed; s0", least=1, most=5e5)
-    bristle_damping: float = quantity(150.0, "N s/m", "assumed; s1", least=0, most=2000)
-    breakaway_ratio: float = quantity(
-        0.7,
-        "-",
-        "assumed; z_ba/z_ss, elasto-plastic law only: below this fraction of the level it is a spring",
-        above=0,
-        most=0.9,
-    )
-    sign_speed: float = quantity(0.002, "m/s", "numerical; (4)'s sign(v) is v/sign_speed below it", least=0.001, most=10)
-
-
-@dataclass(frozen=True)
-class Chambers(Part):
-    """What all four chambers share: dead volume and heat exchange (the paper's section V)."""
-
-    dead_volume: float = quantity(10e-6, "m3", "assumed, tubing included; V0", above=0, most=1000, randomized=(5e-6, 25e-6))
-    wall_heat_transfer: float = quantity(
-        50.0, "W/(m2 K)", "assumed; h, cools in 0.2-1 s", least=0, most=1e4, randomized=(20, 100)
-    )
-    piston_conductance: float = quantity(0.012, "W/K", "assumed; G12, heat between the chambers of a cylinder", least=0, most=5)
-
-
-@dataclass(frozen=True)
-class Valves(Part):
-    """Proportional servovalve: ISO 6358 orifices behind a spool with a first-order lag."""
-
-    sonic_conductance: float = quantity(3.9e-9, "m3/(s Pa)", "from 100 l/min nominal, 6 to 5 bar; C", least=1e-12, most=2e-8)
-    critical_ratio: float = quantity(0.30, "-", "from 100 l/min nominal, 6 to 5 bar; b", least=0, most=0.9)
-    leakage_ratio: float = quantity(0.005, "-", "assumed; Cl/C", least=0, most=0.5)
-    time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, most=10, randomized=(0.0015, 0.008))
-    deadband: float = quantity(
-        0.0,
-        "-",
-        "off; opening within which nothing opens, up to 0.05 assumed of overlapped spools",
-        least=0,
-        most=0.5,
-        option=True,
-    )
-    hysteresis: float = quantity(
-        0.0, "-", "off; width of the play in the opening, up to 0.02 assumed", least=0, most=0.5, option=True
-    )
-    opening_limit: float = quantity(1.0, "-", "off; largest opening, 0.8 to 1 assumed", above=0, most=1, option=True)
-
-
-@dataclass(frozen=True)
-class Air(Part):
-    """Supply, surroundings and the gas itself; absolute pressures."""
-
-    supply_pressure: float = quantity(7.0e5, "Pa", "Table I quotes 6 bar gauge", above=0, most=15e5)
-    atmospheric_pressure: float = quantity(1.013e5, "Pa", "standard", least=1e4, most=2e5)
-    temperature: float = quantity(293.15, "K", "standard; supply, surroundings and walls", least=230, most=370)
-    gas_constant: float = quantity(287.05, "J/(kg K)", "standard; r of dry air", least=10, most=1e4)
-    heat_capacity_ratio: float = quantity(1.4, "-", "standard; gamma", least=1.01, most=2)
-    polytropic_index: float = quantity(1.2, "-", "assumed; k of the control model (6)", least=1, most=2)
-    reference_density: float = quantity(1.185, "kg/m3", "ISO 6358; rho0", least=0.01, most=100)
-    reference_temperature: float = quantity(293.15, "K", "ISO 6358; T0", least=100, most=1000)
-
-    def _check_together(self) -> None:
-        if self.supply_pressure <= self.atmospheric_pressure:
-            raise ValueError(
-                f"Air.supply_pressure = {self.supply_pressure!r} is impossible; "
-                f"allowed: more than atmospheric_pressure = {self.atmospheric_pressure!r} (Pa)"
-            )
 
 
 @dataclass(frozen=True)
@@ -211,9 +87,11 @@ class Parameters:
         f, viscous = self.friction, max(self.cylinder1.viscous_friction, self.cylinder2.viscous_friction)
         coulomb = max(self.cylinder1.coulomb_friction, self.cylinder2.coulomb_friction)
         damping = viscous + (coulomb / f.sign_speed if f.law == "coulomb" else f.bristle_damping)
-        if damping / self.mechanics.mass > FASTEST_RATE:
+        m = self.mechanics
+        damping /= 1 - m.mode_mass_fraction if m.mode_frequency else 1
+        if damping / m.mass > FASTEST_RATE:
             raise ValueError(
-                f"Mechanics.mass = {self.mechanics.mass!r} is impossible with this friction; allowed: at least "
+                f"Mechanics.mass = {m.mass!r} is impossible with this friction; allowed: at least "
                 f"{damping / FASTEST_RATE:.3g} kg, or less friction, so that steps of 0.25 ms follow the motion"
             )
 

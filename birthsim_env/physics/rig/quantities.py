@@ -20,11 +20,13 @@ def quantity(
     randomized: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
     option: bool = False,
+    worth: tuple[float, float] | None = None,
 ) -> Any:
     """A dataclass field that knows its unit, its basis, its limits and the range that domain randomisation draws from.
 
     ``Parameters.to_dict`` names an ``option`` only where it differs from its default: results that are stored by what it
-    returns keep their place when options are added.
+    returns keep their place when options are added. ``worth`` is the range that an option is worth being drawn from: it is
+    drawn only where ``randomize`` or the owner's ``ranges`` name it.
     """
     metadata = {
         "unit": unit,
@@ -35,6 +37,7 @@ def quantity(
         "randomized": randomized,
         "choices": choices,
         "option": option,
+        "worth": worth,
     }
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -66,6 +69,7 @@ class Part:
             if isinstance(field, dataclasses.Field):
                 m = field.metadata
                 drawn = f"; {m['randomized'][0]:g} to {m['randomized'][1]:g}" if m["randomized"] else ""
+                drawn += f"; worth drawing {m['worth'][0]:g} to {m['worth'][1]:g}" if m["worth"] else ""
                 lines.append(f"- ``{name}`` = {field.default!r} ({m['unit']}; {m['basis']}{drawn})")
         cls.__doc__ = "\n".join(lines)
 

@@ -16,10 +16,10 @@ import gymnasium
 import numpy as np
 
 from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy
+from agents.policy.seeds import best_policy, shipped_names
 from baselines.registry import CONTROLLERS, SLOW, make_controller
 from birthsim_env import Parameters
-from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 FILE = Path(__file__).parent / "fingerprints.json"
 LANES, SEED = 3, 7
@@ -37,7 +37,8 @@ def rows() -> dict[str, tuple[str, str, str]]:
     """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
     chosen = [("circle", "lab", name) for name in CONTROLLERS if name not in {*SLOW, *EXCEPTIONS}]
     for scenario in SCENARIOS:
-        chosen += [(scenario, "ideal", who) for who in ("openings", "backstepping", "residual")]
+        driven = ("openings", "backstepping", *(["residual"] if scenario in shipped_names() else []))
+        chosen += [(scenario, "ideal", who) for who in driven]
         chosen += [(scenario, "lab", "admittance-backstepping")]
     return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}
 
@@ -58,7 +59,7 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
         env: Any = gymnasium.make_vec(policy.environment, **shared, **policy.settings.to_dict())
     else:
         period = 0.01 if who == "openings" else Parameters().electronics.control_period
-        env = gymnasium.make_vec(f"BirthSIM/{scenario.capitalize()}-v1", **shared, policy_period=period)
+        env = gymnasium.make_vec(environment_id(scenario), **shared, policy_period=period)
     controller = None if who in ("openings", "residual") else make_controller(who, Parameters())
     rng = np.random.default_rng(SEED)
     observation, _ = env.reset(seed=SEED)

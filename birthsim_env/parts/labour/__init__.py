@@ -1,0 +1,1 @@
+"""A small biomechanical model of the second stage of labour."""

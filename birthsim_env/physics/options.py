@@ -1,0 +1,191 @@
+"""Options of the plant: a supply behind a line, tubes between valves and chambers, a handle on a flexible structure.
+
+Each is off where its figure is 0 (``supply_conductance``, ``tube_length``, ``mode_frequency``). Plants without any run the
+kernels of ``dynamics``, which know none of them. With an option the state has further rows:
+
+- the pressure Ps in a reservoir of volume V, isothermal, which the valves draw from and an ISO 6358 line fills from the source:
+  dPs/dt = r T (q(source, Ps) - sum of the valves' supply flows) / V. The line's critical ratio is the valves'.
+- flows into and out of each chamber, which follow those of the valve with a lag of the time that sound takes through the tube:
+  dq/dt = (q_valve - q) c / L. It stands for the delay L/c of Richer and Hurmuzlu 2000; their attenuation is left out.
+- position and velocity of the handle, a part ``mode_mass_fraction`` of the mass that hangs on the linkage's end by spring and
+  damper: m_h dvh/dt = Fu - k (xh - xc) - d (vh - vc), k = m_h w^2, d = 2 zeta w m_h, w = 2 pi f. The handle's position is
+  counted from where its weight holds it. Hand and tracker are at the handle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from birthsim_env.physics import dynamics, valves
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.geometry import end_effector_motion
+
+RESERVOIR, HANDLE, FLOWS = 0, 1, 5
+"""Further rows: pressure at the valves, Pa; x, y (m), vx, vy (m/s) of the handle; flows of chambers P1, N1, P2, N2, kg/s, four
+from the supply and four to the atmosphere."""
+FURTHER = 13
+ALL = at.STATES + FURTHER
+
+
+def are_off(parameters: Array) -> bool:
+    """Whether no lane has any of the options, (PARAMETERS, N)."""
+    return not parameters[[at.LINE, at.MODE_RATE, at.TUBE_RATE]].any()
+
+
+@helper
+def alter(p: Array, own: Array, n: int) -> None:
+    """Fill ``own`` (PARAMETERS, n), with which ``dynamics`` computes: without the handle's mass, but with all of the weight."""
+    for row in range(at.PARAMETERS):
+        for i in range(n):
+            own[row, i] = p[row, i]
+    for i in range(n):
+        rest = 1.0 - p[at.HANDLE, i]
+        bends = p[at.MODE_RATE, i] > 0.0
+        own[at.INVERSE_MASS, i] = p[at.INVERSE_MASS, i] / rest if bends else p[at.INVERSE_MASS, i]
+        own[at.GRAVITY, i] = p[at.GRAVITY, i] / rest if bends else p[at.GRAVITY, i]
+
+
+@helper
+def lagged_chamber(
+    x: Array, p: Array, dx: Array, i: int, chamber: int, pressure: int, temperature: int, other: int, spool: int, area: int,
+    perimeter: int, length: float, length_rate: float,
+) -> float:  # fmt: skip
+    """Rates of a chamber behind a tube, where there is one; returns what its valve draws from the supply, kg/s."""
+    supplied, exhausted = dynamics.flows_of(x, p, i, pressure, temperature, spool)
+    row = at.STATES + FLOWS + chamber
+    rate = p[at.TUBE_RATE, i]
+    dx[row, i], dx[row + 4, i] = rate * (supplied - x[row, i]), rate * (exhausted - x[row + 4, i])
+    if rate > 0.0:
+        inverse = 1.0 / (x[pressure, i] * (p[at.DEAD_VOLUME, i] + p[area, i] * length) * x[temperature, i])
+        dynamics.exchange(
+            x, p, dx, i, pressure, temperature, other, area, perimeter, length, length_rate, x[row, i], x[row + 4, i], inverse
+        )  # fmt: skip
+    return supplied
+
+
+@helper
+def right_hand_side(x: Array, u: Array, f: Array, own: Array, motion: Array, pull: Array, dx: Array, n: int) -> None:
+    """dx/dt of ``n`` lanes: state (ALL, n), openings (4, n), user force (2, n), parameters from ``alter``.
+
+    Scratch: ``motion`` (4, n) of the linkage's end, and ``pull`` (2, n), the force on it.
+    """
+    end_effector_motion(x[: at.STATES, :n], own[:, :n], motion[:, :n])
+    for i in range(n):
+        supply = x[at.STATES + RESERVOIR, i] if own[at.LINE, i] > 0.0 else own[at.SOURCE, i]
+        own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i] = supply, 1.0 / supply
+        rate, mass, bends = own[at.MODE_RATE, i], own[at.HANDLE, i] * own[at.MASS, i], own[at.MODE_RATE, i] > 0.0
+        for axis in range(2):
+            place, speed = at.STATES + HANDLE + axis, at.STATES + HANDLE + 2 + axis
+            bent, bending = x[place, i] - motion[axis, i], x[speed, i] - motion[2 + axis, i]
+            spring = mass * rate * (rate * bent + 2.0 * own[at.MODE_DAMPING, i] * bending)
+            pull[axis, i] = spring if bends else f[axis, i]
+            dx[place, i] = x[speed, i]
+            dx[speed, i] = (f[axis, i] - spring) / mass if bends else 0.0
+    dynamics.right_hand_side(x, u, pull, own, dx, n)
+    for i in range(n):
+        y1, v1, y2, v2 = x[at.Y1, i], x[at.V1, i], x[at.Y2, i], x[at.V2, i]
+        half1, half2 = own[at.HALF_L1, i], own[at.HALF_L2, i]
+        drawn = lagged_chamber(
+            x, own, dx, i, 0, at.PP1, at.TP1, at.TN1, at.S1P, at.AREA_P1, at.PERIMETER1, half1 + y1, v1
+        ) + lagged_chamber(x, own, dx, i, 1, at.PN1, at.TN1, at.TP1, at.S1N, at.AREA_N1, at.PERIMETER1, half1 - y1, -v1)
+        drawn += lagged_chamber(
+            x, own, dx, i, 2, at.PP2, at.TP2, at.TN2, at.S2P, at.AREA_P2, at.PERIMETER2, half2 + y2, v2
+        ) + lagged_chamber(x, own, dx, i, 3, at.PN2, at.TN2, at.TP2, at.S2N, at.AREA_N2, at.PERIMETER2, half2 - y2, -v2)
+        source, supply, inverse = own[at.SOURCE, i], own[at.SUPPLY, i], own[at.INVERSE_SUPPLY, i]
+        filled = own[at.LINE, i] * valves.driving_flow(
+            source, 1.0 / source, own[at.COLDNESS, i], supply, inverse, own[at.COLDNESS, i], own[at.RHO0, i],
+            own[at.CRITICAL, i], own[at.KNEE, i], own[at.LAMINAR, i],
+        )  # fmt: skip
+        dx[at.STATES + RESERVOIR, i] = own[at.LINE_GAIN, i] * (filled - drawn) if own[at.LINE, i] > 0.0 else 0.0
+
+
+@helper
+def add(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, ahead: float) -> None:
+    """``dynamics.stage`` of all rows."""
+    for row in range(ALL):
+        for i in range(n):
+            total[row, i] += weight * dx[row, i]
+            trial[row, i] = x[row, i] + ahead * dx[row, i]
+
+
+@helper
+def integrate(
+    state: Array, further: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, own: Array, n: int
+) -> None:
+    """``dynamics.integrate`` with options: moves ``state`` (18, n) and ``further`` (FURTHER, n), and keeps the supply of ``p``.
+
+    ``own`` (PARAMETERS, n) is scratch.
+    """
+    x, dx, total, trial = np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK))
+    motion, pull = np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    alter(p, own, n)
+    for row in range(ALL):
+        for i in range(n):
+            x[row, i] = state[row, i] if row < at.STATES else further[row - at.STATES, i]
+    for _ in range(steps):
+        for row in range(ALL):
+            for i in range(n):
+                total[row, i] = x[row, i]
+        right_hand_side(x, u, f, own, motion, pull, dx, n)
+        add(x, dx, total, trial, n, step / 6.0, step / 2.0)
+        right_hand_side(trial, u, f, own, motion, pull, dx, n)
+        add(x, dx, total, trial, n, step / 3.0, step / 2.0)
+        right_hand_side(trial, u, f, own, motion, pull, dx, n)
+        add(x, dx, total, trial, n, step / 3.0, step)
+        right_hand_side(trial, u, f, own, motion, pull, dx, n)
+        add(x, dx, total, trial, n, step / 6.0, 0.0)
+        for row in range(ALL):
+            for i in range(n):
+                x[row, i] = total[row, i]
+        dynamics.record_impacts(x, p, impacts, n)
+    dynamics.settle(x, n)
+    for row in range(ALL):
+        for i in range(n):
+            if row < at.STATES:
+                state[row, i] = x[row, i]
+            else:
+                further[row - at.STATES, i] = x[row, i]
+    for i in range(n):
+        if p[at.LINE, i] > 0.0:
+            p[at.SUPPLY, i], p[at.INVERSE_SUPPLY, i] = further[RESERVOIR, i], 1.0 / further[RESERVOIR, i]
+
+
+@kernel
+def advance(
+    state: Array, further: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array
+) -> None:
+    """``dynamics.advance`` with options; ``further`` (FURTHER, N) moves along, and so does the supply of ``parameters``."""
+    own = np.empty((at.PARAMETERS, BLOCK))
+    impacts[:] = 0.0
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        mine = slice(first, first + n)
+        for sample in range(forces.shape[0]):
+            integrate(
+                state[:, mine], further[:, mine], command[:, mine], forces[sample][:, mine], parameters[:, mine], steps, step,
+                impacts[:, mine], own, n,
+            )  # fmt: skip
+
+
+@kernel
+def port_motion(state: Array, further: Array, p: Array, motion: Array) -> None:
+    """Writes x, y, vx, vy of the end effector (4, N): of the handle where the structure bends."""
+    end_effector_motion(state, p, motion)
+    for i in range(state.shape[1]):
+        if p[at.MODE_RATE, i] > 0.0:
+            for row in range(4):
+                motion[row, i] = further[HANDLE + row, i]
+
+
+def at_rest(state: Array, parameters: Array) -> Array:
+    """Further rows (FURTHER, N) with which a state (18, N) begins, its supply that of the source.
+
+    The handle moves with the linkage, unbent, and what passes the valves passes the tubes.
+    """
+    further = np.empty((FURTHER, state.shape[1]))
+    further[RESERVOIR] = parameters[at.SOURCE]
+    end_effector_motion(state, parameters, further[HANDLE:FLOWS])
+    dynamics.mass_flows(state, parameters, further[FLOWS:])
+    return further

@@ -1,0 +1,168 @@
+"""An energy tank and a speed limit around any law."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.bench.haptics.worlds import resting
+from baselines.bench.stability import Cases, judge
+from baselines.limiter.controller import PortLimiter
+from baselines.limiter.port_energy import PortEnergy
+from baselines.registry import bare_name, known_options, make_controller
+from birthsim_env import Parameters
+from birthsim_env.loop.signals import Measurement
+
+RIG = Parameters()
+T = RIG.electronics.control_period
+KX, MASS = 2000.0, 4.0
+
+
+class Full:
+    """A law that opens everything."""
+
+    def command(self, measurement, reference):
+        return np.ones((4, measurement.position.shape[1]))
+
+    def reset(self, lanes=None):
+        self.forgotten = lanes
+
+
+def seen(time, position, velocity, force, late=0.0):
+    """A measurement of lanes that move along x about (0.5, 0)."""
+    lanes, zero = np.size(position), np.zeros(np.size(position))
+    place = np.array([0.5 + position, zero])
+    clock = np.full(lanes, time)
+    return Measurement(
+        clock, place, clock - late, np.array([np.ones(lanes) * velocity, zero]), np.full((4, lanes), 4e5),
+        np.array([np.ones(lanes) * force, zero]), late > 0,
+    )  # fmt: skip
+
+
+def targets(lanes=1):
+    return resting([(0.5, 0.0)] * lanes, [KX] * lanes)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0043, 0.0271])
+def test_work_is_the_integral_of_force_times_speed_however_late_positions_are(late):
+    """F = F0 cos(wt), x = X sin(wt + p): F0 X w cos(p)/2 per second. A trapezoid of T errs by (w T)^2/6 of F0 X w at most."""
+    w, force, size, phase = 2 * math.pi * 5.0, 20.0, 0.004, 0.7
+    energy, done, ticks = PortEnergy(T, 1), 0.0, round(2.0 / T)
+    for k in range(ticks + round(0.2 / T)):
+        now = k * T
+        stamp = now - late
+        # The first position is one of a rig that waits, so that every stamp has a force of its own time.
+        place = size * math.sin(w * stamp + phase)
+        work, asked, _ = energy.update(seen(now, np.array([place]), 0.0, force * math.cos(w * now), late), targets())
+        if stamp > 0.1 + 1e-9 and stamp <= 2.1 + 1e-9:
+            done += float(work[0])
+        assert asked[0] == 0.0
+    exact = 0.5 * force * size * w * math.cos(phase) * 2.0
+    assert done == pytest.approx(exact, abs=force * size * w * 2.0 * ((w * T) ** 2 / 6 + T))
+
+
+def test_a_position_that_is_not_new_does_no_work():
+    energy = PortEnergy(T, 1)
+    energy.update(seen(0.0, np.array([0.0]), 0.0, 10.0), targets())
+    work, _, offset = energy.update(seen(T, np.array([0.1]), 0.0, 10.0, late=T), targets())
+    assert work[0] == 0.0
+    assert offset[0, 0] == 0.0
+
+
+def run(damping, limiter, seconds=6.0, lanes=1):
+    """A mass on the spring that is asked for, with ``damping`` (N s/m), pushed to and fro: least authority, and at the end."""
+    w, place, speed, least = 2 * math.pi * 1.0, 0.0, 0.0, 1.0
+    for k in range(round(seconds / T)):
+        force = 30.0 * math.sin(w * k * T)
+        limiter.command(seen(k * T, np.full(lanes, place), speed, force), targets(lanes))
+        least = min(least, float(limiter.authority.min()))
+        speed += T * (force - damping * speed - KX * place) / MASS
+        place += T * speed
+    return least, float(limiter.authority[0])
+
+
+def test_a_spring_with_a_damper_keeps_all_its_authority():
+    assert run(60.0, PortLimiter(Full(), RIG)) == (1.0, 1.0)
+
+
+def test_one_that_gives_energy_loses_its_authority():
+    least, _ = run(-20.0, PortLimiter(Full(), RIG), 3.0)
+    assert least == 0.0
+    assert run(-20.0, PortLimiter(Full(), RIG, capacity=math.inf), 3.0) == (1.0, 1.0)
+
+
+def test_a_stiffer_spring_that_is_asked_for_is_paid_by_who_asks():
+    """Held 20 mm out while the setpoint doubles, then let back: the hand gets 0.8 J of which it gave 0.4 J."""
+    limiter, ends = PortLimiter(Full(), RIG, speed=math.inf), []
+    for soften in (1.0, 2.0):
+        limiter.reset()
+        for k in range(4000):
+            place = 0.02 * (min(k, 1000) / 1000 if k < 3000 else (4000 - k) / 1000)
+            stiffness = KX if k < 2000 else KX * soften
+            limiter.command(seen(k * T, np.array([place]), 0.0, stiffness * place), resting([(0.5, 0.0)], [stiffness]))
+        ends.append(limiter.authority[0])
+    assert ends == pytest.approx([1.0, 1.0])
+
+
+def test_beyond_the_speed_the_valves_drive_against_the_motion():
+    limiter, target = PortLimiter(Full(), RIG, capacity=math.inf, speed=0.5), targets()
+    assert (limiter.command(seen(0.0, np.zeros(1), 0.5, 0.0), target) == 1.0).all()
+    away = limiter.command(seen(T, np.zeros(1), 1.0, 0.0), target)[:, 0]
+    back = limiter.command(seen(2 * T, np.zeros(1), -1.0, 0.0), target)[:, 0]
+    # Cylinder 2 points along x at this pose: its chamber P, which pushes outwards, is emptied.
+    assert (away[2], away[3]) == (-1.0, 1.0)
+    np.testing.assert_array_equal(away, -back)
+
+
+def test_without_limits_a_law_is_itself_to_the_last_bit_and_lanes_do_not_meet():
+    free = PortLimiter(make_controller("backstepping", RIG), RIG, capacity=math.inf, speed=math.inf)
+    law, limited = make_controller("backstepping", RIG), PortLimiter(make_controller("backstepping", RIG), RIG)
+    alone = PortLimiter(make_controller("backstepping", RIG), RIG)
+    for k in range(50):
+        place = np.array([0.001, -0.002]) * k / 50
+        now, target = seen(k * T, place, 0.6, np.array([20.0, -20.0])), targets(2)
+        np.testing.assert_array_equal(free.command(now, target), law.command(now, target))
+        both = limited.command(now, target)
+        one = alone.command(
+            Measurement(now.time[1], now.position[:, 1], now.position_time[1], now.velocity[:, 1], now.pressures[:, 1],
+                        now.user_force[:, 1], False), type(target)(target.rows[:, 1]),
+        )  # fmt: skip
+        np.testing.assert_array_equal(both[:, 1], one)
+
+
+def test_a_lane_starts_anew():
+    inner = Full()
+    limiter = PortLimiter(inner, RIG)
+    run(-20.0, limiter, 3.0, lanes=2)
+    limiter.reset(np.array([True, False]))
+    assert limiter.authority[0] == 1.0 > limiter.authority[1]
+    np.testing.assert_array_equal(inner.forgotten, [True, False])
+    out = limiter.command(seen(0.0, np.full(2, 0.05), 0.0, -50.0), targets(2))
+    assert (out[:, 0] == 1.0).all(), "what was before a start does no work"
+
+
+@pytest.mark.parametrize(("name", "value"), [("capacity", 0.0), ("capacity", float("nan")), ("speed", -1.0), ("speed", "fast")])
+def test_limits_are_positive(name, value):
+    with pytest.raises(ValueError, match=f"{name} = "):
+        PortLimiter(Full(), RIG, **{name: value})
+
+
+def test_a_name_puts_any_law_behind_the_limits():
+    law = make_controller("limited:pid[bandwidth=50]", RIG)
+    assert isinstance(law, PortLimiter)
+    assert known_options("limited:pid") == known_options("pid")
+    assert bare_name("limited:mine.py:Mine[gain=2]") == "mine.py:Mine"
+    with pytest.raises(ValueError, match=r"controller = 'limited:none'"):
+        make_controller("limited:none", RIG)
+
+
+def test_a_clamp_that_swings_with_the_papers_law_gets_no_energy_behind_the_limits():
+    """20 kN/m, lab sensors: joules without the limits, see docs/haptics.md; with them what the row of issue 19 allows."""
+    case = Cases([RIG], np.array([20000.0]), np.array([KX]), np.zeros(1), np.zeros(1))
+    bare = judge(case, make_controller("backstepping", RIG), "lab", 0, None)
+    limited = judge(case, make_controller("limited:backstepping", RIG), "lab", 0, None)
+    assert bare.energy[0] > 1.0
+    assert limited.energy[0] < 0.05
+    assert limited.motion[0] < 2e-3
