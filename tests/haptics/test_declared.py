@@ -74,7 +74,7 @@ def test_a_coupled_stiffness_is_felt_along_the_push() -> None:
         ("pid", True),
         ("admittance-adaptive", True),
         ("admittance-sensorless", False),
-    ],  # fmt: skip
+    ],
 )
 def test_who_uses_the_force_of_the_hand(name: str, uses: bool) -> None:
     assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is uses
