@@ -38,7 +38,7 @@ class AdaptiveAdmittance(AdmittanceBackstepping):
 
     @property
     def gain_fraction(self) -> Array:
-        return self._memories[0][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
+        return self._memories[-1][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         g, rig = self._gains["lab" if sampled else "ideal"], self.parameters

@@ -20,10 +20,11 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.observers import REST, observe
-from baselines.estimation.state_estimator import MOVING_SPEED, disturbance_forces
+from baselines.estimation.state_estimator import disturbance_forces
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
+    DAMPING,
     FEEDFORWARD,
     OPENING,
     POSITION,
@@ -80,8 +81,7 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     spools, pressures, opened, joints = m[SPOOLS:PRESSURES], m[PRESSURES:OPENED], m[OPENED:JOINTS], m[JOINTS:LAW]
     pistons, levels, unexplained = m[PISTONS:], m[FRICTION:HAND], own[19:21]
     for i in range(n):
-        kx, ky, kxy = target[8, i], target[9, i], target[14, i]
-        missed += 0 if kx > 0.0 and kx * ky - kxy * kxy > 0.0 else 1
+        missed += 0 if admittance.is_stiffer(target[8, i], target[9, i], target[14, i], 0.0) else 1
         rest[0, i], rest[1, i] = 0.0, 0.0
     for i in range(n):
         for k in range(2):
@@ -90,12 +90,12 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
         tracker_noise.observe(m[TRACKER:BIAS], position, s[POSITION_TIME, :n], about[NOISE], fresh)
         if about[FORCE_SENSOR] > 0.0:
             force_bias.tare(m[BIAS:FRICTION], time, s[USER_FORCE:REFERENCE, :n], about[FORCE_BIAS], period, force)
-    admittance.give_way(m[OFFSET:FRESH], target, force, about[MASS], about[RATIO], period, told[4], fresh, motion)
+    admittance.give_way(m[OFFSET:FRESH], target, force, about[MASS], about[RATIO], period, s[DAMPING, :n], motion)
+    admittance.mark_moving(motion, moving)
     chamber_observer.observe(spools, pressures, opened, s[PRESSURE:USER_FORCE, :n], joints, p, period, about[TRUST], fresh)
     reference_friction.rub(motion, p, period, m[BRISTLES:SPOOLS], believed)
     drag = disturbance
     for i in range(n):
-        moving[i] = 1.0 if motion[2, i] * motion[2, i] + motion[3, i] * motion[3, i] > MOVING_SPEED * MOVING_SPEED else 0.0
         for k in range(2):
             if fresh[i] > 0.0:
                 levels[friction_level.LEVEL + k, i] = 1.0
