@@ -11,6 +11,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
+from baselines.admittance.adaptive_controller import AdaptiveAdmittance, SensorlessAdmittance
 from baselines.admittance.controller import AdmittanceBackstepping
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
@@ -39,6 +40,8 @@ CONTROLLERS: dict[str, Factory] = {
     "backstepping-force-first": partial(BacksteppingController, force_first=True),
     "backstepping-cartesian": CartesianBackstepping,
     "admittance-backstepping": AdmittanceBackstepping,
+    "admittance-adaptive": AdaptiveAdmittance,
+    "admittance-sensorless": SensorlessAdmittance,
     "pid": PositionPID,
     "lqr": LinearQuadratic,
     "sliding-mode": SlidingMode,

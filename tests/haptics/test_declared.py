@@ -67,7 +67,14 @@ def test_a_coupled_stiffness_is_felt_along_the_push() -> None:
 
 @pytest.mark.parametrize(
     ("name", "uses"),
-    [("backstepping", False), ("backstepping-cartesian", False), ("admittance-backstepping", True), ("pid", True)],
+    [
+        ("backstepping", False),
+        ("backstepping-cartesian", False),
+        ("admittance-backstepping", True),
+        ("pid", True),
+        ("admittance-adaptive", True),
+        ("admittance-sensorless", False),
+    ],
 )
 def test_who_uses_the_force_of_the_hand(name: str, uses: bool) -> None:
     assert uses_force(Condition(name, RIG, "ideal", 0, 0, force_sensor=True)) is uses

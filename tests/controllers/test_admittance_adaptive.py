@@ -1,0 +1,84 @@
+"""The adaptive law and the one without a force sensor."""
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.admittance import adaptive_stage as at
+from baselines.bench.evaluation import evaluate
+from baselines.bench.sensor_floor import probe_floor
+from baselines.commands.honest import as_described
+from baselines.registry import make_controller
+from birthsim_env.parts.drawn.randomization import documented_ranges
+from birthsim_env.physics.rig.parameters import Parameters
+
+NAMES = ("admittance-adaptive", "admittance-sensorless")
+
+
+def openings(name, sensors, lanes=3, steps=120, shown=None, **gains):
+    """Openings (steps, 4, lanes) of a law in the circle; ``shown`` changes the hand's force that it is shown."""
+    law = make_controller(name, Parameters(), **gains)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True)
+    env.reset(seed=[40 + k for k in range(lanes)])
+    told = []
+    for _ in range(steps):
+        seen = env.measurement if shown is None else replace(env.measurement, user_force=env.measurement.user_force + shown)
+        told.append(law.command(seen, env.reference))
+        env.step(told[-1].T)
+    env.close()
+    return np.array(told)
+
+
+def test_without_learning_it_is_the_law_that_it_derives_from():
+    np.testing.assert_array_equal(
+        openings("admittance-adaptive", "ideal", friction_rate=0.0), openings("admittance-backstepping", "ideal")
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("sensors", ["ideal", "honest"])
+def test_a_lane_of_many_is_the_single_one(name, sensors):
+    np.testing.assert_array_equal(openings(name, sensors)[:, :, :1], openings(name, sensors, lanes=1))
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "honest"])
+def test_without_a_force_sensor_the_hands_force_is_not_read(sensors):
+    np.testing.assert_array_equal(
+        openings("admittance-sensorless", sensors), openings("admittance-sensorless", sensors, shown=25.0)
+    )
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.6])
+def test_friction_that_is_not_as_believed_is_learned_on_a_circle(factor):
+    rig = Parameters()
+    changes = {f"cylinder{k}.coulomb_friction": factor * rig_cylinder.coulomb_friction
+               for k, rig_cylinder in ((1, rig.cylinder1), (2, rig.cylinder2))}  # fmt: skip
+    law = make_controller("admittance-adaptive", rig)
+    result = evaluate("BirthSIM/Circle-v1", law, "adaptive", 1, 0, progress=False, parameters=rig.replace(changes))
+    levels = law._memories[0][at.FRICTION : at.FRICTION + 2, 0]
+    assert not result.lost[0]
+    np.testing.assert_allclose(levels, factor, rtol=0.2)
+
+
+def test_floor_of_a_scale_error_is_that_error():
+    """x shown = x + s (x - registration): the place moves by 1/(1 + s) of what is asked for."""
+    off = {f"electronics.{name}": 0.0 for name in ("force_gain_error", "force_crosstalk", "position_distortion")}
+    rig = Parameters().replace({**off, "electronics.position_scale_error": 0.01})
+    floor = np.abs(probe_floor(rig, 16, 0)["stiffness_error"])
+    assert 0.6 < floor.max() <= 1.2  # drawn within 20 % of 1 %, times a number in [-1, 1)
+
+
+def test_sensors_as_described_are_the_same_in_all_worlds():
+    rig = as_described(Parameters().replace({"electronics.force_bias": 0.5}))
+    drawn = documented_ranges(rig, "honest")
+    assert drawn["electronics.force_bias"] == (0.5, 0.5)
+    assert drawn["electronics.position_noise"] == (1e-4, 1e-4)
+    assert drawn["mechanics.mass"] == documented_ranges(Parameters(), "honest")["mechanics.mass"]
+
+
+def test_nothing_wrong_leaves_nothing():
+    names = ("force_gain_error", "force_crosstalk", "position_distortion", "position_scale_error")
+    floor = probe_floor(Parameters().replace({f"electronics.{name}": 0.0 for name in names}), 4, 0)
+    assert all(np.abs(values).max() < 1e-9 for values in floor.values())
