@@ -43,7 +43,7 @@ ALLOWANCE = 0.1
 BACK, LASTING, RECOVERY = 0.05, 0.2, 2.0
 """s, time constants: authority comes back; a low authority lowers what it comes back to; that comes back."""
 
-FULL = 1.25
+FULL = 2.0
 
 
 class PortLimiter:
@@ -64,6 +64,11 @@ class PortLimiter:
         self._period = parameters.electronics.control_period
         self._rates = tuple(-math.expm1(-self._period / lag) for lag in (LASTING, RECOVERY, BACK))
         self.authority: Array = np.ones(0)
+
+    @property
+    def TOLD(self) -> tuple[str, ...]:  # noqa: N802
+        """What the law's ``command`` takes besides the signals, and this one hands on."""
+        return getattr(self.law, "TOLD", ())
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """That of the law, which holds where neither limit acts."""
