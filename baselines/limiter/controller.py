@@ -66,7 +66,7 @@ class PortLimiter:
         self.authority: Array = np.ones(0)
 
     @property
-    def TOLD(self) -> tuple[str, ...]:  # noqa: N802
+    def TOLD(self) -> tuple[str, ...]:
         """What the law's ``command`` takes besides the signals, and this one hands on."""
         return getattr(self.law, "TOLD", ())
 
