@@ -10,6 +10,7 @@ import numpy as np
 from baselines.backstepping import cartesian_law
 from baselines.backstepping.controller import PNEUMATIC_GAIN, SIGN_WIDTH
 from baselines.backstepping.impedance import cartesian_impedance
+from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import require_stiffness
 from baselines.estimation.stages import pistons
 from baselines.impedance import Impedance
@@ -49,8 +50,9 @@ class CartesianBackstepping(StagedController):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         law = LawStage(cartesian_law.control, np.array([*self._options, self._least_stiffness, *self._p]), np.zeros(0))
-        return [pistons(self.parameters, sampled, informed=False), law]
+        return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the first lane whose stiffness, a few 10 N/m, is too soft for positive gains."""
+        """Raise the error of the first lane whose stiffness is too large, or, a few 10 N/m, too soft for positive gains."""
+        require_softer(reference, self.parameters, measurement.sampled)
         require_stiffness(reference, self._least_stiffness)

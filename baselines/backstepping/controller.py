@@ -11,6 +11,7 @@ import numpy as np
 from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
+from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import feedforward_rows, lanes_of
 from baselines.estimation.observers import PistonObserver, measured_joints
 from baselines.estimation.stages import JOINTS, OWN, pistons
@@ -97,7 +98,8 @@ class BacksteppingController(StagedController):
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
     damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where
     ``damping_ratio`` is given.
-    Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves.
+    Raises ``ValueError`` for options that are not positive, and for an unknown layout of valves. ``command`` refuses setpoints
+    without positive gains and those at which the law would swing (``stiffest``).
     """
 
     def __init__(
@@ -143,14 +145,15 @@ class BacksteppingController(StagedController):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         law = LawStage(_stage, np.array([*self._options, *self._p]), np.zeros(0))
-        return [pistons(self.parameters, sampled, informed=False), law]
+        return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def reset(self, lanes: Mask | None = None) -> None:
         super().reset(lanes)
         self._observer.reset(lanes)
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the first lane whose setpoints have no gains."""
+        """Raise the error of the first lane whose setpoints are too stiff or have no gains."""
+        require_softer(reference, self.parameters, measurement.sampled)
         joints = measured_joints(measurement, self._p)
         for lane, setpoints in enumerate(reference.stiffness.T):
             if not np.isfinite(joints[:, lane]).all():
