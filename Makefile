@@ -27,7 +27,7 @@ LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --
   --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
 # What an installation here has; cluster (Ray) is left out.
-EXTRAS := agents onnx mpc tune sweep video live dev
+EXTRAS := agents onnx mpc tune sweep control log video live dev
 CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti nvidia-cuda-nvrtc nvidia-cuda-runtime \
   nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 \
   nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx
@@ -143,6 +143,8 @@ pictures: $(READY)
 	cp $(OUT)/studies/*.png docs/
 	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
 	cp $(OUT)/robustness/map_0.png docs/robustness.png
+	$(BIN)/python examples/frequency_responses.py --out $(OUT)/frequency
+	cp $(OUT)/frequency/frequency_responses.png docs/
 
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison

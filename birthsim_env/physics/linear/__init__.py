@@ -1,0 +1,1 @@
+"""The plant near one operating point: a linear model with names and units."""

@@ -1,0 +1,182 @@
+"""Logs: every number of a recording or evaluation comes back to the last bit, with its unit, or a line says what is wrong."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from baselines.bench import pieces
+from baselines.work import tasks
+from baselines.work.files import write_json
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.logs import reading, writing
+from birthsim_live.logs.log import Log
+from birthsim_live.rig import frames
+from birthsim_live.rig.recording import load_recording
+from tests.console import call
+from tests.live.test_live_recording import recorded
+
+MISSING = "mcap is not installed: pip install 'birthsim[log]'"
+HEAD = ["topic", "log_time"]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A recording with a pointer that comes and goes, a loss and a reset; an evaluation of two laws; one of its pieces."""
+    folder = tmp_path_factory.mktemp("logs")
+    _, recorder = recorded(folder / "one.rec")
+    recorder.finish()
+    rig = Parameters()
+    results = []
+    for name in ("pid", "backstepping"):
+        task = pieces.evaluation_tasks(name, pieces.controller_settings(name, rig), "BirthSIM/Probe-v1", {}, 2, 7)[0]
+        result = task.work(**task.settings)
+        tasks._write(folder / f"{name}.json", task, result)
+        results.append(pieces.gathered(name, [result]).to_dict())
+    results[0]["episodes"]["hunting_x"][1] = float("nan")
+    results[0]["episodes"]["air"] = [np.nextafter(0.1, 1), -0.0]
+    write_json(folder / "evaluation.json", {"arguments": {"seed": "7"}, "rig": rig.to_dict(), "results": results})
+    return {"recording": folder / "one.rec", "evaluation": folder / "evaluation.json", "piece": folder / "pid.json"}
+
+
+def bits(values: object) -> bytes:
+    """Numbers to the last bit, all kinds of NaN as one."""
+    numbers = np.asarray(values)
+    return np.where(numbers == numbers, numbers, np.nan).tobytes() if numbers.dtype.kind == "f" else numbers.tobytes()
+
+
+def rows_of(log: Log, name: str) -> np.ndarray:
+    return np.concatenate([one.values[name] for one in log.series])
+
+
+@pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
+def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+    status, printed, complained = call("log", monkeypatch, capsys, files[kind], "--out", tmp_path / "a.parquet")
+    assert (status, complained) == (0, "")
+    log, table = reading.read_log(files[kind]), pq.read_table(tmp_path / "a.parquet")
+    assert printed.startswith(f"written to {tmp_path / 'a.parquet'}: {table.num_rows} rows of {len(log.columns)} columns")
+    assert table.column_names == [*HEAD, *log.columns]
+    for name, (unit, meaning) in log.columns.items():
+        assert table.schema.field(name).metadata == {b"unit": unit.encode(), b"description": meaning.encode()}
+        assert bits(table.column(name).to_numpy()) == bits(rows_of(log, name)), name
+    topics = [one.topic for one in log.series for _ in one.times]
+    assert table.column("topic").to_pylist() == topics
+    about = json.loads(table.schema.metadata[b"birthsim"])
+    assert Parameters.from_dict(json.loads(about["rig"])).to_dict() == log.about["rig"]
+    assert json.loads(about["events"]) == [event._asdict() for event in log.events]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
+
+
+@pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
+def test_mcap_gives_every_finite_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+    reader = pytest.importorskip("mcap.reader", reason=MISSING)
+    assert call("log", monkeypatch, capsys, files[kind], "--out", tmp_path / "a.mcap")[0] == 0
+    log = reading.read_log(files[kind])
+    messages: dict[str, list[tuple[int, dict]]] = {}
+    with (tmp_path / "a.mcap").open("rb") as file:
+        mcap = reader.make_reader(file, validate_crcs=True)
+        for schema, channel, message in mcap.iter_messages():
+            rules = json.loads(schema.data)
+            # What Foxglove Studio's parseJsonSchema takes: anything else makes it refuse the channel.
+            assert rules["type"] == "object"
+            assert {entry["type"] for entry in rules["properties"].values()} <= {"number", "integer", "boolean", "string"}
+            assert None not in json.loads(message.data).values()
+            messages.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
+            if channel.topic == log.series[0].topic:
+                units = {name: entry["unit"] for name, entry in rules["properties"].items()}
+                assert units == {name: column.unit for name, column in log.columns.items()}
+        about = {record.name: record.metadata for record in mcap.iter_metadata()}["birthsim"]
+    assert json.loads(about["rig"]) == log.about["rig"]
+    for one in log.series:
+        found = messages.pop(one.topic)
+        assert [now for now, _ in found] == [round(1e9 * time) for time in one.times]
+        for name, values in one.values.items():
+            told = np.array([said.get(name, np.nan) for _, said in found], dtype=values.dtype)
+            assert bits(told) == bits(np.where(np.isfinite(values), values, np.nan).astype(values.dtype)), name
+    events = [(topic.removeprefix("/"), now, said) for topic, many in messages.items() for now, said in many]
+    expected = [(event.kind, round(1e9 * event.time), {event.kind: json.dumps(event.value)}) for event in log.events]
+    assert sorted(events, key=str) == sorted(expected, key=str)
+
+
+def test_a_log_holds_what_the_file_holds(files: dict[str, Path]) -> None:
+    recording, log = load_recording(files["recording"]), reading.read_log(files["recording"])
+    assert {name: len(ends) for name, (_, _, ends) in reading.FIELDS.items()} == frames.FIELDS
+    assert bits(np.array([log.series[0].values[name] for name in log.columns]).T) == bits(recording.rows)
+    assert np.isnan(log.series[0].values["pointer_x"]).any()
+    assert {event.kind for event in log.events} == {"settings", "path", "lost"}
+    raw, log = json.loads(files["evaluation"].read_text()), reading.read_log(files["evaluation"])
+    for result, one in zip(raw["results"], log.series, strict=True):
+        assert one.topic == f"/evaluation/{result['controller']}"
+        assert one.values["seed"].tolist() == result["seeds"] == [7, 8]
+        for name, numbers in result["episodes"].items():
+            assert log.columns[name].unit == result["units"][name]
+            assert bits(one.values[name]) == bits(np.array(numbers, dtype=float))
+        assert {f"return_{discount}" for discount in result["returns"]} <= one.values.keys()
+    piece, log = json.loads(files["piece"].read_text())["result"], reading.read_log(files["piece"])
+    assert [one.topic for one in log.series] == ["/error/pid/7", "/error/pid/8"]
+    found = pieces.gathered("pid", [piece]).traces[0].transpose(1, 2, 0)
+    errors = np.array([[one.values["error_x"], one.values["error_y"]] for one in log.series])
+    assert bits(errors) == bits(found.copy())
+    assert log.series[0].times[1] == pytest.approx(0.01)
+
+
+BAD = [
+    ("none.rec", "a.mcap", "none.rec' cannot be read"),
+    ("none.json", "a.parquet", "none.json' cannot be read"),
+    ("bad.rec", "a.parquet", "bad.rec' is damaged or foreign (no chunk is whole)"),
+    ("bad.json", "a.parquet", "bad.json' is damaged or foreign (JSONDecodeError"),
+    ("list.json", "a.parquet", "list.json' is damaged or foreign (TypeError"),
+    ("short.json", "a.parquet", "short.json' is damaged or foreign (ValueError: episodes of pid are not as many"),
+    ("evaluation.json", "a.csv", "a.csv'; allowed: a file that ends in .parquet or .mcap"),
+    ("evaluation.json", "none/a.parquet", "none/a.parquet': No such file or directory"),
+]
+
+
+@pytest.mark.parametrize(("name", "out", "words"), BAD)
+def test_what_is_wrong_is_named_in_one_line(name, out, words, files, tmp_path, monkeypatch, capsys) -> None:
+    content = json.loads(files["evaluation"].read_text())
+    write_json(tmp_path / "evaluation.json", content)
+    content["results"][0]["lost"].pop()
+    write_json(tmp_path / "short.json", content)
+    for bad in ("bad.json", "bad.rec"):
+        (tmp_path / bad).write_text("{")
+    (tmp_path / "list.json").write_text("[1]")
+    before = sorted(tmp_path.iterdir())
+    status, printed, complained = call("log", monkeypatch, capsys, tmp_path / name, "--out", tmp_path / out)
+    assert (status, printed) == (2, "")
+    assert complained.startswith("birthsim-log: error: ")
+    assert complained.count("\n") == 1
+    assert words in complained
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
+def test_a_log_is_written_whole_or_not_at_all(suffix: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
+    """A writer that fails half way leaves the file that was there."""
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"before")
+
+    def half(log: Log, file) -> None:
+        file.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(writing.WRITERS, suffix, half)
+    status, _, complained = call("log", monkeypatch, capsys, files["recording"], "--out", path)
+    assert status == 2
+    assert complained == f"birthsim-log: error: {str(path)!r}: No space left on device\n"
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("suffix", "package"), [(".parquet", "pyarrow"), (".mcap", "mcap.writer")])
+def test_without_the_extra_it_says_how_to_get_it(suffix, package, files, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    status, _, complained = call("log", monkeypatch, capsys, files["recording"], "--out", tmp_path / f"a{suffix}")
+    assert status == 2
+    assert "pip install 'birthsim[log]'" in complained
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,297 @@
+"""The linear model against finite differences, the second model, formulas of stiffness, valve gains, and the plant's motion."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.bench.accuracy.second_model import SecondModel, rates
+from birthsim_env import Parameters, Plant, balanced_pressures, linearize
+from birthsim_env.physics import control_model, geometry, valves
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.linear.model import LinearModel
+from tests.physics.test_second_model import ELASTO_PLASTIC, OTHER_RIG
+
+COULOMB = {"friction.law": "coulomb"}
+RIGS = {"default": {}, "other": OTHER_RIG, "elasto-plastic": ELASTO_PLASTIC, "Coulomb": COULOMB}
+SCALES = np.array([*[0.1] * 4, *[1e-4] * 2, *[1e5, 300.0] * 4, *[1.0] * 8, 10.0, 10.0])
+"""Size of each state, opening and force."""
+STEP = np.finfo(float).eps ** (1 / 3)
+"""Of central differences, relative to ``SCALES``: their truncation, its square, and rounding, eps over it, are both 4e-11."""
+ALLOWED = 1e-8
+"""Relative to the largest entry of a row: 4e-11 times the curvature of the steepest characteristics."""
+MISSING = "python-control is not installed: pip install 'birthsim[control]'"
+
+
+def pose_of(rig: Parameters, y1: float, y2: float) -> Array:
+    return geometry.end_effector(np.array([y1, y2]), rig)
+
+
+def differences(function, x: Array, scales: Array) -> Array:
+    """Jacobian of a function of columns by central differences."""
+    step = np.diag(STEP * scales)
+    return (function(x[:, None] + step) - function(x[:, None] - step)) / (2 * STEP * scales)
+
+
+def assert_same(found: Array, expected: Array, scales: Array, allowed: float = ALLOWED) -> None:
+    size = (np.abs(expected) * scales).max(axis=1, keepdims=True)
+    assert np.all(np.abs(found - expected) * scales <= allowed * size)
+
+
+def plant_jacobian(rig: Parameters, model: LinearModel) -> Array:
+    plant = Plant(rig, 24)
+    point = np.concatenate([model.at.state, model.at.openings, model.at.force])
+    return differences(lambda s: plant.derivatives(s[:18], s[18:22], s[22:]), point, SCALES)
+
+
+@pytest.mark.parametrize("openings", [(0.0, 0.0, 0.0, 0.0), (0.1, -0.2, -0.05, 0.02)], ids=["shut", "open"])
+@pytest.mark.parametrize("name", RIGS)
+def test_a_stuck_model_is_the_plants_central_difference(name: str, openings: tuple[float, ...]) -> None:
+    rig = Parameters().replace(RIGS[name])
+    pose = pose_of(rig, 0.03, -0.07)
+    pressures = balanced_pressures(rig, pose) + np.array([2e3, 0.0, -3e3, 0.0])
+    model = linearize(rig, pose, pressures, openings=openings, force=(1.0, -2.0))
+    kept = [at.STATE_NAMES.index(signal.name) for signal in model.states]
+    assert len(kept) == (16 if name == "Coulomb" else 18)
+    expected = plant_jacobian(rig, model)[kept]
+    assert_same(np.hstack([model.A, model.B]), expected[:, [*kept, *range(18, 24)]], SCALES[[*kept, *range(18, 24)]])
+    still = Plant(rig).derivatives(model.at.state[:, None], model.at.openings[:, None], model.at.force[:, None])[:, 0]
+    np.testing.assert_allclose(model.at.rates, still, rtol=1e-12, atol=1e-12)
+    if name != "Coulomb":
+        np.testing.assert_allclose(model.at.rates[[at.V1, at.V2]], 0.0, atol=1e-12)
+        assert np.all(np.abs(model.at.state[[at.Z1, at.Z2]]) > 1e-6)
+
+
+def test_a_sliding_model_is_a_plant_without_dry_friction() -> None:
+    rig = Parameters().replace(OTHER_RIG)
+    model = linearize(rig, pose_of(rig, 0.03, -0.07), friction="sliding", openings=(0.1, -0.2, 0.0, 0.02))
+    smooth = rig.replace({**COULOMB, "cylinder1.coulomb_friction": 0.0, "cylinder2.coulomb_friction": 0.0})
+    kept = [at.STATE_NAMES.index(signal.name) for signal in model.states]
+    assert not {at.Z1, at.Z2} & set(kept)
+    np.testing.assert_allclose(model.at.rates[[at.V1, at.V2]], 0.0, atol=1e-12)
+    columns = [*kept, *range(18, 24)]
+    assert_same(np.hstack([model.A, model.B]), plant_jacobian(smooth, model)[np.ix_(kept, columns)], SCALES[columns])
+
+
+def test_outputs_are_the_jacobian_and_the_slope_of_9() -> None:
+    rig = Parameters().replace(OTHER_RIG)
+    piston = np.array([0.03, -0.07])
+    model = linearize(rig, geometry.end_effector(piston, rig))
+    jacobian = geometry.jacobian(piston, rig)
+    np.testing.assert_allclose(model.C[:2, [at.Y1, at.Y2]], jacobian, rtol=1e-12)
+    np.testing.assert_allclose(model.C[2:4, [at.V1, at.V2]], jacobian, rtol=1e-12)
+    assert not model.D.any()
+
+    def forces(s: Array) -> Array:
+        rows = []
+        for c, (y, pp, pn) in ((rig.cylinder1, (at.Y1, at.PP1, at.PN1)), (rig.cylinder2, (at.Y2, at.PP2, at.PN2))):
+            a, b, half = s[pp] * c.area_p, s[pn] * c.area_n, c.stroke / 2
+            rows += [a - b - rig.air.atmospheric_pressure * (c.area_p - c.area_n)]
+            rows += [rig.air.polytropic_index * (a / (half + s[y]) + b / (half - s[y]))]
+        return np.array(rows)[[0, 2, 1, 3]]
+
+    assert_same(model.C[4:8], differences(forces, model.at.state, SCALES[:18]), SCALES[:18])
+    np.testing.assert_allclose(model.at.outputs[4:8], forces(model.at.state), rtol=1e-12)
+    np.testing.assert_array_equal(model.C[8:], np.eye(18)[list(at.PRESSURES)])
+
+
+@pytest.mark.parametrize("name", ["default", "other", "elasto-plastic"])
+def test_at_an_equilibrium_it_is_the_second_models(name: str) -> None:
+    """States s(x) of the second model obey T A = A2 T there, T = ds/dx; openings that hold the pressures make it one."""
+    rig = Parameters().replace(RIGS[name])
+    pose = pose_of(rig, -0.02, 0.05)
+    shut = linearize(rig, pose)
+    plant = Plant(rig)
+    p = plant.lane_parameters[:, 0]
+    coldness, law = p[at.COLDNESS], p[[at.RHO0, at.CRITICAL, at.KNEE, at.LAMINAR]]
+    hold = []
+    for pressure in shut.at.state[list(at.PRESSURES)]:
+        fill, drain = (
+            valves.driving_flow(up, 1 / up, coldness, down, 1 / down, coldness, *law)
+            for up, down in ((rig.air.supply_pressure, pressure), (pressure, rig.air.atmospheric_pressure))
+        )
+        hold.append(valves.opening_for_flow(0.0, fill, drain, p[at.CONDUCTANCE], p[at.LEAKAGE]))
+    model = linearize(rig, pose, openings=hold)
+    np.testing.assert_allclose(model.at.rates / SCALES[:18], 0.0, atol=1e-11)
+
+    def translated(states: Array) -> Array:
+        columns = []
+        for state in states.T:
+            plant.state[:, 0] = state
+            columns.append(SecondModel(rig, plant.end_effector()[:, 0], state).state)
+        return np.array(columns).T
+
+    x, u, f = model.at.state, model.at.openings, model.at.force
+    plant.state[:, 0] = x
+    second = SecondModel(rig, plant.end_effector()[:, 0], x)
+    size = np.array([*[0.1] * 4, *[1e-4] * 4, *[20.0] * 4, 1e-4, 1e-4, *[1.0] * 8, 10.0, 10.0])
+    to_second = differences(translated, x, SCALES[:18])
+
+    def second_rates(s: Array) -> Array:
+        return np.array([rates(c[:18], c[18:22], c[22:], *second.constants) for c in s.T.copy()]).T
+
+    both = differences(second_rates, np.concatenate([second.state, u, f]), size)
+    assert_same(to_second @ model.A, both[:, :18] @ to_second, SCALES[:18], 1e-7)
+    assert_same(to_second @ model.B, both[:, 18:], SCALES[18:])
+
+
+@pytest.mark.parametrize("friction", ["sliding", "stuck"])
+@pytest.mark.parametrize(("heat", "index"), [(0.0, "heat_capacity_ratio"), (40.0, None)], ids=["adiabatic", "isothermal"])
+def test_a_slow_hand_feels_the_stiffness_of_9(heat: float, index: str | None, friction: str) -> None:
+    """Tight valves, shut: J (K - d(J^T W)/dy)^-1 J^T, with K of (9) over chambers with their dead volume, at index gamma where
+    no heat is exchanged and 1 where all is; W is weight and hand. Stuck pistons add s0."""
+    heats = {"chambers.wall_heat_transfer": heat, "chambers.piston_conductance": 0.0}
+    rig = Parameters().replace({**OTHER_RIG, **heats, "valves.leakage_ratio": 0.0})
+    piston, hand = np.array([0.03, -0.07]), np.array([3.0, -5.0])
+    pose = geometry.end_effector(piston, rig)
+    model = linearize(rig, pose, force=hand, friction=friction)
+    n = getattr(rig.air, index) if index else 1.0
+    stiffness, pressures = [], model.at.outputs[8:].reshape(2, 2)
+    for c, y, (pp, pn) in zip((rig.cylinder1, rig.cylinder2), piston, pressures, strict=True):
+        lengths = [c.stroke / 2 + s * y + rig.chambers.dead_volume / area for s, area in ((1, c.area_p), (-1, c.area_n))]
+        stiffness.append(control_model.pneumatic_stiffness.py_func(pp, pn, c.area_p, c.area_n, *lengths, n))
+    load = model.at.force - [0.0, rig.mechanics.mass * rig.mechanics.gravity]
+    turning = differences(
+        lambda y: np.stack([geometry.joint_force(load, one, rig) for one in y.T], axis=1), piston, np.full(2, 0.1)
+    )
+    joint = np.diag(stiffness) - turning + (rig.friction.bristle_stiffness * np.eye(2) if friction == "stuck" else 0.0)
+    jacobian = geometry.jacobian(piston, rig)
+    expected = jacobian @ np.linalg.inv(joint) @ jacobian.T
+    # What inertia, damping and thermal lag add to the real part is quadratic in the frequency: (2 pi 1e-4 s)^2 = 4e-7.
+    found = model.frequency_response([1e-4])[0, :2, 4:].real
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+def test_shut_spools_have_the_mean_gain_of_both_sides() -> None:
+    rig = Parameters()
+    pose = pose_of(rig, 0.03, -0.07)
+    shut, more, less = (linearize(rig, pose, openings=np.full(4, u)).A for u in (0.0, 1e-15, -1e-15))
+    np.testing.assert_allclose(shut, (more + less) / 2, rtol=1e-12, atol=1e-12)
+    state, air = linearize(rig, pose).at.state, rig.air
+    for row, spool, volume in (
+        (at.PP1, at.S1P, rig.chambers.dead_volume + rig.cylinder1.area_p * (0.1 + 0.03)),
+        (at.PN2, at.S2N, rig.chambers.dead_volume + rig.cylinder2.area_n * (0.2 + 0.07)),
+    ):
+        pressure = state[row]
+        gains = []
+        for up, down in ((air.supply_pressure, pressure), (pressure, air.atmospheric_pressure)):
+            x = (max(down / up, rig.valves.critical_ratio) - rig.valves.critical_ratio) / (1 - rig.valves.critical_ratio)
+            flow = rig.valves.sonic_conductance * air.reference_density * up * np.sqrt(1 - x * x)
+            gains.append(air.heat_capacity_ratio * air.gas_constant * air.temperature * flow / volume)
+        for model, gain in ((more, gains[0]), (less, gains[1]), (shut, sum(gains) / 2)):
+            assert model[row, spool] == pytest.approx(gain, rel=1e-12)
+
+
+def test_a_small_sine_moves_the_plant_as_the_frequency_response_says() -> None:
+    """A hand of 0.05 N at 2 Hz on a rig without dry friction and leakage; the plant's answer over the last of 16 periods."""
+    dry = {f"cylinder{k}.coulomb_friction": 0.0 for k in (1, 2)}
+    rig = Parameters().replace({**COULOMB, **dry, "valves.leakage_ratio": 0.0})
+    pose, frequency, periods, samples = pose_of(rig, 0.02, -0.05), 2.0, 16, 250
+    model = linearize(rig, pose, friction="sliding")
+    plant = Plant(rig)
+    plant.state[:] = model.at.state[:, None]
+    time = np.arange(periods * samples) / (frequency * samples)
+    push = 0.05 * np.sin(2 * np.pi * frequency * time)
+    path = []
+    for now in push:
+        path.append(plant.end_effector()[:2, 0])
+        plant.advance(np.zeros((4, 1)), np.array([[now], [0.0]]), 1 / (frequency * samples))
+    last = slice(-samples, None)
+    # Each force is held for one sample: the first harmonic is late by half of one.
+    late = time[last] - 0.5 / (frequency * samples)
+    turn = np.exp(2j * np.pi * frequency * late)
+    basis = np.stack([turn.imag, turn.real, np.ones(samples), late])
+    sine, cosine, _, _ = np.linalg.lstsq(basis.T, np.array(path)[last], rcond=None)[0]
+    found = (sine + 1j * cosine) / 0.05
+    expected = model.frequency_response([frequency])[0, :2, 4]
+    # The amplitude, 5e-5 m, over the length of a chamber, 0.1 m, is the size of what a linear model leaves out: 5e-4.
+    assert np.all(np.abs(found - expected) < 2e-3 * np.abs(expected).max())
+
+
+def test_edges_of_the_pressures_are_finite() -> None:
+    rig = Parameters().replace({"cylinder1.coulomb_friction": 1e3, "cylinder2.coulomb_friction": 1e3})
+    edges = [rig.air.atmospheric_pressure, rig.air.supply_pressure] * 2
+    model = linearize(rig, pose_of(rig, 0.0, 0.0), edges)
+    assert np.isfinite(model.A).all()
+    assert_same(model.A, plant_jacobian(rig, model)[:, :18], SCALES[:18], 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"pose": (0.5, 9.0)}, r"position = \(0.5, 9\) m is unreachable"),
+        ({"pose": (0.5, np.nan)}, r"pose\[1\] = nan; allowed: finite numbers"),
+        ({"pressures": (1e5, 2e5, 3e5, 9e5)}, r"pressures = .*; allowed: 101300 to 700000 \(Pa"),
+        ({"pressures": (2e5, 2e5, 6e5, 2e5)}, r"leave .* N on piston 2; allowed: what friction holds, at most 19.95 N"),
+        ({"pressures": (2e5, 2e5, 6e5, 2e5), "friction": "sliding"}, r"leave 204.1 N on piston 2"),
+        ({"openings": (0.0, 0.0, 0.0, 2.0)}, r"openings = .*; allowed: -1 to 1"),
+        ({"force": (1.0,)}, r"force has shape \(1,\); allowed: \(2,\)"),
+        ({"friction": "dry"}, r"friction = 'dry'; allowed: 'stuck', 'sliding'"),
+        ({"parameters": Parameters().replace({"chambers.tube_length": 1.0})}, "allowed: a rig whose options are off"),
+    ],
+)
+def test_bad_input_is_named(given: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=words) as caught:
+        linearize(**{"parameters": None, "pose": (0.5, 0.0), **given})  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
+
+
+def test_a_frequency_of_zero_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"frequency = 0; allowed: above 0"):
+        linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])
+
+
+def test_names_units_and_arrays_belong_together_and_cannot_be_changed() -> None:
+    model = linearize(None, (0.5, 0.0))
+    assert model.A.shape == (len(model.states), len(model.states))
+    assert model.B.shape == (len(model.states), len(model.inputs))
+    assert model.C.shape == (len(model.outputs), len(model.states))
+    assert model.D.shape == (len(model.outputs), len(model.inputs))
+    assert model.states[0] == ("y1", "m")
+    assert model.states[13] == ("Tn2", "K")
+    assert [signal.unit for signal in model.inputs] == ["1"] * 4 + ["N"] * 2
+    with pytest.raises(ValueError, match="read-only"):
+        model.A[0, 0] = 1.0
+
+
+def test_python_control_gives_the_same_response() -> None:
+    control = pytest.importorskip("control", reason=MISSING)
+    model = linearize(None, (0.5, 0.0), friction="sliding")
+    space = model.to_control()
+    assert isinstance(space, control.StateSpace)
+    for labels, signals in (
+        (space.state_labels, model.states),
+        (space.input_labels, model.inputs),
+        (space.output_labels, model.outputs),
+    ):
+        assert list(labels) == [signal.name for signal in signals]
+    frequency = np.array([0.1, 1.0, 10.0])
+    theirs = space(2j * np.pi * frequency).transpose(2, 0, 1)
+    np.testing.assert_allclose(theirs, model.frequency_response(frequency), rtol=1e-6, atol=1e-12)
+
+
+def test_without_python_control_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(ImportError, match=r"birthsim\[control\]"):
+        linearize(None, (0.5, 0.0)).to_control()
+
+
+def test_the_example_draws_and_prints_resonance_and_bandwidth(tmp_path: Path) -> None:
+    """A sliding rig's resonance is that of its slowest mode: damping moves the peak by zeta^2 < 1 %, the grid by 0.4 %."""
+    script = Path(__file__).parents[2] / "examples" / "frequency_responses.py"
+    done = subprocess.run([sys.executable, script, "--out", tmp_path], capture_output=True, text=True, timeout=300, check=True)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines()[2:]]
+    assert len(rows) == 16
+    assert all(float(row[-1]) > 0 for row in rows)
+    pose = (0.5, 0.0)
+    model = linearize(None, pose, balanced_pressures(None, pose, (5200.0, 2700.0)), friction="sliding")
+    modes = np.linalg.eigvals(model.A)
+    slowest = min(abs(mode) for mode in modes if mode.imag > 5) / (2 * np.pi)
+    found = next(float(row[4]) for row in rows if row[:3] == ["hand Fy to y", "sliding", "high"])
+    assert found == pytest.approx(slowest, rel=0.02)
+    assert (tmp_path / "frequency_responses.png").stat().st_size > 20_000
