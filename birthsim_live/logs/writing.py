@@ -90,7 +90,7 @@ def _write_mcap(log: Log, file: BinaryIO) -> None:
         now = round(event.time * 1e9)
         content = {event.kind: json.dumps(finite(event.value))}
         writer.add_message(channels[event.kind], now, json.dumps(content).encode(), now)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _schema(log: Log, series: Series) -> dict[str, object]:
