@@ -61,8 +61,8 @@ class ResidualSettings:
             raise ValueError(f"force_sensor = {shown(self.force_sensor)}; allowed: True, False")
         if not self.force_sensor and (self.impedance != "fixed" or self.law in FORCE_LAWS):
             raise ValueError(
-                f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' and "
-                f"a law other than {', '.join(map(repr, FORCE_LAWS))}, which need the hand's force"
+                f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "
+                f"and a law other than {', '.join(map(repr, FORCE_LAWS))}, which need the hand's force"
             )
 
     @property

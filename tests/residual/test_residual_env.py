@@ -72,7 +72,7 @@ def assert_follows(env, actions, rows, seed):
 
 
 @pytest.mark.parametrize("law", LAWS[:-1])
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", ["ideal", "lab", "honest"])
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
