@@ -9,6 +9,7 @@ import argparse
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.training.validation import Score, validate
 from baselines.bench.statistics import crossed_interval, number, quantile
@@ -64,7 +65,7 @@ def _compare(arguments: argparse.Namespace) -> None:
     print(_less("all seeds", np.stack([law.error - score.error for score in scores])[:, within]))
 
 
-def _row(name: str, score: Score, within: Array, gained: Array | None = None) -> str:
+def _row(name: str, score: Score, within: NDArray[np.bool_], gained: Array | None = None) -> str:
     """A row of the table; ``gained`` (1, N), mm, less than the law's error."""
     error = [number(quantile(score.error[within], fraction)) for fraction in (0.5, 0.95)]
     stiffness = number(quantile(score.stiffness[within], 0.5))
@@ -80,10 +81,18 @@ def _less(name: str, gained: Array) -> str:
 def _gains(gained: Array) -> list[str]:
     """Median and mean of ``gained`` (seeds, N), with intervals over seeds and episodes."""
     told = []
-    for statistic in (lambda values: float(np.median(values)), lambda values: float(np.mean(values))):
+    for statistic in (_median, _mean):
         low, high = crossed_interval(statistic, gained)
         told.append(f"{number(statistic(gained))} ({number(low)} to {number(high)})")
     return told
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values))
+
+
+def _mean(values: Array) -> float:
+    return float(np.mean(values))
 
 
 if __name__ == "__main__":

@@ -320,7 +320,7 @@ def test_importing_twice_registers_once():
         ({"authority": "40"}, "authority = '40'; allowed: more than 0"),
         ({"time_constant": 0.0}, r"time_constant = 0\.0; allowed: more than 0, at most 1"),
         ({"time_constant": 1.5}, r"time_constant = 1\.5; allowed: more than 0, at most 1"),
-        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-backstepping', 'none'"),
+        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-sensorless', 'none'"),
         ({"law": None}, "law = None; allowed: 'backstepping'"),
         ({"impedance": "soft"}, "impedance = 'soft'; allowed: 'fixed', 'variable_kp', 'variable'"),
         ({"impedance": "variable", "law": "none"}, "impedance = 'variable'; allowed: 'fixed', law = 'none' has no impedance"),
