@@ -101,6 +101,7 @@ def assemble(
     actuation: Actuation | None = None,
     picture_size: tuple[int, int] = (640, 480),
     num_threads: int | None = None,
+    force_sensor: bool = True,
     **unknown: Any,
 ) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed, and
@@ -110,6 +111,7 @@ def assemble(
     rig = load_parameters(parameters)
     one_of("valves", valves, VALVE_LAYOUTS)
     one_of("sensors", sensors, tuple(SENSORS))
+    one_of("force_sensor", force_sensor, (True, False))
     if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
         raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object with {', '.join(PROTOCOL)}")
     chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
@@ -141,6 +143,7 @@ def assemble(
         chosen,
         policy_periods(policy_period, rig),
         threads_for(num_envs, num_threads),
+        force_sensor,
     )
     limit = observation.LIMIT
     names = (*(f"last action: {name}" for name in chosen.names), *chosen.memory_names)

@@ -89,6 +89,8 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures;
       `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
       (`birthsim_env.physics.electronics`).
+    - `force_sensor`: `False` for a rig without one: the measured force of the hand is zero, and every entry of the observation
+      is computed with that.
     - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
       (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; `"sensors"` varies the
       experiment and draws the figures of `honest` sensors alone; a mapping such as `{"mechanics.mass": (2, 5)}` draws just

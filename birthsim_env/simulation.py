@@ -32,7 +32,7 @@ from birthsim_env.loop.rows import (
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage
-from birthsim_env.loop.world import jump_stage, plant_stage
+from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
@@ -60,7 +60,8 @@ class Simulation:
     ``measurement``; ``since_jump`` (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded;
     ``impacts`` (2, N) m/s, the fastest collision of each piston with an end stop during the last step. ``period`` is that of
     control, s, and ``periods`` how many of them make a policy step. ``beginning`` and ``closing`` stages run where episodes
-    begin, and at the end of a policy step. ``threads`` share the lanes.
+    begin, and at the end of a policy step. ``threads`` share the lanes. Without a
+    ``force_sensor`` the measured force of the hand is zero.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Simulation:
         actuation: Actuation,
         periods: int,
         threads: int = 1,
+        force_sensor: bool = True,
     ) -> None:
         self.parameters = parameters
         self.plant = Plant(parameters, num_envs)
@@ -87,6 +89,7 @@ class Simulation:
         self.actuation = actuation
         for part in (trajectory, user_force, stiffness):
             part.prepare(num_envs)
+        self.force_sensor = force_sensor
         self.period = parameters.electronics.control_period
         self.periods, self.threads = periods, threads
         self.beginning: list[Stage] = []
@@ -242,16 +245,18 @@ class Simulation:
             self._compiled(self.stiffness, "sample", self._set),
             self._compiled(self.user_force, "force", self._push),
         ]
-        senses = self._compiled(self.sensors, "measure", self._measure)
+        senses = [self._compiled(self.sensors, "measure", self._measure)]
+        if not self.force_sensor:
+            senses.append(no_force_stage())
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
         moves = plant_stage(self.plant, self.period)
-        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, moves, *looks, senses)))
+        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, moves, *looks, *senses)))
         if self._loop is not None and made == self._made:
             return
         counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
-        self._loop = MixedLoop(lanes, *places, [*acts, moves, *looks, counts, senses], self.closing)
-        self._look = MixedLoop(lanes, *places, [*looks, begins, senses], self.beginning)
+        self._loop = MixedLoop(lanes, *places, [*acts, moves, *looks, counts, *senses], self.closing)
+        self._look = MixedLoop(lanes, *places, [*looks, begins, *senses], self.beginning)
         self._made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,7 @@ class ResidualController:
         self._nominal = parameter_column(rig)
         self._periods = policy_periods(settings.policy_period, rig)
         self._law, self._size = ResidualLaw(rig, settings), settings.size
+        self._force_sensor = settings.force_sensor
         self.reset()
 
     def reset(self, lanes: Mask | None = None) -> None:
@@ -71,6 +73,8 @@ class ResidualController:
         """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference))[:, 0]
+        if not self._force_sensor:
+            measurement = replace(measurement, user_force=np.zeros_like(measurement.user_force))
         lanes = measurement.position.shape[1]
         if self._action.shape[1] != lanes:
             self._action = np.zeros((len(self._action), lanes))

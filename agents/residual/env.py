@@ -22,6 +22,7 @@ class _LawInside:
         impedance: str = ResidualSettings.impedance,
         authority: float = ResidualSettings.authority,
         time_constant: float = ResidualSettings.time_constant,
+        force_sensor: bool = ResidualSettings.force_sensor,
         **arguments: Any,
     ) -> None:
         inside = ("action_mode", "valves", "actuation")
@@ -32,9 +33,11 @@ class _LawInside:
         refuse_unknown(arguments, own, inside)
         rig = load_parameters(arguments.pop("parameters", None))
         period = arguments.get("policy_period", ResidualSettings.policy_period)
-        settings = ResidualSettings(law, impedance, authority, time_constant, period)
+        settings = ResidualSettings(law, impedance, authority, time_constant, period, force_sensor)
         actuation = ResidualActuation(rig, settings)
-        super().__init__(scenario, parameters=rig, actuation=actuation, **arguments)  # type: ignore[call-arg]
+        super().__init__(  # type: ignore[call-arg]
+            scenario, parameters=rig, actuation=actuation, force_sensor=force_sensor, **arguments
+        )
 
 
 class ResidualEnv(_LawInside, BirthSIMEnv):
@@ -65,7 +68,8 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
 
     ## Arguments
     Those of `BirthSIMEnv` without `action_mode`, `valves` and `actuation`, and `law` (one of `agents.residual.settings.LAWS`),
-    `impedance`, `authority` (N) and `time_constant` (s).
+    `impedance`, `authority` (N) and `time_constant` (s). Without a `force_sensor` neither the law nor the policy is told the
+    hand's force, and the observer of the unexplained forces finds it among them.
 
     ## Version history
     - v1: as `BirthSIMEnv` v1.

@@ -10,10 +10,14 @@ from birthsim_env.physics.rig.values import is_within, shown
 NO_LAW = "none"
 
 LAWS = (
-    *("backstepping", "backstepping-weight", "backstepping-frozen", "backstepping-force-first", "admittance-backstepping"),
+    *("backstepping", "backstepping-weight", "backstepping-frozen", "backstepping-force-first"),
+    *("admittance-backstepping", "admittance-adaptive", "admittance-sensorless"),
     NO_LAW,
 )
 """Laws that can be told of a force, the paper's first; and none, where a policy drives the valves by itself."""
+
+FORCE_LAWS = ("admittance-backstepping", "admittance-adaptive")
+"""Those that read the hand's force."""
 
 VALVES = 4
 """Length of an action without a law: the openings of all spools."""
@@ -31,7 +35,8 @@ class ResidualSettings:
     of them without a law or on one that is stiff by itself). ``authority`` (N) bounds the force: 100 N, since the weight of
     2 kg more than believed is 40 to 57 N along cylinder 1 and friction comes on top. ``time_constant`` (s) of the low-pass
     between an action and the law: without it single lanes oscillate. ``policy_period`` (s). Raises ``ValueError`` for values
-    outside these limits.
+    outside these limits, and without a
+    ``force_sensor`` for what needs the hand's force: a law of ``FORCE_LAWS``, and an impedance that varies.
     """
 
     law: str = "backstepping"
@@ -39,6 +44,7 @@ class ResidualSettings:
     authority: float = 100.0
     time_constant: float = 0.028
     policy_period: float = 0.01
+    force_sensor: bool = True
 
     def __post_init__(self) -> None:
         for name, low, high in (("authority", 0.0, 500.0), ("time_constant", 0.0, 1.0), ("policy_period", 0.0, 1.0)):
@@ -49,8 +55,15 @@ class ResidualSettings:
             value = getattr(self, name)
             if not isinstance(value, str) or value not in allowed:
                 raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(map(repr, allowed))}")
-        if self.impedance != "fixed" and self.law in ("admittance-backstepping", NO_LAW):
+        if self.impedance != "fixed" and (self.law.startswith("admittance") or self.law == NO_LAW):
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
+        if not isinstance(self.force_sensor, bool):
+            raise ValueError(f"force_sensor = {shown(self.force_sensor)}; allowed: True, False")
+        if not self.force_sensor and (self.impedance != "fixed" or self.law in FORCE_LAWS):
+            raise ValueError(
+                f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "
+                f"and a law other than {', '.join(map(repr, FORCE_LAWS))}, which need the hand's force"
+            )
 
     @property
     def size(self) -> int:

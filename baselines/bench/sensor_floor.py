@@ -7,6 +7,7 @@ switched off, and so is the bias of the force, which a law may tare.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
@@ -15,16 +16,21 @@ import numpy as np
 from birthsim_env.loop.signals import displacement
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.hands.user_forces import forces_of
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.success import SETTLED
 
 STATIC = ("force_gain_error", "force_crosstalk", "position_distortion", "distortion_length", "position_scale_error")
 """Errors that do not change in an episode and that no law can find."""
 
 HELD = 3.0
 """s into ``BirthSIM/Probe`` when the push is held."""
+
+STEP = 0.02
+"""s between the instants of a circle that are looked at."""
 
 STEPS = 12
 """Iterations for the place: each is nearer by the slope of the distortion, below 0.1."""
@@ -44,11 +50,7 @@ def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
     static = _static_sensors(rig, episodes, seed)
 
     def place(pushed: Array) -> Array:
-        found: Array = target + _spring(pushed, stiffness)
-        for _ in range(STEPS):
-            shown, felt = _shown(static, found, pushed)
-            found = found - (shown - target - _spring(felt, stiffness))
-        return found
+        return _place(static, target, stiffness, pushed)
 
     moved, wanted = place(force) - place(np.zeros_like(force)), _spring(force, stiffness)
     direction = force / np.hypot(*force)
@@ -56,6 +58,36 @@ def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
     return {
         "stiffness_error": 100 * (asked / along - 1), "held_error": 1e3 * np.hypot(*(place(force) - target - wanted))
     }  # fmt: skip
+
+
+def circle_floor(rig: Parameters, episodes: int, seed: int) -> Array:
+    """Settled error of the worlds of ``BirthSIM/Circle-v1`` for ``rig``, mm, (episodes,)."""
+    env: Any = gymnasium.make_vec(
+        "BirthSIM/Circle-v1", num_envs=episodes, parameters=rig, sensors="honest", randomize=True
+    )  # fmt: skip
+    env.reset(seed=[seed + k for k in range(episodes)])
+    simulation, static = env.simulation, _static_sensors(rig, episodes, seed)
+    hand, before = deepcopy(simulation.user_force), np.zeros((2, episodes))
+    jumped, squares, counts = np.zeros((3, episodes))
+    for instant in np.arange(0.0, env.steps * simulation.period * simulation.periods, STEP):
+        reference = simulation.reference_at(np.full(episodes, instant))
+        force = forces_of(hand, np.full((1, episodes), instant), reference.position, reference.velocity)[0].copy()
+        jumped[np.any(force != before, axis=0)] = instant
+        before, settled = force, instant - jumped >= SETTLED
+        missed = _place(static, reference.position, reference.stiffness, force) - reference.compliant_target(force)
+        squares += settled * (missed**2).sum(axis=0)
+        counts += settled
+    env.close()
+    return np.asarray(1e3 * np.sqrt(squares / counts))
+
+
+def _place(static: HonestSensors, target: Array, stiffness: Array, force: Array) -> Array:
+    """Where (2, N), m, the place shown is the one that the force shown asks for."""
+    found: Array = target + _spring(force, stiffness)
+    for _ in range(STEPS):
+        shown, felt = _shown(static, found, force)
+        found = found - (shown - target - _spring(felt, stiffness))
+    return found
 
 
 def _spring(force: Array, stiffness: Array) -> Array:

@@ -15,6 +15,7 @@ from birthsim_env.loop.rows import (
     STATE,
     TICK,
     TIME,
+    USER_FORCE,
     WORLD,
 )
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
@@ -107,3 +108,17 @@ def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> 
     ``memory`` (5, N): force and setpoints a period ago; where an episode ``begins`` they are only remembered.
     """
     return Stage(_jumps, np.array([period, jump_rate * period, float(begins)]), memory)
+
+
+@kernel
+def _hide_force(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    s = block(seen, SEEN)
+    for axis in range(2):
+        for i in range(n):
+            s[USER_FORCE + axis, i] = 0.0
+    return 0
+
+
+def no_force_stage() -> Stage:
+    """A rig without a force sensor: what is measured of the hand's force is zero."""
+    return Stage(_hide_force)

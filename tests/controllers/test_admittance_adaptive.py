@@ -8,7 +8,7 @@ import pytest
 
 from baselines.admittance import adaptive_stage as at
 from baselines.bench.evaluation import evaluate
-from baselines.bench.sensor_floor import probe_floor
+from baselines.bench.sensor_floor import circle_floor, probe_floor
 from baselines.commands.honest import as_described
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
@@ -82,3 +82,15 @@ def test_nothing_wrong_leaves_nothing():
     names = ("force_gain_error", "force_crosstalk", "position_distortion", "position_scale_error")
     floor = probe_floor(Parameters().replace({f"electronics.{name}": 0.0 for name in names}), 4, 0)
     assert all(np.abs(values).max() < 1e-9 for values in floor.values())
+
+
+def test_on_circles_a_scale_and_a_gain_leave_their_share():
+    """Scale s: the distance from the registration times s/(1 + s); gain g: g times the displacement asked for; else nothing."""
+    off = {f"electronics.{name}": 0.0 for name in ("force_gain_error", "force_crosstalk", "position_distortion")}
+    none = Parameters().replace({**off, "electronics.position_scale_error": 0.0})
+    assert np.abs(circle_floor(none, 4, 0)).max() < 1e-9
+    scaled = circle_floor(none.replace({"electronics.position_scale_error": 0.01}), 16, 0)
+    assert scaled.min() > 0.0
+    assert scaled.max() < 0.012 * 400.0, "places are within 400 mm of the registration"
+    gained = circle_floor(none.replace({"electronics.force_gain_error": 0.01}), 16, 0)
+    assert 0.0 < gained.max() < 0.03 * 1e3 * 40.0 / 500.0, "40 N at 500 N/m, 1 % drawn up to threefold"

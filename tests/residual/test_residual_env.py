@@ -72,7 +72,7 @@ def assert_follows(env, actions, rows, seed):
 
 
 @pytest.mark.parametrize("law", LAWS[:-1])
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", ["ideal", "lab", "honest"])
 def test_zero_actions_are_bit_for_bit_the_law(sensors, law):
     arguments = {"sensors": sensors, "randomize": True}
     rows = by_hand(CIRCLE, 140, 3, law=law, **arguments)
@@ -320,7 +320,7 @@ def test_importing_twice_registers_once():
         ({"authority": "40"}, "authority = '40'; allowed: more than 0"),
         ({"time_constant": 0.0}, r"time_constant = 0\.0; allowed: more than 0, at most 1"),
         ({"time_constant": 1.5}, r"time_constant = 1\.5; allowed: more than 0, at most 1"),
-        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-backstepping', 'none'"),
+        ({"law": "pid"}, "law = 'pid'; allowed: 'backstepping', .*'admittance-sensorless', 'none'"),
         ({"law": None}, "law = None; allowed: 'backstepping'"),
         ({"impedance": "soft"}, "impedance = 'soft'; allowed: 'fixed', 'variable_kp', 'variable'"),
         ({"impedance": "variable", "law": "none"}, "impedance = 'variable'; allowed: 'fixed', law = 'none' has no impedance"),

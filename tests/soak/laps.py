@@ -87,7 +87,7 @@ def world_of(number: int, seed: int) -> World:
         control = f"random {arguments['action_mode']}s"
     elif kind < 0.92:
         law = one(LAWS)
-        impedance = "fixed" if law in (NO_LAW, "admittance-backstepping") else one(list(IMPEDANCES))
+        impedance = "fixed" if law == NO_LAW or law.startswith("admittance") else one(list(IMPEDANCES))
         arguments = {"law": law, "impedance": impedance}
         control = "residual without a law" if law == NO_LAW else f"residual on {law}"
     else:

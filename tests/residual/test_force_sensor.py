@@ -1,0 +1,125 @@
+"""Without a force sensor nothing inside reads the hand's force: neither the observation, nor an observer, nor the law."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents
+from agents.policy.controller import ResidualController
+from agents.residual.law import observation_names
+from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
+from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.sensors import SENSORS
+
+assert agents  # importing it registers the ids
+CIRCLE, LANES, STEPS = "BirthSIM/CircleResidual-v1", 3, 140
+BLIND = [law for law in LAWS if law not in FORCE_LAWS]
+
+
+def course(law, actions, **arguments):
+    """Observations and states of a run."""
+    env = gymnasium.make_vec(CIRCLE, num_envs=LANES, randomize=True, law=law, **arguments)
+    found = [env.reset(seed=3)[0]]
+    for action in actions:
+        observation, _, _, _, info = env.step(action)
+        found += [observation, env.simulation.plant.state.copy(), env.simulation.openings]
+    assert np.abs(info["user_force"]).max() > 5, "it was pushed"
+    return found
+
+
+def actions_for(law, reach=0.3):
+    size = ResidualSettings(law).size
+    reach = 0.02 if law == NO_LAW else reach
+    return np.random.default_rng(0).uniform(-reach, reach, (STEPS, LANES, size)).astype(np.float32)
+
+
+class Lying:
+    """Honest sensors whose force sensor shows something else altogether."""
+
+    sampled, drawn = True, HonestSensors.drawn
+
+    def __init__(self, *setting):
+        self._honest = HonestSensors(*setting)
+        self.begin, self.vary, self.put_out = self._honest.begin, self._honest.vary, self._honest.put_out
+
+    def measure(self, *seen):
+        told = self._honest.measure(*seen)
+        told.user_force[:] = 1000.0
+        return told
+
+
+@pytest.mark.parametrize("law", BLIND)
+def test_what_a_force_sensor_would_show_changes_no_bit(law, monkeypatch):
+    monkeypatch.setitem(SENSORS, "lying", Lying)
+    blind = [course(law, actions_for(law), sensors=kind, force_sensor=False) for kind in ("honest", "lying")]
+    for one, other in zip(*blind, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab", "honest"])
+@pytest.mark.parametrize("law", [law for law in BLIND if law != NO_LAW])
+def test_these_laws_are_the_same_without_it(law, sensors):
+    """With zero actions: they read no force, so that the residual is judged beside the law itself."""
+    actions = np.zeros((STEPS, LANES, 2), np.float32)
+    with_it, without = (course(law, actions, sensors=sensors, force_sensor=has) for has in (True, False))
+    for k, (one, other) in enumerate(zip(with_it[1:], without[1:], strict=True)):
+        if k % 3:
+            np.testing.assert_array_equal(one, other)
+    names = observation_names(ResidualSettings(law))
+    assert np.any(with_it[-3] != without[-3]), "its policy sees less"
+    felt = [k for k, name in enumerate(names) if name.startswith("user force")]
+    assert len(felt) == 2
+    assert not without[-3][:, felt].any()
+    assert with_it[-3][:, felt].any()
+
+
+def test_the_force_that_is_shown_is_zero_from_the_first_observation_on():
+    env = gymnasium.make("BirthSIM/Circle-v1", sensors="lab", force_sensor=False).unwrapped
+    env.reset(seed=0)
+    for _ in range(STEPS):
+        assert not env.measurement.user_force.any()
+        *_, info = env.step(np.zeros(4))
+    assert np.abs(info["user_force"]).max() > 5
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "honest"])
+@pytest.mark.parametrize("law", ["backstepping-force-first", "admittance-sensorless"])
+def test_the_controller_hides_the_force_by_itself(law, sensors):
+    """It is handed measurements with a force, and does what the environment does inside."""
+    settings = ResidualSettings(law, authority=40.0, force_sensor=False)
+
+    def policy(seen):
+        return np.tanh(seen[:, [0, 6]] - 0.3 * seen[:, [14, 15]]).astype(np.float32)
+
+    arguments = {"sensors": sensors, "randomize": True, "num_envs": LANES}
+    inside = gymnasium.make_vec(CIRCLE, **arguments, **settings.to_dict())
+    outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
+    observation, _ = inside.reset(seed=11)
+    outside.reset(seed=11)
+    controller = ResidualController(policy=policy, settings=settings)
+    for _ in range(STEPS):
+        observation, *_ = inside.step(policy(observation))
+        for _ in range(10):
+            outside.step(controller.command(outside.measurement, outside.reference).T)
+        np.testing.assert_array_equal(outside.simulation.plant.state, inside.simulation.plant.state)
+
+
+@pytest.mark.parametrize("law", FORCE_LAWS)
+def test_a_law_that_reads_the_force_is_refused(law):
+    with pytest.raises(ValueError, match=f"force_sensor = False with law = '{law}'"):
+        ResidualSettings(law, force_sensor=False)
+
+
+def test_an_impedance_that_varies_is_refused():
+    with pytest.raises(ValueError, match="impedance = 'variable_kp'; allowed: impedance = 'fixed'"):
+        ResidualSettings(impedance="variable_kp", force_sensor=False)
+
+
+def test_bad_input():
+    for wrong in (1, None, "no"):
+        with pytest.raises(ValueError, match="force_sensor"):
+            ResidualSettings(force_sensor=wrong)
+        with pytest.raises(ValueError, match="force_sensor"):
+            gymnasium.make("BirthSIM/Circle-v1", force_sensor=wrong)
