@@ -8,6 +8,7 @@ import shutil
 
 import pytest
 
+from agents.residual.settings import LAWS
 from baselines.bench.speed import speeds as speed
 from baselines.commands import bench
 from tests.console import call
@@ -56,6 +57,6 @@ def test_without_gcc_the_twin_has_no_speed(monkeypatch):
 def test_first_steps_compile_once():
     seconds = dict(speed.first_steps())
     names = [name.removesuffix(", compiled") for name in seconds if name.endswith(", compiled")]
-    assert len(names) == 7
+    assert len(names) == 1 + len(LAWS)
     assert seconds["valve mode, compiled"] > 3.0 * seconds["valve mode, cached"]
     assert all(seconds[f"{name}, cached"] < seconds["valve mode, compiled"] for name in names)
