@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 
-from baselines.work.files import is_alive, this_process
+from baselines.work.files import is_alive, later_signals, this_process
 
 HEARTBEAT, PATIENCE = 5.0, 60.0
 """s, assumed: a dozen touches, so that a slow disk voids no claim."""
@@ -44,7 +44,7 @@ class Claims:
         claim.parent.mkdir(parents=True, exist_ok=True)
         self.tidy(path)
         try:
-            with claim.open("x", encoding="ascii") as file:
+            with later_signals(), claim.open("x", encoding="ascii") as file:
                 self._held.add(path)
                 file.write("{} {}".format(*this_process()))
         except FileExistsError:
@@ -53,8 +53,9 @@ class Claims:
 
     def give_up(self, path: Path) -> None:
         """End a claim of this process."""
-        self._held.discard(path)
-        _claim(path).unlink(missing_ok=True)
+        with later_signals():
+            self._held.discard(path)
+            _claim(path).unlink(missing_ok=True)
 
     def tidy(self, path: Path) -> None:
         """Remove a void claim of another process, if there is one."""

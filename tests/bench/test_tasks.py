@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -150,6 +151,21 @@ def test_the_claim_of_another_host_is_void_once_nobody_touches_it(log, tmp_path,
     run_tasks(made(log), tmp_path / "out", 1, "work")
     assert ran(log) == [0, 2, 3, 4, 1], "what others have claimed comes last"
     assert not list(tmp_path.rglob("*.claim"))
+
+
+def test_ctrl_c_while_a_claim_is_made_leaves_none(monkeypatch, tmp_path):
+    """It comes when the file is there and nobody knows yet whose it is."""
+    opened = Path.open
+
+    def now(path, mode, **options):
+        file = opened(path, mode, **options)
+        signal.raise_signal(signal.SIGINT)
+        return file
+
+    monkeypatch.setattr(Path, "open", now)
+    with pytest.raises(KeyboardInterrupt), Claims() as mine:
+        mine.take(tmp_path / "piece.json")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_claim_is_touched_and_respected_until_it_is_given_up(tmp_path, monkeypatch):
