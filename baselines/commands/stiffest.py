@@ -8,14 +8,18 @@ leaves the nominal rig within 20 mm, over m/(tau + latency/4).
 
 from __future__ import annotations
 
+import argparse
 import itertools
+from typing import cast
 
 import numpy as np
 from tqdm import tqdm
 
-from baselines.backstepping import stiffest
+from baselines.backstepping.stiffest import PART
 from baselines.bench.stability import Cases, judge
+from baselines.commands.shared import run
 from baselines.registry import make_controller
+from baselines.staged import StagedController
 from birthsim_env.physics.rig.parameters import Parameters
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
@@ -28,26 +32,28 @@ SWING = 0.02
 
 
 def main() -> None:
-    """Measure and print."""
-    print(
-        f"{'law':24}{'mass, kg':>10}{'valve, ms':>10}{'late, ms':>10}{'rests up to, N/m':>18}{'over m/(tau + late/4), 1/s':>28}"
-    )
+    """Entry point."""
+    run(argparse.ArgumentParser(prog="baselines.commands.stiffest", description=(__doc__ or "").splitlines()[0]), _measure)
+
+
+def _measure(_: argparse.Namespace) -> None:
+    head = ("mass, kg", "valve, ms", "late, ms", "rests up to, N/m", "over m/(tau + late/4), 1/s")
+    print(f"{'law':24}" + "".join(f"  {word}" for word in head))
     cases = list(itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES))
     for name, mass, lag, late in tqdm(cases, leave=False):
         rig = Parameters().replace({"mechanics.mass": mass, "valves.time_constant": lag, "electronics.position_latency": late})
         limit = rests_up_to(name, rig, "lab" if late else "ideal")
-        rate = limit * (lag + stiffest.PART * late) / mass
-        tqdm.write(f"{name:24}{mass:10g}{1e3 * lag:11g}{1e3 * late:10g}{limit:18.0f}{rate:28.1f}")
+        rate = limit * (lag + PART * late) / mass
+        cells = zip((mass, 1e3 * lag, 1e3 * late, limit, rate), head, strict=True)
+        tqdm.write(f"{name:24}" + "".join(f"{value:{len(word) + 2}.5g}" for value, word in cells))
 
 
 def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
     """N/m: the last of ``ASKED`` before the first at which the law swings, without its own bound; infinite where none does."""
-    own, stiffest.RATE = stiffest.RATE, np.inf
-    try:
-        still = np.zeros(len(ASKED))
-        verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), make_controller(name, rig), sensors, 0, None)
-    finally:
-        stiffest.RATE = own
+    law, still = cast(StagedController, make_controller(name, rig)), np.zeros(len(ASKED))
+    stages = law.law_stages
+    law.law_stages = lambda sampled: stages(sampled)[1:]  # type: ignore[method-assign]
+    verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), law, sensors, 0, None)
     swings = verdict.lost | (verdict.motion > SWING)
     return float(ASKED[max(int(np.argmax(swings)) - 1, 0)]) if swings.any() else np.inf
 

@@ -11,8 +11,8 @@ A target that moves does work on the hand that nobody should bound. So the work 
 ``ALLOWANCE`` is forgiven; and a rig that only stays behind its target gives nothing.
 
 *Speed.* Beyond ``speed``, relative to the target, the valves brake: each piston's chambers are driven against its motion, fully
-from ``FULL`` times that speed on. A rig whose force was balanced by a hand that lets go is faster all the same: its chambers
-need some 30 ms to be emptied, with any law. What the brake shortens is how far it flies.
+from ``FULL`` times that speed on. A rig whose force was balanced by a hand that lets go is faster all the same: what its
+chambers hold accelerates it until the valves have let it out, with any law. What the brake shortens is how far it flies.
 
 The tank needs a force sensor. Energy tanks: Ferraguti, Secchi and Fantuzzi, ICRA 2013; the observer: Hannaford and Ryu,
 IEEE Transactions on Robotics and Automation 18(1), 2002. Figures without a source are assumed.
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.controller import Controller, lanes_of
+from baselines.controller import Controller, checked_command, lanes_of
 from baselines.impedance import Impedance, declared_by
 from baselines.limiter.port_energy import PortEnergy
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
@@ -44,6 +44,7 @@ BACK, LASTING, RECOVERY = 0.05, 0.2, 2.0
 """s, time constants: authority comes back; a low authority lowers what it comes back to; that comes back."""
 
 FULL = 2.0
+"""The brake is on in full at so many times the speed limit."""
 
 
 class PortLimiter:
@@ -84,7 +85,10 @@ class PortLimiter:
             self.authority[lanes], self._ceiling[lanes], self._level[lanes] = 1.0, 1.0, self._capacity
 
     def command(self, measurement: Measurement, reference: Reference, **options: Any) -> Array:
-        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes."""
+        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
+
+        ``options`` are those of the law, see ``TOLD``. Raises what the law raises; ``ValueError`` for openings that are none.
+        """
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference), **options)[:, 0]
         lanes = lanes_of(measurement, reference)
@@ -92,8 +96,8 @@ class PortLimiter:
             self._energy = PortEnergy(self._period, lanes)
             self.authority, self._level, self._ceiling = np.ones(lanes), np.full(lanes, self._capacity), np.ones(lanes)
             self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
-        openings = self._bounded(measurement, reference) * self.law.command(measurement, reference, **options)
-        return self._slowed(openings, measurement, reference)
+        openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
+        return self._slowed(self._bounded(measurement, reference) * openings, measurement, reference)
 
     def _bounded(self, measurement: Measurement, reference: Reference) -> Array:
         if math.isinf(self._capacity):

@@ -16,7 +16,7 @@ from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import EVERY, Recorder
 from birthsim_live.rig.recording import Recording, load_recording, packed
 from birthsim_live.rig.session import Session
-from tests.bench.test_side_by_side import waited_for
+from tests.work.test_side_by_side import waited_for
 
 RIG = Parameters().replace({"mechanics.mass": 2.5})
 

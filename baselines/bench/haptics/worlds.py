@@ -12,7 +12,7 @@ from baselines.bench.probes import board_limit
 from baselines.bench.rig_port import RigPort, takes_damping_factor
 from baselines.bench.stability import PNEUMATIC
 from baselines.controller import Controller
-from baselines.registry import make_controller
+from baselines.registry import LIMITED, make_controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -95,9 +95,12 @@ def varies_damping(law: Controller) -> bool:
 
 
 def uses_force(condition: Condition) -> bool:
-    """Whether the law does anything else when its force sensor says 1 N: two lanes differ in nothing more."""
-    if not condition.force_sensor:
-        return False
+    """Whether the law does anything else when its force sensor says 1 N, where two lanes differ in nothing more.
+
+    The limits of a ``PortLimiter`` always read the sensor.
+    """
+    if not condition.force_sensor or condition.controller.startswith(LIMITED):
+        return condition.force_sensor
     law, reference = condition.law(), resting([POSES[0]] * 2, [2000.0] * 2)
     law.reset()
     plant, force, still = Plant(condition.rig, 2), np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2))

@@ -64,7 +64,7 @@ PARENT = """
 import os, sys, time
 from pathlib import Path
 from baselines.work.side_by_side import side_by_side
-from tests.bench.test_side_by_side import wait_beside
+from tests.work.test_side_by_side import wait_beside
 if __name__ == "__main__":
     side_by_side(wait_beside, [(sys.argv[1],), (sys.argv[1],)], 2, lambda number, result: None)
 """

@@ -228,7 +228,7 @@ def test_every_range_can_be_drawn_and_none_is_unless_it_is_named():
 
 
 def test_the_page_has_every_option_with_its_default_and_its_range():
-    page = (Path(__file__).parents[2] / "docs" / "plant_options.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "plant_options.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\|[^|]*\| `([\w.]+)` \| ([^| ]+)[^|]*\| (\S+) to (\S+) \|", page, re.MULTILINE)
     assert {name: (float(low), float(high)) for name, _, low, high in rows} == WORTH
     for name, default, *_ in rows:

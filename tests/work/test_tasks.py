@@ -17,7 +17,7 @@ from baselines.work import claims, tasks
 from baselines.work.claims import Claims
 from baselines.work.files import this_process
 from baselines.work.tasks import Task, code_stamp, run_tasks
-from tests.bench.test_side_by_side import waited_for
+from tests.work.test_side_by_side import waited_for
 
 
 def square(log, number):
@@ -187,7 +187,7 @@ PROCESS = """
 import sys
 from pathlib import Path
 from baselines.work.tasks import run_tasks
-from tests.bench.test_tasks import made, slowly
+from tests.work.test_tasks import made, slowly
 if __name__ == "__main__":
     log, out = map(Path, sys.argv[1:])
     results, failures = run_tasks(made(log, slowly, range(12)), out, 1, "work")

@@ -13,7 +13,7 @@ import pytest
 from birthsim_env.physics.compiled import compilation
 from birthsim_env.physics.compiled.compilation import source_stamp
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 PROBE = """
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.loop.signals import compliance

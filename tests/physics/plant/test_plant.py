@@ -20,7 +20,7 @@ from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 RANDOMIZED = {
     "mechanics.mass": (2, 5),
     "cylinder1.coulomb_friction": (6, 25),

@@ -1,0 +1,1 @@
+"""Compilation, and functions with the same bits everywhere."""

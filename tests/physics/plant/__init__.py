@@ -1,0 +1,1 @@
+"""The whole plant: its motion, balances, limits and options."""
