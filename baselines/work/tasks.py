@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.work.claims import Claims
-from baselines.work.files import finite, write_json
+from baselines.work.files import finite, later_signals, write_json
 from baselines.work.side_by_side import side_by_side
 
 _ROOT = Path(__file__).resolve().parent.parent.parent
@@ -127,9 +127,11 @@ def run_tasks(
                 task = begun[number]
                 path = paths[task.name]
                 if isinstance(outcome, dict):
-                    # As it would be read: one run gives the same as an interrupted one.
-                    _write(path, task, outcome)
-                    results[task.name] = _read(path) or {}
+                    # A signal in between would leave a file that the last line does not count.
+                    with later_signals():
+                        _write(path, task, outcome)
+                        # As it would be read: one run gives the same as an interrupted one.
+                        results[task.name] = _read(path) or {}
                 else:
                     failures[task.name] = outcome
                 claims.give_up(path)

@@ -168,6 +168,21 @@ def test_ctrl_c_while_a_claim_is_made_leaves_none(monkeypatch, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_ctrl_c_right_after_a_piece_is_written_counts_it(log, tmp_path, monkeypatch, capsys):
+    """Between the file and the count of what is kept."""
+    written = tasks._write
+
+    def now(*piece):
+        written(*piece)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(tasks, "_write", now)
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(made(log, square, range(3)), tmp_path / "out", 1, "work")
+    assert len(list(tmp_path.rglob("*.json"))) == 1
+    assert "work: 1 of 3 are complete and kept; the same command goes on" in capsys.readouterr().out
+
+
 def test_a_claim_is_touched_and_respected_until_it_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(claims, "HEARTBEAT", 0.02)
     monkeypatch.setattr(claims, "PATIENCE", 0.0)
