@@ -169,7 +169,8 @@ learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done >docs/learned.md
+	{ echo "# Tables of the residual"; echo; \
+	  for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done; } >docs/learned.md
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 scores: $(READY)
