@@ -17,13 +17,12 @@ version = release = birthsim_env.__version__
 
 extensions = ["myst_nb"]
 exclude_patterns = ["_generate"]
+toc_object_entries = False
 # Indented and unnamed blocks hold commands, formulas and TOML; what is Python says so.
 highlight_language = "none"
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4
-# The changelog ends some lines with words that look like links of the web; only what is written as a link is one.
-myst_links_external_new_tab = False
 
 # Every notebook runs at every build, in a folder of its own, and a failing cell fails the build.
 nb_execution_mode = "force"

@@ -86,7 +86,7 @@ def _text(thing: object) -> str:
     if listed:
         # A block of arguments becomes a list; what stands further in belongs to the argument above it.
         text += "\nArguments:\n\n" + re.sub(r"^    (\w+): ", r"- ``\1``: ", listed, flags=re.MULTILINE)
-    return re.sub(r"^#+ (.*)$", r"**\1**", text, flags=re.MULTILINE)
+    return re.sub(r"^#+ (.*)$", r"**\1**\n", text, flags=re.MULTILINE)
 
 
 def _first(thing: object) -> str:

@@ -11,7 +11,7 @@ from baselines.commands.start import command
 PROJECT = Path(__file__).resolve().parent.parent.parent / "pyproject.toml"
 
 
-class _Read(Exception):
+class _FoundError(Exception):
     """Carries a command's parser out of it, before anything is done."""
 
 
@@ -19,7 +19,7 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     """The parser of a console command such as ``birthsim-train``."""
 
     def give(self: argparse.ArgumentParser, *_: object) -> None:
-        raise _Read(self)
+        raise _FoundError(self)
 
     with (
         mock.patch.object(argparse.ArgumentParser, "parse_args", give),
@@ -28,7 +28,7 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     ):
         try:
             command()
-        except _Read as found:
+        except _FoundError as found:
             return found.args[0]
     raise RuntimeError(f"{name} parsed no arguments")
 
@@ -41,7 +41,16 @@ def commands() -> str:
 
 def _section(parser: argparse.ArgumentParser) -> str:
     formatter = parser._get_formatter()
-    lines = [f"## `{parser.prog}`", "", _plain(parser.description), "", "```text", " ".join(parser.format_usage().split()), "```", ""]
+    lines = [
+        f"## `{parser.prog}`",
+        "",
+        _plain(parser.description),
+        "",
+        "```text",
+        " ".join(parser.format_usage().split()),
+        "```",
+        "",
+    ]
     lines += ["| option | what it does |", "|---|---|"]
     for action in parser._actions:
         if action.help is argparse.SUPPRESS or isinstance(action, argparse._HelpAction):
@@ -50,7 +59,7 @@ def _section(parser: argparse.ArgumentParser) -> str:
         option = f"{', '.join(action.option_strings)} {value}".strip()
         required = " Required." if action.required and action.option_strings else ""
         said = _plain(formatter._expand_help(action) if action.help else "")
-        lines.append(f"| `{option.replace('|', '&#124;')}` | {said}{'.' if required and said else ''}{required} |")
+        lines.append(f"| `{option}` | {said}{'.' if required and said else ''}{required} |")
     return "\n".join([*lines, "", _plain(parser.epilog)]).rstrip()
 
 

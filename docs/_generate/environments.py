@@ -21,7 +21,10 @@ def environments() -> str:
 
 
 def _shared() -> str:
-    rows = [f"| {k} | {entry.name} | {entry.scale:g} {entry.unit} |" for k, entry in enumerate(observation.ENTRIES)]
+    scales = [f"{entry.scale:g} {entry.unit}".replace("1 half strokes", "half a stroke") for entry in observation.ENTRIES]
+    rows = [
+        f"| {k} | {entry.name} | {scale} |" for k, (entry, scale) in enumerate(zip(observation.ENTRIES, scales, strict=True))
+    ]
     info = [f"| `{name}` | {size} | {words} |" for name, (size, words) in FIELDS.items()]
     terms = (reward.__doc__ or "").strip()
     return "\n".join([
@@ -54,7 +57,8 @@ def _section(scenario: str) -> str:
     made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
     return "\n".join([
         f"## `{name}`", "", picture, "", "| | |", "|---|---|", *rows, "",
-        "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py", "\n\n".join(made).rstrip(), "```",
+        "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py",
+        "\n\n".join(made).rstrip(), "```",
     ])  # fmt: skip
 
 

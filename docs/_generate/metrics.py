@@ -28,10 +28,11 @@ def metrics() -> str:
     return "\n".join([
         "| metric | unit | meaning |", "|---|---|---|", *rows, "",
         f"- Nothing changes: target, force and setpoints have been constant for {QUIET:g} s.",
-        f"- `stiffness_error` and `cross_motion` exist where the target stands still and the episode ends in a push held for {HELD:g} s. "
-        f"Positions are means over {WINDOW:g} s, so hunting does not enter.",
+        f"- `stiffness_error` and `cross_motion` exist where the target stands still and the episode ends in a push held for "
+        f"{HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
         f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
-        "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what `birthsim-haptics` measures.",
+        "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
+        "`birthsim-haptics` measures.",
     ])  # fmt: skip
 
 

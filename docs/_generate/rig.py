@@ -15,7 +15,14 @@ def rig() -> str:
 
 def _section(name: str, part: object) -> str:
     about = (type(part).__doc__ or "").partition("\n\nFields")[0].replace("\n    ", "\n")
-    lines = [f"## `{name}`", "", about, "", "| field | default | unit | allowed | drawn from | basis |", "|---|---|---|---|---|---|"]
+    lines = [
+        f"## `{name}`",
+        "",
+        about,
+        "",
+        "| field | default | unit | allowed | drawn from | basis |",
+        "|---|---|---|---|---|---|",
+    ]
     for field in dataclasses.fields(part):
         m, value = field.metadata, getattr(part, field.name)
         shown = f"`{value!r}`" if isinstance(value, str) else f"{value:.6g}"

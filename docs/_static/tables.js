@@ -2,7 +2,7 @@
 "use strict";
 
 const SHORT = 4; // rows below which sorting says nothing
-const LONG = 15; // rows from which a filter helps
+const LONG = 30; // rows from which a filter helps
 
 // What a cell is worth: its first number ("lost" is the worst of all), else its words.
 function worth(text) {
