@@ -20,6 +20,8 @@ exclude_patterns = ["_generate"]
 toc_object_entries = False
 # Indented and unnamed blocks hold commands, formulas and TOML; what is Python says so.
 highlight_language = "none"
+# Two hyphens begin an option.
+smartquotes = False
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4
@@ -30,6 +32,8 @@ nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
+# Progress bars, and the word that kernels compile.
+nb_output_stderr = "remove"
 
 html_theme = "furo"
 html_title = "BirthSIM"
@@ -46,9 +50,9 @@ linkcheck_retries = 2
 
 
 def seen_from_the_site(app, page, source):
-    """Links of pages in docs/ to the README lead to its page of the site."""
-    if "/" not in page:
-        source[0] = source[0].replace("](../README.md", "](project/readme.md")
+    """Links to the README lead to its page of the site."""
+    up = "../" * page.count("/")
+    source[0] = source[0].replace(f"]({up}../README.md", f"]({up}project/readme.md")
 
 
 def setup(app):

@@ -1,6 +1,7 @@
 """Every console command of pyproject.toml with its options, from the parser that reads them."""
 
 import argparse
+import os
 import sys
 import tomllib
 from pathlib import Path
@@ -36,7 +37,9 @@ def parser_of(name: str) -> argparse.ArgumentParser:
 def commands() -> str:
     """A section for every command."""
     names = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]["scripts"]
-    return "\n\n".join(_section(parser_of(name)) for name in sorted(names))
+    # argparse breaks its lines for a terminal, which may be none.
+    with mock.patch.dict(os.environ, COLUMNS="100"):
+        return "\n\n".join(_section(parser_of(name)) for name in sorted(names))
 
 
 def _section(parser: argparse.ArgumentParser) -> str:
@@ -47,7 +50,7 @@ def _section(parser: argparse.ArgumentParser) -> str:
         _plain(parser.description),
         "",
         "```text",
-        " ".join(parser.format_usage().split()),
+        parser.format_usage().rstrip(),
         "```",
         "",
     ]

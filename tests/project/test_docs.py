@@ -20,6 +20,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 PAGES = {page.relative_to(DOCS).with_suffix("").as_posix(): page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md")}
 
+FIGURE = re.compile(r"\b\d+\.\d+\b")
+
 TABLE = """<!doctype html><article><table class="docutils"><thead><tr><th>law</th><th>error, mm</th></tr></thead>
 <tbody>{}</tbody></table></article><script>{}</script>"""
 
@@ -45,6 +47,14 @@ def test_what_a_toctree_names_is_linked_for_readers_without_one(page):
     links = re.findall(r"\]\(([^)#:]+\.md)\)", PAGES[page])
     linked = {(folder / link).resolve().relative_to(DOCS).with_suffix("").as_posix() for link in links}
     assert set(listed(page)) - linked == set()
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("explanation/") and not page.endswith("index")])
+def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
+    prose = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
+    links = {(DOCS / page).parent / link for link in re.findall(r"\]\(([^)#:]+\.md)", prose)}
+    known = {figure for link in links for figure in FIGURE.findall(link.read_text(encoding="utf-8"))}
+    assert set(FIGURE.findall(prose)) - known == set()
 
 
 @pytest.fixture(scope="module")
