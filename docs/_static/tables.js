@@ -49,7 +49,10 @@ function addFilter(table) {
 addEventListener("DOMContentLoaded", () => {
   for (const table of document.querySelectorAll("article table.docutils")) {
     const rows = table.tBodies[0]?.rows.length ?? 0;
-    if (!table.tHead || rows < SHORT || !table.tHead.textContent.trim()) continue;
+    if (!table.tHead?.textContent.trim() || rows < SHORT) continue;
+    if (rows >= LONG) addFilter(table);
+    // A table of words alone is in an order that its writer chose.
+    if ([...table.tBodies[0].querySelectorAll("td")].every((cell) => Number.isNaN(worth(cell.textContent)))) continue;
     [...table.tHead.rows[0].cells].forEach((head, column) => {
       const button = document.createElement("button");
       button.type = "button";
@@ -58,6 +61,5 @@ addEventListener("DOMContentLoaded", () => {
       button.addEventListener("click", () => sort(table, column, head));
       head.append(button);
     });
-    if (rows >= LONG) addFilter(table);
   }
 });
