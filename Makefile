@@ -103,10 +103,12 @@ kills: $(READY)
 	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci docs/conf.py docs/_generate
-	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests .ci docs/conf.py docs/_generate
+	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci
+	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/ruff check docs/conf.py docs/_generate
+	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready

@@ -18,7 +18,11 @@ BLOCKS = {
 }
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+TRAINS = {name for name, block in BLOCKS.items() if ".learn(" in block}
+"""Blocks that take more than a few seconds."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in TRAINS else ()) for name in BLOCKS])
 def test_python_blocks_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
