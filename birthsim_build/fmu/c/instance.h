@@ -58,12 +58,13 @@ static const char *model_refusal(const Model *m, unsigned k, double value) {
 /* Whole control periods up to now + step, s; NULL, or why not. */
 static const char *model_advance(Model *m, double now, double step) {
   double due = (now + step - m->began) / MODEL_PERIOD;
-  if (!(step >= 0.0) || !(due < 1e15)) return "the communication step must be a finite number from 0 on, s";
+  if (!(step >= 0.0) || !(due - (double)m->periods < 1e9)) return "the communication step must be a finite number from 0 on, s";
   /* Times come in as sums of steps: a period that lacks a thousandth is complete. */
   long long count = (long long)floor(due + 1e-3) - m->periods;
   if (count > 0) {
-    model_run(m->memory, count);
+    int missed = model_run(m->memory, (int32_t)count);
     m->periods += count;
+    if (missed) return "the law cannot serve these setpoints: the stiffness must be positive definite";
   }
   m->time = now + step;
   for (int k = 0; k < MODEL_OUTPUTS; k++)
