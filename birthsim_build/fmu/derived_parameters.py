@@ -46,13 +46,14 @@ def _text(term: Any) -> str:
 def parameter_names(rig: Parameters) -> list[str]:
     """Dotted names of the numbers that may be set, in the order of ``SECTIONS``.
 
-    Options that the rig leaves off (``quantities.quantity``) are not among them: another plant is compiled for those.
+    Options (``quantities.quantity``) are not among them, since another plant is compiled for those, nor is the speed from which
+    collisions are reported, which the plant does not use.
     """
     return [
         f"{section}.{field.name}"
         for section in SECTIONS
         for field in dataclasses.fields(getattr(rig, section))
-        if not isinstance(field.default, str) and not field.metadata["option"]
+        if not (isinstance(field.default, str) or field.metadata["option"] or field.name == "impact_speed")
     ]
 
 

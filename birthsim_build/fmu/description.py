@@ -60,11 +60,8 @@ def model_description(model: Description, version: int) -> bytes:
     }  # fmt: skip
     if three:
         capabilities["fixedInternalStepSize"] = repr(model.period)
-        _units(root, model)
-        ElementTree.SubElement(root, "CoSimulation", capabilities)
-    else:
-        ElementTree.SubElement(root, "CoSimulation", capabilities)
-        _units(root, model)
+    ElementTree.SubElement(root, "CoSimulation", capabilities)
+    _units(root, model)
     categories = ElementTree.SubElement(root, "LogCategories")
     ElementTree.SubElement(categories, "Category", name="logStatusError", description="what was refused, and why")
     ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(model.period))

@@ -20,7 +20,9 @@ from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.rig.parameters import Parameters
 
-_SENSES = ("board", "plant", "sensors")
+_PLANT, _LOOP = ("board", "plant", "sensors"), ("sensors", "law", "valves", "board", "plant")
+"""Parts of a model's control period, in order. A law acts on what is measured when the period begins: the hand's force of that
+instant comes in just before."""
 _OPENINGS = range(WORLD + OPENING, WORLD + SHOWN)
 _FORCES = range(FORCE, FORCE + 2)
 _REFERENCE = range(WORLD + REFERENCE, WORLD + REFERENCE + REFERENCES)
@@ -43,9 +45,8 @@ def fmu_model(identifier: str, about: str, world: World, law: Part | None, rig: 
 
     The target, the setpoints and the hand of the scenario are left out: they are the model's inputs.
     """
-    names = ("law", "valves", *_SENSES) if law else _SENSES
     every = {**world.parts, **({"law": law} if law else {})}
-    parts = {name: every[name] for name in names if name in every}
+    parts = {name: every[name] for name in (_LOOP if law else _PLANT) if name in every}
     functions = sorted({function_name(stage) for part in parts.values() for stage in part.stages})
     image = image_of(world.rows, parts, functions)
     inputs = [*_rows(_REFERENCE if law else _OPENINGS), *_rows(_FORCES)]
