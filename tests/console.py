@@ -18,6 +18,7 @@ COMMANDS = {
     "haptics": "baselines.commands.haptics",
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},
+    "fmu": "birthsim_build.commands.fmu",
 }
 PATIENCE = 600.0  # s; only a state that never comes takes so long
 RESIDUAL = "BirthSIM/ProbeResidual-v1"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from baselines.work.files import whole_file
-from birthsim_build.code.compiler import compile_object, zig
+from birthsim_build.code.compiler import compile_object, link
 from birthsim_build.fmu.description import model_description
 from birthsim_build.fmu.model import Model
 
@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 VERSIONS = (2, 3)
 """Of the FMI standard."""
 
-_FOLDERS = {"x86-64": ("linux64", "x86_64-linux", "so"), "aarch64": ("aarch64-linux", "aarch64-linux", "so")}
+BINARIES = {"x86-64": ("linux64", "x86_64-linux", "so"), "aarch64": ("aarch64-linux", "aarch64-linux", "so")}
 """Folder of a target's binary in FMI 2.0 and 3.0, and its ending."""
 
 _ZIG = {"x86-64": "x86_64-linux-gnu.2.17", "aarch64": "aarch64-linux-gnu.2.17"}
@@ -35,12 +35,13 @@ def write_fmu(model: Model, version: int, path: Path, targets: Sequence[str] = (
                 compile_object(model.functions, target, place / f"{target}.o", {"birthsim_image": model.image})
                 binary = place / f"{target}.so"
                 sources = [HERE / "c" / f"fmi{version}.c", *([HERE / "c" / "fmi3_refused.c"] if version == 3 else [])]
-                zig(
+                link(
                     *("cc", "-target", _ZIG[target], "-shared", "-fPIC", "-O2", "-std=c99", "-fno-strict-aliasing"),
-                    *("-ffp-contract=off", "-fvisibility=hidden", "-s", f"-I{HERE / 'fmi_headers'}", f"-I{HERE / 'c'}", f"-I{place}"),
+                    *("-ffp-contract=off", "-fvisibility=hidden", "-s"),
+                    *(f"-I{headers}" for headers in (HERE / "fmi_headers", HERE / "c", place)),
                     *map(str, sources), str(place / f"{target}.o"), "-lm", "-o", str(binary),
                 )  # fmt: skip
-                two, three, ending = _FOLDERS[target]
+                two, three, ending = BINARIES[target]
                 _put(archive, f"binaries/{three if version == 3 else two}/{name}.{ending}", binary.read_bytes())
 
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.description import Description, Variable
-from birthsim_build.image import HEAD, Part, Words, function_name
+from birthsim_build.image import HEAD, Part, Words, function_name, packed_image, packed_part, packed_rows
 from birthsim_build.layout import LAYOUT, Row
-from birthsim_build.loops import World, image_of
-from birthsim_env.loop.rows import FORCE, MOTION, OPENING, POSITION, REFERENCE, SEEN, SHOWN, STATE, WORLD
+from birthsim_build.loops import World
+from birthsim_env.loop.rows import FORCE, MOTION, OPENING, POSITION, REFERENCE, SHOWN, STATE, WORLD
 from birthsim_env.loop.signals import REFERENCES
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 _PLANT, _LOOP = ("board", "plant", "sensors"), ("sensors", "law", "valves", "board", "plant")
@@ -46,9 +46,9 @@ def fmu_model(identifier: str, about: str, world: World, law: Part | None, rig: 
     The target, the setpoints and the hand of the scenario are left out: they are the model's inputs.
     """
     every = {**world.parts, **({"law": law} if law else {})}
-    parts = {name: every[name] for name in (_LOOP if law else _PLANT) if name in every}
-    functions = sorted({function_name(stage) for part in parts.values() for stage in part.stages})
-    image = image_of(world.rows, parts, functions)
+    parts = [every[name] for name in (_LOOP if law else _PLANT) if name in every]
+    functions = sorted({function_name(stage) for part in parts for stage in part.stages})
+    image = packed_image(packed_rows(world.rows, parts), [packed_part(part, functions) for part in parts])
     inputs = [*_rows(_REFERENCE if law else _OPENINGS), *_rows(_FORCES)]
     outputs = [row for one in (*_TRUTH, *_MEASURED, *((_OPENINGS,) if law else ())) for row in _rows(one)]
     start = image.view(np.float64)[HEAD:]
@@ -110,7 +110,7 @@ def _header(model: Description, rows: list[Row], words: int, rig: Parameters) ->
         "}",
         "",
     ]
-    assert HEAD + PARAMETERS <= words and len(rows) == len(of["input"]) + len(of["output"]) and max(row.number for row in rows) < WORLD + SEEN
+    assert len(rows) == len(of["input"]) + len(of["output"])
     return "\n".join(lines)
 
 
