@@ -22,15 +22,17 @@ ONE_LANE = {
 """Environment of the process that compiles for one lane, and not for the processor that it runs on."""
 
 
-def compile_object(functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None) -> None:
+def compile_object(
+    functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False
+) -> None:
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
-    Beside it stands the assembly, ``.s``.
+    For a Cortex-M7 the assembly stands beside it, ``.s``. Where it is to ``count``, the code counts its operations.
     """
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "data.npz"
         np.savez(place, **dict(data or {}))  # type: ignore[arg-type]
-        request = {"functions": list(functions), "target": target, "data": str(place), "out": str(out)}
+        request = {"functions": list(functions), "target": target, "data": str(place), "out": str(out), "count": count}
         subprocess.run(
             [sys.executable, "-m", "birthsim_build.code.emit"], input=json.dumps(request), text=True, check=True,
             env={**os.environ, **ONE_LANE},

@@ -80,13 +80,17 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
 
 def _show(report: Report) -> None:
     for name, value in report.items():
-        if isinstance(value, dict):
+        if name == "estimate":
+            for law, found in value.items():
+                said = f"{found['operations']:,.0f} operations; at most {found['most']:,.0f} cycles, an estimate"
+                print(f"{law:60}{found['cycles']:>12,.0f} cycles a period; {said}")
+        elif isinstance(value, dict):
             for key, size in value.items():
                 print(f"{name + ' ' + key:60}{size:>12,} bytes")
         elif isinstance(value, int):
             print(f"{name:60}{value:>12,} bytes")
         else:
-            print(f"{name:60}{', '.join(value) if isinstance(value, list) else value!s:>12}")
+            print(f"{name:60}{', '.join(value) or 'nothing' if isinstance(value, list) else value:>12}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 import json
+import os
 
 import pytest
 from filelock import FileLock
@@ -9,11 +10,8 @@ from tests.build.targets import BUILT, build, need_linker
 def _once(tmp_path_factory, target, *options):
     """A folder of birthsim-build, made by the first worker that asks for it."""
     need_linker()
-    root = (
-        tmp_path_factory.getbasetemp().parent
-        if "PYTEST_XDIST_WORKER" in __import__("os").environ
-        else tmp_path_factory.getbasetemp()
-    )
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
     folder = root / "built" / target
     with FileLock(str(root / f"{target}.lock")):
         if not (folder / "build.json").is_file():
