@@ -9,6 +9,8 @@ _FUNCTION = re.compile(r"\.type\s+([\w.$]+),%function")
 _SAVED = re.compile(r"^\s+(v?)push(?:\.w)?\s+\{([^}]*)\}")
 _MOVED = re.compile(r"^\s+subw?(?:\.w)?\s+sp,(?:\s*sp,)?\s*#(\d+)")
 _CALL = re.compile(r"^\s+(?:bl|b|b\.w)\s+([\w.$]+)\s*$")
+POINTER = "*"
+"""Stands for whatever a pointer calls."""
 _POINTED = re.compile(r"^\s+blx\s+r")
 
 
@@ -17,19 +19,19 @@ def stack_bytes(assembly: str, entry: str, pointed: str) -> int:
     frames, calls = _functions(assembly)
 
     def deepest(name: str) -> int:
-        return frames[name] + max((deepest(other) for other in calls[name] if other != name), default=0)
+        called = {other for other in calls[name] if other in frames and other != name}
+        if POINTER in calls[name]:
+            called |= {other for other in frames if other.startswith(pointed)}
+        return frames[name] + max((deepest(other) for other in called), default=0)
 
-    for name in frames:
-        reached = {other for other in frames if other.startswith(pointed)} if None in calls[name] else set()
-        calls[name] = {other for other in calls[name] if other in frames} | reached
     return deepest(entry)
 
 
-def _functions(assembly: str) -> tuple[dict[str, int], dict[str, set[str | None]]]:
-    """Bytes of each function's frame, and what it calls; None is a call by a pointer."""
+def _functions(assembly: str) -> tuple[dict[str, int], dict[str, set[str]]]:
+    """Bytes of each function's frame, and what it calls."""
     functions = set(_FUNCTION.findall(assembly))
     frames: dict[str, int] = dict.fromkeys(functions, 0)
-    calls: dict[str, set[str | None]] = {name: set() for name in functions}
+    calls: dict[str, set[str]] = {name: set() for name in functions}
     now = ""
     for line in assembly.splitlines():
         label = _LABEL.match(line)
@@ -42,5 +44,5 @@ def _functions(assembly: str) -> tuple[dict[str, int], dict[str, set[str | None]
         elif call := _CALL.match(line):
             calls[now].add(call[1])
         elif _POINTED.match(line):
-            calls[now].add(None)
+            calls[now].add(POINTER)
     return frames, calls
