@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_build.bundle import Bundle, identifier, make_bundle
-from birthsim_build.code.compiler import compile_object, link
+from birthsim_build.code.compiler import compile_object, has_linker, link
 from birthsim_build.code.counting import COUNTS, OPERATIONS
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import ROWS
@@ -34,8 +34,11 @@ HOSTS = {"x86_64": ("x86-64", "elf_x86_64"), "aarch64": ("aarch64", "aarch64linu
 
 
 def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
-    """Of every law alone: operations and estimated cycles of a control period, the mean and the most; empty on other hosts."""
-    if platform.machine() not in HOSTS:
+    """Of every law alone: operations and estimated cycles of a control period, the mean and the most.
+
+    Empty without a linker, and on other hosts.
+    """
+    if platform.machine() not in HOSTS or not has_linker():
         return {}
     target, emulation = HOSTS[platform.machine()]
     kinds = {sampled: "lab" if sampled else "ideal" for _, sampled in bundle.laws}

@@ -39,10 +39,19 @@ def compile_object(
         )  # fmt: skip
 
 
-def link(*arguments: str) -> None:
-    """Run a linker of PyPI's ``ziglang``, ``wasm-ld`` or ``ld.lld``; ``ValueError`` where it is missing or refuses."""
-    if find_spec("ziglang") is None:
+def has_linker() -> bool:
+    """Whether PyPI's ``ziglang`` is there."""
+    return find_spec("ziglang") is not None
+
+
+def require_linker() -> None:
+    """Raises ``ValueError`` where PyPI's ``ziglang`` is missing."""
+    if not has_linker():
         raise ValueError("linking needs the extra build: pip install 'birthsim[build]'")
+
+
+def link(*arguments: str) -> None:
+    """Run a linker of PyPI's ``ziglang``, ``wasm-ld`` or ``ld.lld``; ``ValueError`` where it refuses."""
     done = subprocess.run([sys.executable, "-m", "ziglang", *arguments], capture_output=True, text=True)
     if done.returncode:
         said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]

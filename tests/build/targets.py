@@ -22,6 +22,7 @@ from birthsim_build.layout import LAYOUT, ROWS
 from birthsim_env import Parameters
 from birthsim_env.loop.rows import ASKED, IMPACT, OPENING, SEEN, WORLD
 from birthsim_env.parts.scenarios import environment_id
+from birthsim_live.rig.controllers import as_action
 
 HERE = Path(__file__).parent
 ROW = {row.name: row.number for row in LAYOUT}
@@ -47,27 +48,37 @@ def build(target, folder, *options):
     subprocess.run(line, check=True, capture_output=True, text=True)
 
 
-def python_rows(scenario, sensors, controller, periods=PERIODS):
-    """All rows of world and seen (periods, WORLD + SEEN) of the nominal scenario under a controller."""
-    rig = Parameters()
-    period = rig.electronics.control_period
-    env = gymnasium.make_vec(environment_id(scenario), num_envs=1, sensors=sensors, policy_period=period)
-    env.reset(seed=0)
+def make_law(controller):
     kind, _, policy = controller.partition(":")
-    law, simulation = make_controller(kind, rig, **({"policy": policy} if policy else {})), env.unwrapped.simulation
+    return make_controller(kind, Parameters(), **({"policy": policy} if policy else {}))
+
+
+def python_rows(scenario, sensors, controller, periods=PERIODS, exchange=None, **world):
+    """All rows of world and seen (periods, WORLD + SEEN) of the nominal scenario under a controller.
+
+    ``exchange`` {"at", "controller"} puts another controller in its place; ``world`` are arguments of the environment.
+    """
+    period = Parameters().electronics.control_period
+    env = gymnasium.make_vec(environment_id(scenario), num_envs=1, sensors=sensors, policy_period=period, **world)
+    env.reset(seed=0)
+    law, simulation = make_law(controller), env.unwrapped.simulation
     rows = np.empty((periods, WORLD + SEEN))
-    for row in rows:
-        simulation.step(np.ascontiguousarray(law.command(simulation.measurement, simulation.reference)))
+    for k, row in enumerate(rows):
+        if exchange and exchange["at"] == k:
+            law = make_law(exchange["controller"])
+        opened = law.command(simulation.measurement, simulation.reference)
+        simulation.step(as_action(opened, simulation.actuation.size))
         row[:] = np.concatenate(simulation.rows())[:, 0]
     return rows
 
 
-def node_rows(folder, make, out, periods=PERIODS, inputs=None):
-    """All rows (periods, ROWS) in Node: ``make`` is a method of Bundle and its arguments; ``inputs`` name -> (periods,)."""
+def node_rows(folder, make, out, periods=PERIODS, inputs=None, exchange=None):
+    """All rows (periods, ROWS) in Node: ``make`` is a method of Bundle and its arguments; ``inputs`` name -> (periods,);
+    ``exchange`` {"at", "controller", "sensors"}."""
     need(shutil.which("node"), "node is missing: apt-get install nodejs")
     names, values = list(inputs or {}), np.array(list((inputs or {}).values())).T
     np.ascontiguousarray(values).tofile(out / "inputs.bin")
-    request = {"folder": str(folder), "make": make, "periods": periods, "names": names, "out": str(out)}
+    request = {"folder": str(folder), "make": make, "periods": periods, "names": names, "out": str(out), "exchange": exchange}
     subprocess.run(["node", str(HERE / "run.mjs"), json.dumps(request)], check=True, capture_output=True, text=True)
     return np.fromfile(out / "rows.bin").reshape(periods, ROWS)
 

@@ -1,6 +1,5 @@
 """The code for other processors computes the bits of Python, under qemu."""
 
-import importlib.util
 import shutil
 import subprocess
 import sys
