@@ -10,6 +10,8 @@ from typing import Any
 from birthsim_build.bundle import Bundle
 from birthsim_build.code.compiler import compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
+from birthsim_build.code.stack import stack_bytes
+from birthsim_build.estimate import estimates
 from birthsim_build.faces.c import write_example, write_header
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
@@ -51,11 +53,14 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
 
 
 def build_cortex(bundle: Bundle, folder: Path) -> Report:
-    """Write the object of the laws alone and its header; returns sizes in bytes."""
+    """Write the object of the laws alone and its header; returns sizes in bytes, and what a period takes."""
     images = {name: words for name, words in bundle.images().items() if name.startswith("law_")}
     built = _object(bundle, "cortex-m7", folder, images)
     write_header(images, folder)
-    return {"target": "cortex-m7", **built}
+    assembly = folder / "birthsim.s"
+    stack = stack_bytes(assembly.read_text(), "birthsim_advance", "birthsim_stage_")
+    assembly.unlink()
+    return {"target": "cortex-m7", **built, "stack": stack, "estimate": estimates(bundle)}
 
 
 def _object(bundle: Bundle, target: str, folder: Path, images: Mapping[str, Words]) -> Report:
