@@ -26,3 +26,6 @@ TARGETS = {
 }
 """WebAssembly as browsers have it since 2021, x86-64 since 2009 (which rounds in an instruction), every aarch64, and a
 Cortex-M7 with double precision. No target fuses a product with a sum: the code does not allow it, and LLVM then does not."""
+
+BUILT = ("wasm", "x86-64", "aarch64", "cortex-m7")
+"""Targets of ``birthsim-build``; Windows has its FMUs only."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 from dataclasses import fields
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -13,6 +15,7 @@ import pytest
 
 from baselines.registry import make_controller
 from birthsim_build.commands.fmu import main
+from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.units import exponents
 from birthsim_env import Parameters
@@ -29,6 +32,7 @@ pytest.importorskip("ziglang")
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
 CIRCLE = "BirthSIM/Circle-v1"
+HEADERS = Path(archive.__file__).parent / "fmi_headers"
 
 
 class Unit:
@@ -146,6 +150,24 @@ def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, 
         env.step(law.command(seen, reference).T)
         assert one.get(["measured_x", "measured_y"]).tolist() == seen.position[:, 0].tolist()
         assert one.get(STATE_NAMES).tolist() == simulation.rows()[0][STATE : STATE + 18, 0].tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("wine") is None, reason="runs Windows' binary where Wine is installed")
+def test_windows_computes_the_bits_of_linux(written, tmp_path):
+    path = written("--controller", "backstepping", "--sensors", "lab", "--target", "x86-64", "x86-64-windows")
+    about, unpacked = fmpy.read_model_description(path), Path(fmpy.extract(path, tmp_path / "fmu"))
+    (linux,), (windows,) = (unpacked / "binaries" / "linux64").iterdir(), (unpacked / "binaries" / "win64").iterdir()
+    printed = []
+    for target, library, host in (("x86_64-linux-gnu", linux, []), ("x86_64-windows-gnu", windows, ["wine"])):
+        folder = library.parent
+        line = [sys.executable, "-m", "ziglang", "cc", "-target", target, f"-I{HEADERS}", Path(__file__).parent / "host.c"]
+        subprocess.run([*line, library, f"-Wl,-rpath,{folder}", "-o", folder / "host.exe"], check=True)
+        quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
+        done = subprocess.run([*host, folder / "host.exe", about.guid], cwd=folder, env=quiet, capture_output=True, check=True)
+        printed.append(done.stdout.split())
+    assert len(printed[0]) == 400 * 37
+    assert printed[0] == printed[1]
 
 
 def test_parameters_act_as_in_python(written, unit):
