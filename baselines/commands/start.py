@@ -18,7 +18,9 @@ ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the term
 
 _ABOVE = {
     **dict.fromkeys(("evaluate", "explain", "export", "scores", "sweep", "train"), "agents"),
+    "build": "birthsim_build",
     **dict.fromkeys(("live", "log", "replay"), "birthsim_live"),
+    "fmu": "birthsim_build",
 }
 """Command -> the package that holds it, where that is not this one."""
 
