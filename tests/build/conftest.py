@@ -1,4 +1,3 @@
-import json
 import os
 
 import pytest
@@ -27,9 +26,3 @@ def wasm(tmp_path_factory):
 @pytest.fixture(scope="session")
 def library(tmp_path_factory):
     return _once(tmp_path_factory, "x86-64", *BUILT)
-
-
-@pytest.fixture(scope="session")
-def sizes(library):
-    """Bytes of each loop of the library."""
-    return json.loads((library / "build.json").read_text())["loops"]

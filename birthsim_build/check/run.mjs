@@ -17,3 +17,11 @@ for (let period = 0; period < periods; period++) {
   kept.set(loop.rows, period * loop.rows.length);
 }
 writeFileSync(`${out}/rows.bin`, kept);
+loop.reset();
+let done = 0;
+const started = performance.now();
+while (performance.now() - started < 500) {
+  loop.advance(1000);
+  done += 1000;
+}
+console.log(done / ((performance.now() - started) / 1000));
