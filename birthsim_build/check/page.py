@@ -32,15 +32,15 @@ def _table(head: tuple[str, ...], lines: Sequence[tuple[str, ...]]) -> str:
 
 
 def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: list[Line], periods: int) -> str:
-    """The page of what every target takes and computes, ``results``, and of a build of ``every`` loop with its lines ``wide``."""
+    """The page of what targets take and compute, ``results``, and of a build of ``every`` loop with its lines ``wide``."""
     sizes = [(target, *_sizes(report)) for target, (report, _) in results.items()]
     equal = sum(line[1] == "equal" for line in wide)
     parts = [
         "# Sizes, speeds and bits of what is built",
-        "Written by `python -m birthsim_build.commands.targets --out out/targets --page docs/targets.md`, for the Circle, ideal "
-        f"and lab sensors, three laws. {periods} control periods (200 policy steps) are compared with Python, in every bit of "
-        "the plant's state, of what the sensors say, of what is asked for and of the openings. Speeds are control periods per "
-        f"second of CPU time (a policy step has 10) of one core ({platform.machine()}) that others used too.",
+        "Written by `python -m birthsim_build.commands.targets --out out/targets --page docs/targets.md`, for the Circle, "
+        f"ideal and lab sensors, three laws. {periods} control periods (200 policy steps) are compared with Python, in all "
+        "bits of the plant's state, of what the sensors say, of what is asked for and of the openings. Speeds are control "
+        f"periods per second of CPU time (a policy step has 10) of one core ({platform.machine()}) that others used too.",
         _table(("target", "code and data", "needs from elsewhere"), sizes),
         *(
             f"## {target}\n\n{_table(('what', 'bits', 'speed' if target != 'cortex-m7' else 'estimate per period'), lines)}"

@@ -6,7 +6,6 @@ python -m birthsim_build.commands.targets --out out/targets --page docs/targets.
 from __future__ import annotations
 
 import argparse
-import platform
 import shutil
 import time
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from birthsim_build.check.page import CLOCK, Line, page
 from birthsim_build.check.reference import CHAMBERS, PERIODS, SHARED, as_inputs, first_difference
 from birthsim_build.check.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
 from birthsim_build.code.compiler import require_linker
-from birthsim_build.estimate import HOSTS
+from birthsim_build.estimate import HOST
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
@@ -53,11 +52,10 @@ def _targets(arguments: argparse.Namespace) -> None:
     folder, rig = make_folder(arguments.out), Parameters()
     bundle = make_bundle(rig, ["circle"], ["ideal", "lab"], LAWS, [POLICY])
     every = make_bundle(rig, SCENARIOS, SENSORS, [name for name in CONTROLLERS if name not in SLOW], [POLICY])
-    host, _ = HOSTS.get(platform.machine(), ("", ""))
     results: dict[str, tuple[Report, list[Line]]] = {}
     for target, build, check in (
         ("wasm", build_wasm, _in_node),
-        *((target, _library(target), _in_process if target == host else _emulated) for target in ("x86-64", "aarch64")),
+        *((target, _library(target), _in_process if target == HOST else _emulated) for target in ("x86-64", "aarch64")),
         ("cortex-m7", build_cortex, _on_cortex),
     ):  # fmt: skip
         place = make_folder(folder / target)
