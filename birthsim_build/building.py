@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_build.bundle import Bundle
-from birthsim_build.code.compiler import compile_object, link
+from birthsim_build.code.compiler import EMULATIONS, compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
 from birthsim_build.code.stack import stack_bytes
 from birthsim_build.estimate import estimates
@@ -40,9 +40,8 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
     """Write a shared library for Linux, the object that it is made of, the header and an example; returns sizes in bytes."""
     images = bundle.images()
     built = _object(bundle, target, folder, images)
-    emulation = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}[target]
     link(
-        "ld.lld", "-m", emulation, "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
+        "ld.lld", "-m", EMULATIONS[target], "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
         str(folder / "birthsim.o"),
     )  # fmt: skip
     loops = [name for name in images if name != "plant" and not name.startswith("law_")]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from birthsim_build.bundle import Bundle, identifier, make_bundle
-from birthsim_build.code.compiler import compile_object, has_linker, link
+from birthsim_build.code.compiler import EMULATIONS, compile_object, has_linker, link
 from birthsim_build.code.counting import COUNTS, OPERATIONS
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import ROWS
@@ -30,7 +30,8 @@ CYCLES = {
 PERIODS = 2000
 """Control periods that are counted: two seconds of the Circle, with its first push."""
 
-HOSTS = {"x86_64": ("x86-64", "elf_x86_64"), "aarch64": ("aarch64", "aarch64linux")}
+HOST = {"x86_64": "x86-64", "aarch64": "aarch64"}.get(platform.machine()) if platform.system() == "Linux" else None
+"""The target whose shared library runs on this machine; None where there is none."""
 
 
 def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
@@ -38,17 +39,16 @@ def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:
 
     Empty without a linker, and on other hosts.
     """
-    if platform.machine() not in HOSTS or not has_linker():
+    if HOST is None or not has_linker():
         return {}
-    target, emulation = HOSTS[platform.machine()]
     kinds = {sampled: "lab" if sampled else "ideal" for _, sampled in bundle.laws}
     whole = make_bundle(bundle.rig, ["circle"], kinds.values(), ())
     whole = Bundle(bundle.rig, whole.worlds, bundle.laws, None)
     images = whole.images()
     with tempfile.TemporaryDirectory() as folder:
         built, library = Path(folder) / "counting.o", Path(folder) / "counting.so"
-        compile_object(whole.functions, target, built, count=True)
-        link("ld.lld", "-m", emulation, "-shared", "-o", str(library), str(built))
+        compile_object(whole.functions, HOST, built, count=True)
+        link("ld.lld", "-m", EMULATIONS[HOST], "-shared", "-o", str(library), str(built))
         code: Any = ctypes.CDLL(str(library))
     found = {}
     for controller, sampled in bundle.laws:

@@ -22,6 +22,10 @@ ONE_LANE = {
 """Environment of the process that compiles for one lane, and not for the processor that it runs on."""
 
 
+EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
+"""Targets with shared libraries -> what the linker calls them."""
+
+
 def compile_object(
     functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False
 ) -> None:

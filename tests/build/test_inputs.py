@@ -1,22 +1,29 @@
 """What acts on a built loop from outside does what the same does in Python: a person's hand, setpoints, another law."""
 
-import ctypes
 import math
 
 import numpy as np
 import pytest
 
+from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
+from birthsim_build.check.running import ROW, library_loop, node_rows
 from birthsim_build.image import HEAD
 from birthsim_build.layout import ROWS
 from birthsim_env import StiffnessSchedule, UserForce
 from birthsim_env.parts.scenarios import SCENARIOS
-from tests.build.targets import PERIODS, ROW, SHARED, assert_same_bits, node_rows, python_rows
+from tests.build.targets import assert_same_bits, need_program
 
 LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}
 STIFFNESS, DAMPING, LIMIT = 800.0, 20.0, 25.0
 HELD = np.where((np.arange(PERIODS) // 300) % 2, 1.0, 0.0)
 POINTER = np.array([0.5 + 0.02 * np.sin(0.01 * np.arange(PERIODS)), 0.03 * np.cos(0.013 * np.arange(PERIODS))])
 PUSH = np.where(np.arange(PERIODS) > 900, 7.0, 0.0)
+
+
+@pytest.fixture
+def in_node(wasm, tmp_path):
+    need_program("node", "nodejs")
+    return lambda choice=LOOP, **options: node_rows(wasm, ["loop", choice], tmp_path, PERIODS, **options)[0]
 
 
 class Held(UserForce):
@@ -45,12 +52,12 @@ class Held(UserForce):
         return forces
 
 
-def test_a_person_s_hand(wasm, tmp_path):
+def test_a_person_s_hand(in_node):
     constants = {"pointer_stiffness": STIFFNESS, "pointer_damping": DAMPING, "pointer_limit": LIMIT}
     inputs = {name: np.full(PERIODS, value) for name, value in constants.items()}
     inputs |= {"pointer_held": HELD, "pointer_x": POINTER[0], "pointer_y": POINTER[1], "add_force_y": PUSH}
-    rows = node_rows(wasm, ["loop", LOOP], tmp_path, inputs=inputs)
-    expected = python_rows("circle", "ideal", LOOP["controller"], user_force=Held())
+    rows = in_node(inputs=inputs)
+    expected = loop_rows("circle", "ideal", LOOP["controller"], user_force=Held())
     assert_same_bits(rows[:, SHARED], expected[:, SHARED])
 
 
@@ -76,31 +83,30 @@ class Chosen(StiffnessSchedule):
         return rows
 
 
-def test_setpoints_of_a_person(wasm, tmp_path):
+def test_setpoints_of_a_person(in_node):
     inputs = {"keep_Kclx": np.zeros(PERIODS), "add_Kclx": ASKED, "add_Kcly": np.full(PERIODS, 150.0)}
-    rows = node_rows(wasm, ["loop", LOOP], tmp_path, inputs=inputs)
-    expected = python_rows("circle", "ideal", LOOP["controller"], stiffness=Chosen())
+    rows = in_node(inputs=inputs)
+    expected = loop_rows("circle", "ideal", LOOP["controller"], stiffness=Chosen())
     assert_same_bits(rows[:, SHARED], expected[:, SHARED])
 
 
-def test_one_valve_per_cylinder(wasm, tmp_path):
-    rows = node_rows(wasm, ["loop", {**LOOP, "valves": "one_valve"}], tmp_path)
-    assert_same_bits(rows[:, SHARED], python_rows("circle", "ideal", LOOP["controller"], valves="one_valve")[:, SHARED])
+def test_one_valve_per_cylinder(in_node):
+    rows = in_node({**LOOP, "valves": "one_valve"})
+    assert_same_bits(rows[:, SHARED], loop_rows("circle", "ideal", LOOP["controller"], valves="one_valve")[:, SHARED])
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_another_law_takes_over(wasm, tmp_path, sensors):
+def test_another_law_takes_over(in_node, sensors):
     exchange = {"at": 777, "controller": "residual:circle", "sensors": sensors}
-    rows = node_rows(wasm, ["loop", {**LOOP, "sensors": sensors}], tmp_path, exchange=exchange)
-    assert_same_bits(rows[:, SHARED], python_rows("circle", sensors, LOOP["controller"], exchange=exchange)[:, SHARED])
+    rows = in_node({**LOOP, "sensors": sensors}, exchange=exchange)
+    assert_same_bits(rows[:, SHARED], loop_rows("circle", sensors, LOOP["controller"], exchange=exchange)[:, SHARED])
 
 
 @pytest.fixture
-def loop(library, sizes):
+def loop(library):
     """``advance`` of the library, and a loop of its as words."""
-    code, name = ctypes.CDLL(str(library / "libbirthsim.so")), "circle_lab_admittance_backstepping"
-    first = np.array((ctypes.c_int64 * (sizes[name] // 8)).in_dll(code, f"birthsim_{name}"))
-    return lambda words, periods: code.birthsim_advance(ctypes.c_void_p(words.ctypes.data), periods), first
+    advance, first = library_loop(library, "circle_lab_admittance_backstepping")
+    return lambda words, periods: advance(words.ctypes.data, periods), first
 
 
 def test_a_copy_goes_on_by_itself(loop):

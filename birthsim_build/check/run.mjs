@@ -17,3 +17,12 @@ for (let period = 0; period < periods; period++) {
   kept.set(loop.rows, period * loop.rows.length);
 }
 writeFileSync(`${out}/rows.bin`, kept);
+loop.reset();
+let done = 0;
+const started = process.cpuUsage();
+const spent = () => process.cpuUsage(started).user / 1e6;
+while (spent() < 0.5) {
+  loop.advance(1000);
+  done += 1000;
+}
+console.log(done / spent());
