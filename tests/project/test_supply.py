@@ -101,3 +101,11 @@ def test_the_changelog_is_in_its_order():
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     for version in text.split("\n## ")[1:]:
         assert re.findall(r"^### (.*)$", version, re.MULTILINE) == ["Added", "Changed", "Fixed"]
+
+
+def test_the_headers_of_the_fmi_standard_are_unchanged():
+    fmpy = pytest.importorskip("fmpy")
+    theirs = Path(fmpy.__file__).parent / "c-code"
+    ours = list((ROOT / "birthsim_build" / "fmu" / "fmi_headers").glob("*.h"))
+    assert len(ours) == 6
+    assert [path.name for path in ours if path.read_bytes() != (theirs / path.name).read_bytes()] == []
