@@ -60,7 +60,7 @@ def parameter_names(rig: Parameters) -> list[str]:
 def derived_parameters(rig: Parameters) -> list[str]:
     """C expressions of the rows of ``physics.compiled.lanes``, over ``p[k]``, the k-th of ``parameter_names``."""
     place = {name: Expression(f"p[{k}]") for k, name in enumerate(parameter_names(rig))}
-    sections = {"geometry": rig.geometry}
+    sections: dict[str, Any] = {"geometry": rig.geometry}
     for section in SECTIONS:
         part = getattr(rig, section)
         names = [field.name for field in dataclasses.fields(part)]

@@ -52,8 +52,8 @@ def model_description(model: Description, version: int) -> bytes:
         generationTool=f"birthsim-build {__version__}",
         variableNamingConvention="structured",
         license="MIT",
-        **{"instantiationToken" if three else "guid": model.token},
     )
+    root.set("instantiationToken" if three else "guid", model.token)
     capabilities = {
         "modelIdentifier": model.identifier, "canHandleVariableCommunicationStepSize": "true",
         f"canGetAndSetFMU{'S' if three else 's'}tate": "true", f"canSerializeFMU{'S' if three else 's'}tate": "true",
@@ -80,7 +80,8 @@ def model_description(model: Description, version: int) -> bytes:
             for k in outputs:
                 ElementTree.SubElement(listed, "Unknown", index=str(k + 1))
     ElementTree.indent(root)
-    return ElementTree.tostring(root, "utf-8", xml_declaration=True)
+    content: bytes = ElementTree.tostring(root, "utf-8", xml_declaration=True)
+    return content
 
 
 def _units(root: ElementTree.Element, model: Description) -> None:
