@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Measurement, Reference, compliance
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -65,7 +66,7 @@ def look(
     scales: Array, rows: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """Writes observations, ``rows`` (N, SIZE + M + S), see ``observe``; then ``action`` (M, N), ``shown`` (S, N)."""
-    motion, joints, seen = np.empty((4, 1)), np.empty((4, 1)), np.empty(scales.shape[0])
+    motion, joints, seen = scratch(4), scratch(4), scratch(SIZE)[:, 0]
     for i in range(position.shape[1]):
         motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
         motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]

@@ -77,13 +77,13 @@ class PolicyNetwork:
         x = np.minimum(np.maximum(x, -CLIP), CLIP)
         for k, (weight, bias) in enumerate(self._transposed):
             y = np.empty((len(x), len(bias)))
-            _layer(x, weight, bias, k + 1 < len(self.layers) or self.squashed, y)
+            layer(x, weight, bias, k + 1 < len(self.layers) or self.squashed, y)
             x = y
         return np.clip(x, -1.0, 1.0).astype(np.float32)
 
 
 @kernel
-def _layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) -> None:
+def layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) -> None:
     """Writes x W + b, or its tanh where ``squashed``, for inputs (N, m), W (m, n) and b (n,), into ``y`` (N, n).
 
     The vector registers hold neighbouring outputs, so that every sum runs over its inputs in their order.
