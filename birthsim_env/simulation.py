@@ -22,11 +22,13 @@ from birthsim_env.loop.rows import (
     MOTION,
     OPENING,
     REFERENCE,
+    SEEN,
     SHOWN,
     SINCE_JUMP,
     STATE,
     TICK,
     TIME,
+    WORLD,
     fill_measurement,
     measurement_of,
 )
@@ -232,37 +234,58 @@ class Simulation:
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)
-        acts = [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
-        if hasattr(self.sensors, "board_stage"):
-            return [*acts, self.sensors.board_stage()]
-        return [*acts, self._put_out] if hasattr(self.sensors, "put_out") else acts
+        return [*stages(self.plant.num_envs, self.sensors.sampled)] if stages else [self._ask]
 
-    def _assemble(self) -> None:
-        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
-        lanes, places, acts = self.plant.num_envs, self._places(), self._acts()
-        looks: list[Part] = [
-            self._compiled(self.trajectory, "sample", self._follow),
-            self._compiled(self.stiffness, "sample", self._set),
-            self._compiled(self.user_force, "force", self._push),
-        ]
+    def _board(self) -> list[Part]:
+        if hasattr(self.sensors, "board_stage"):
+            return [self.sensors.board_stage()]
+        return [self._put_out] if hasattr(self.sensors, "put_out") else []
+
+    def rows(self) -> tuple[Array, Array]:
+        """Copies of the rows of the world and of what is seen now, (WORLD, N) and (SEEN, N)."""
+        world, seen = (np.zeros((count, self.plant.num_envs)) for count in (WORLD, SEEN))
+        for rows, places in zip((world, seen), self._places(), strict=True):
+            for array, row in places:
+                rows[row : row + len(array)] = array
+        return world, seen
+
+    def parts(self) -> dict[str, list[Part]]:
+        """What a control period runs, in this order: stages, and methods that call what a user has written in Python."""
         senses = [self._compiled(self.sensors, "measure", self._measure)]
         if not self.force_sensor:
             senses.append(no_force_stage())
+        return {
+            "actuation": self._acts(),
+            "board": self._board(),
+            "plant": [plant_stage(self.plant, self.period)],
+            "target": [self._compiled(self.trajectory, "sample", self._follow)],
+            "setpoints": [self._compiled(self.stiffness, "sample", self._set)],
+            "hand": [self._compiled(self.user_force, "force", self._push)],
+            "jumps": [jump_stage(self.period, self.user_force.jump_rate, self._jumps, False)],
+            "sensors": senses,
+        }
+
+    def _assemble(self) -> None:
+        """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
+        lanes, places, parts = self.plant.num_envs, self._places(), self.parts()
+        every = [part for group in parts.values() for part in group]
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
-        moves = plant_stage(self.plant, self.period)
-        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in (*acts, moves, *looks, *senses)))
+        made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))
         if self._loop is not None and made == self._made:
             return
-        counts, begins = (jump_stage(self.period, self.user_force.jump_rate, self._jumps, first) for first in (False, True))
-        self._loop = MixedLoop(lanes, *places, [*acts, moves, *looks, counts, *senses], self.closing)
-        self._look = MixedLoop(lanes, *places, [*looks, begins, *senses], self.beginning)
+        begins = jump_stage(self.period, self.user_force.jump_rate, self._jumps, True)
+        looks = [*parts["target"], *parts["setpoints"], *parts["hand"]]
+        self._loop = MixedLoop(lanes, *places, every, self.closing)
+        self._look = MixedLoop(lanes, *places, [*looks, begins, *parts["sensors"]], self.beginning)
         self._made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
         """The plant by itself, and the actuation by itself: to be timed, on a copy."""
         lanes, places = self.plant.num_envs, self._places()
-        return MixedLoop(lanes, *places, [plant_stage(self.plant, self.period)]), MixedLoop(lanes, *places, self._acts())
+        return MixedLoop(lanes, *places, [plant_stage(self.plant, self.period)]), MixedLoop(
+            lanes, *places, [*self._acts(), *self._board()]
+        )
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Part) -> Part:

@@ -16,9 +16,8 @@ with the disturbance forces of ``state_estimator``: believed friction and what a
 
 from __future__ import annotations
 
-import numpy as np
-
 from baselines.backstepping.cartesian_law import across, along, load_rates, pressure_openings
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -121,7 +120,7 @@ def command(
     """
     c4, gain, rest_gain, rest_push, dead_zone = gains[0], gains[1], gains[2], gains[3], gains[4]
     quickness, level, fall, least = gains[5], gains[6], gains[7], gains[8]
-    u, kept = np.empty((4, 1)), exact.exp(-period / p[at.TAU])
+    u, kept = scratch(4), exact.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
         pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]

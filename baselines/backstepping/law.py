@@ -20,6 +20,7 @@ from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_s
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
 from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
 from birthsim_env.loop.signals import REFERENCES
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
@@ -271,9 +272,8 @@ def command(
     ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N); ``reference`` (15, N); ``believed`` (TOLD, N);
     ``options`` (OPTIONS,).
     """
-    x, air, r = np.empty((4, BLOCK)), np.empty((4, BLOCK)), np.empty((REFERENCES, BLOCK))
-    wanted, told, u = np.empty((8, BLOCK)), np.empty((TOLD, BLOCK)), np.empty((4, BLOCK))
-    asked, gains, intent, misses = np.empty((3, BLOCK)), np.empty((GAINS, BLOCK)), np.empty((INTENTS, BLOCK)), 0
+    x, air, r, wanted, told, u = scratch(4), scratch(4), scratch(REFERENCES), scratch(8), scratch(TOLD), scratch(4)
+    asked, gains, intent, misses = scratch(3), scratch(GAINS), scratch(INTENTS), 0
     for first in range(0, joints.shape[1], BLOCK):
         n = min(BLOCK, joints.shape[1] - first)
         load(joints, first, n, x)

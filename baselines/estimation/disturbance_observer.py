@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -24,7 +25,7 @@ def observe(
     period: float, bandwidth: float, fresh: Array, joints: Array,
 ) -> None:  # fmt: skip
     """One control period. ``estimate`` (4, N): v1, v2, d1, d2; ``joints`` (4, N) gets y1, y2, v1, v2 as measured."""
-    motion, one = np.empty((4, 1)), np.empty((4, 1))
+    motion, one = scratch(4), scratch(4)
     for i in range(estimate.shape[1]):
         motion[0, 0], motion[1, 0], motion[2, 0], motion[3, 0] = position[0, i], position[1, i], velocity[0, i], velocity[1, i]
         piston_motion(motion, p, one, 1)

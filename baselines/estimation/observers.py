@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -74,7 +75,8 @@ def observe(
     estimate, rest, innovations = memory[ESTIMATE:REST], memory[REST:INNOVATION], memory[INNOVATION:RELUCTANT]
     reluctance, history = memory[RELUCTANT:FRESH], memory[HISTORY:]
     depth, held = history.shape[0] // 2, exact.exp(-REST_BANDWIDTH * period)
-    motion, joints = np.zeros((4, 1)), np.zeros((4, 1))
+    motion, joints = scratch(4), scratch(4)
+    motion[2, 0], motion[3, 0] = 0.0, 0.0
     for i in range(estimate.shape[1]):
         slot = (int(memory[SLOT, i]) + 1) % depth
         sampled = position_time[i] - memory[LAST, i]

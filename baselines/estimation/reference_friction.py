@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Mask
+from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -28,7 +29,7 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
 @kernel
 def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
     """Carries ``bristles`` (2, N) on by one period of ``motion`` (8, N) and writes what they hold back, ``drag`` (2, N), N."""
-    one, joints = np.empty((4, 1)), np.empty((4, 1))
+    one, joints = scratch(4), scratch(4)
     for i in range(motion.shape[1]):
         for row in range(4):
             one[row, 0] = motion[row, i]

@@ -67,7 +67,7 @@ def _worn_plant(world: int, seen: int, memory: int, constants: int, tables: int,
 def _optional_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """As ``_worn_plant``, with the options of ``physics.options``; memory: inner commands and further states."""
     w, s, m, about = block(world, WORLD), block(seen, SEEN), block(memory, 4 + options.FURTHER), numbers(constants, 2)
-    u, own, p, x = scratch(4), scratch(PARAMETERS), w[:PARAMETERS], w[STATE : STATE + STATES]
+    u, own, p, x = scratch(4), scratch(options.SCRATCH), w[:PARAMETERS], w[STATE : STATE + STATES]
     spools.admit(s[OPENING : OPENING + 4], p, m[:4], u, n)
     steps = int(about[1])
     options.integrate(

@@ -27,6 +27,7 @@ RESERVOIR, HANDLE, FLOWS = 0, 1, 5
 from the supply and four to the atmosphere."""
 FURTHER = 13
 ALL = at.STATES + FURTHER
+SCRATCH = 4 * ALL + 6 + at.PARAMETERS
 
 
 def are_off(parameters: Array) -> bool:
@@ -112,14 +113,14 @@ def add(x: Array, dx: Array, total: Array, trial: Array, n: int, weight: float, 
 
 @helper
 def integrate(
-    state: Array, further: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, own: Array, n: int
+    state: Array, further: Array, u: Array, f: Array, p: Array, steps: int, step: float, impacts: Array, scratch: Array, n: int
 ) -> None:
     """``dynamics.integrate`` with options: moves ``state`` (18, n) and ``further`` (FURTHER, n), and keeps the supply of ``p``.
 
-    ``own`` (PARAMETERS, n) is scratch.
+    ``scratch`` is (SCRATCH, BLOCK).
     """
-    x, dx, total, trial = np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK)), np.empty((ALL, BLOCK))
-    motion, pull = np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    x, dx, total, trial = scratch[:ALL], scratch[ALL : 2 * ALL], scratch[2 * ALL : 3 * ALL], scratch[3 * ALL : 4 * ALL]
+    motion, pull, own = scratch[4 * ALL : 4 * ALL + 4], scratch[4 * ALL + 4 : 4 * ALL + 6], scratch[4 * ALL + 6 :]
     alter(p, own, n)
     for row in range(ALL):
         for i in range(n):
@@ -157,7 +158,7 @@ def advance(
     state: Array, further: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array
 ) -> None:
     """``dynamics.advance`` with options; ``further`` (FURTHER, N) moves along, and so does the supply of ``parameters``."""
-    own = np.empty((at.PARAMETERS, BLOCK))
+    scratch = np.empty((SCRATCH, BLOCK))
     impacts[:] = 0.0
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
@@ -165,7 +166,7 @@ def advance(
         for sample in range(forces.shape[0]):
             integrate(
                 state[:, mine], further[:, mine], command[:, mine], forces[sample][:, mine], parameters[:, mine], steps, step,
-                impacts[:, mine], own, n,
+                impacts[:, mine], scratch, n,
             )  # fmt: skip
 
 

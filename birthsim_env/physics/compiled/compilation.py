@@ -32,11 +32,13 @@ from numba.core.compiler import CompileResult
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-BLOCK = 32
-"""Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise."""
+BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
+"""Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise.
+
+``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; a lane's bits do not depend on it."""
 
 _ROOT = Path(__file__).resolve().parents[3]
-_PACKAGES = ("birthsim_env", "baselines", "agents")
+_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build")
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -104,7 +106,8 @@ class _DiskCache(NullCache):
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
-        kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions)).encode()).hexdigest()
+        how = (BLOCK, numba.config.LOOP_VECTORIZE, numba.config.SLP_VECTORIZE)
+        kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions, how)).encode()).hexdigest()
         return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

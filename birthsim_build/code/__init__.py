@@ -1,0 +1,1 @@
+"""From stages to machine code of another processor."""

@@ -1,0 +1,88 @@
+"""Compiles stages for one lane and writes an object file: a process of its own, since the kernels of this one are for blocks.
+
+    python -m birthsim_build.code.emit <REQUEST.json
+
+The request names functions (``module:name``), the target, whether to prefer small code, data (name -> words) and the object file.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from birthsim_build.code.advance import advance_code
+from birthsim_build.code.targets import TARGETS, Target
+from birthsim_env.loop.stage import SIGNATURE
+from birthsim_env.physics.compiled.compilation import BLOCK
+
+EXPORTED = "birthsim_"
+
+
+def main() -> None:
+    """Entry point."""
+    request: dict[str, Any] = json.load(sys.stdin)
+    if BLOCK != 1:
+        raise RuntimeError(f"BIRTHSIM_BLOCK = {BLOCK}; allowed: 1")
+    emit(request["functions"], TARGETS[request["target"]], request["small"], Path(request["data"]), Path(request["out"]))
+
+
+def emit(functions: list[str], target: Target, small: bool, data: Path, out: Path) -> None:
+    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``, an NPZ file of words."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    chosen = llvm.Target.from_triple(target.triple)
+    machine = chosen.create_target_machine(
+        cpu=target.processor, features=target.features, opt=3, reloc=target.reloc, codemodel="default"
+    )
+    head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
+    kernels = [_kernel_code(function) for function in functions]
+    module = llvm.parse_assembly(head + advance_code([symbol for symbol, _ in kernels]) + _constants(data))
+    for _, code in kernels:
+        module.link_in(llvm.parse_assembly(head + code))
+    for one in [*module.functions, *module.global_variables]:
+        if not one.is_declaration and not one.name.startswith(EXPORTED):
+            one.linkage = llvm.Linkage.internal
+    tuning = llvm.create_pipeline_tuning_options(speed_level=3)
+    builder = llvm.create_pass_builder(machine, tuning)
+    builder.getModulePassManager().run(module, builder)
+    module.verify()
+    out.with_suffix(".ll").write_text(str(module))
+    out.write_bytes(machine.emit_object(module))
+
+
+def _kernel_code(function: str) -> tuple[str, str]:
+    """Symbol and LLVM code of a kernel with the signature of a stage, without what belongs to this processor or to Python."""
+    module, _, name = function.partition(":")
+    kernel: Any = getattr(import_module(module), name)
+    if SIGNATURE.args not in kernel.overloads:
+        kernel.compile(SIGNATURE)
+    compiled = kernel.overloads[SIGNATURE.args]
+    code = str(compiled.library._get_module_for_linking())
+    code = re.sub(r"^target .*$|^source_filename.*$", "", code, flags=re.MULTILINE)
+    code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code).replace("= common ", "= internal ")
+    # IEEE's own operations: processors that have an instruction for them need no library.
+    for operation, numbers in (("sqrt", 1), ("floor", 1), ("fabs", 1), ("copysign", 2)):
+        intrinsic = f"@llvm.{operation}.f64("
+        code = code.replace(f"@{operation}(", intrinsic)
+        code = re.sub(rf"^declare .*{re.escape(intrinsic)}.*$", "", code, flags=re.MULTILINE)
+        code += f"\ndeclare double {intrinsic}{', '.join(['double'] * numbers)})"
+    return compiled.fndesc.mangled_name, code
+
+
+def _constants(data: Path) -> str:
+    with np.load(data) as arrays:
+        return "\n".join(
+            f"@{name} = constant [{len(words)} x i64] [{', '.join(f'i64 {word}' for word in words)}], align 8"
+            for name, words in arrays.items()
+        )
+
+
+if __name__ == "__main__":
+    main()

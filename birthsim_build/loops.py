@@ -1,0 +1,104 @@
+"""The closed loops that are built: environment, sensors and controller as parts, the same stages as in Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy
+from agents.policy.stage import policy_stage
+from agents.residual.law import ResidualLaw
+from baselines.registry import controller_names, make_controller
+from baselines.staged import StagedController
+from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
+from birthsim_build.stages import ask, outside, pair_valves
+from birthsim_env.assembly import policy_periods
+from birthsim_env.loop.rows import MOTION, SEEN, SHOWN, STATE, WORLD
+from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.world import no_force_stage, plant_stage
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array, parameter_column
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+
+RESIDUAL = "residual"
+
+BEFORE, AFTER = ("law", "valves", "board", "plant", "target", "setpoints", "hand"), ("jumps", "sensors")
+"""Parts in the order in which a control period runs them; the inputs act between the two."""
+
+
+@dataclass(frozen=True)
+class World:
+    """A scenario with its sensors where an episode begins: ``rows`` (WORLD + SEEN,), and all parts but the law."""
+
+    rows: Array
+    parts: dict[str, Part]
+    sampled: bool
+
+
+def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 0, valves: str = "two_valves") -> World:
+    """The nominal scenario ``environment`` (an id) where the episode seeded ``seed`` begins."""
+    period = rig.electronics.control_period
+    env: Any = gymnasium.make_vec(environment, num_envs=1, sensors=sensors, parameters=rig, policy_period=period)
+    env.reset(seed=seed)
+    simulation = env.unwrapped.simulation
+    parts = {name: Part(tuple(stages), {}) for name, stages in simulation.parts().items() if name != "actuation"}
+    if valves == "one_valve":
+        parts["valves"] = Part((Stage(pair_valves, sees_world=False),), {})
+    parts["inputs"] = Part((Stage(outside, memory=INPUT_MEMORY),), {})
+    order = [*BEFORE, "inputs", *AFTER]
+    parts = {name: parts[name] for name in order if name in parts and parts[name].stages}
+    return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
+
+
+def law_part(controller: str, rig: Parameters, sampled: bool, policy: str | None = None) -> Part:
+    """A controller as a part, from what is measured to openings; with ``policy``, that of the residual.
+
+    Raises ``ValueError`` for a controller that is not compiled.
+    """
+    if controller == RESIDUAL:
+        stored = load_policy(best_policy(policy or "circle"))
+        settings = stored.settings
+        residual = ResidualLaw(rig, settings)
+        residual.prepare(1, sampled)
+        shown, periods = residual.shown.shape[0], policy_periods(settings.policy_period, rig)
+        told = policy_stage(stored.network, periods, settings.size, shown, parameter_column(rig), 1)
+        hidden = () if settings.force_sensor else (no_force_stage(),)
+        first = {WORLD + SHOWN + settings.size + k: 1.0 for k in range(2)}
+        return Part((*hidden, told, *residual.stages()), first)
+    law = make_controller(controller, rig)
+    if not isinstance(law, StagedController):
+        compiled = [name for name in controller_names() if name == RESIDUAL or isinstance(_made(name, rig), StagedController)]
+        raise ValueError(f"controller = {controller!r}; allowed: a compiled one: {', '.join(compiled)}")
+    law.prepare(1, sampled)
+    return Part((Stage(ask, sees_world=False), *law.stages()), {})
+
+
+def _made(name: str, rig: Parameters) -> Any:
+    try:
+        return make_controller(name, rig)
+    except ValueError:
+        return None
+
+
+def loop_parts(world: World, law: Part) -> dict[str, Part]:
+    """All parts of a closed loop in order."""
+    return {"law": law, **world.parts}
+
+
+def plant_world(rig: Parameters) -> World:
+    """The plant alone: at mid stroke, at rest, with pressures that balance the weight; from openings and the hand's force."""
+    plant = Plant(rig)
+    rows = np.zeros(WORLD + SEEN)
+    rows[:PARAMETERS], rows[STATE : STATE + STATES] = plant.lane_parameters[:, 0], plant.state[:, 0]
+    rows[MOTION : MOTION + 4] = plant.end_effector()[:, 0]
+    return World(rows, {"plant": Part((plant_stage(plant, rig.electronics.control_period),), {})}, False)
+
+
+def image_of(rows: Array | None, parts: dict[str, Part], functions: list[str]) -> Words:
+    """The image of a loop; ``functions`` are those of the code."""
+    several = list(parts.values())
+    return packed_image(packed_rows(rows, several), [packed_part(part, functions) for part in several])
