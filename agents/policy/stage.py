@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork, layer
@@ -25,11 +23,11 @@ OBSERVED, MEAN, DEVIATION, ACTIVATIONS, WEIGHTS = range(5)
 
 @kernel
 def decide(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Writes the action, once per policy step; memory: control periods since the episode began."""
-    s, calls, about = block(seen, SEEN), block(memory, 1), numbers(constants, ABOUT + PARAMETERS + SIZE)
-    due = math.fmod(calls[0, 0], about[PERIODS]) == 0.0
+    """Writes the action, once per policy step; memory: control periods until the next."""
+    s, left, about = block(seen, SEEN), block(memory, 1), numbers(constants, ABOUT + PARAMETERS + SIZE)
+    due = left[0, 0] == 0.0
     for i in range(n):
-        calls[0, i] += 1.0
+        left[0, i] = (about[PERIODS] if due else left[0, i]) - 1.0
     if not due:
         return 0
     size, shown, layers = int(about[ACTIONS]), int(about[MEMORIES]), int(about[LAYERS])

@@ -25,7 +25,7 @@ from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
 from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
 from baselines.valve_inverse import two_valve_openings
 from birthsim_env.loop.rows import SEEN
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.stage import block, carray, numbers, pointer
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -97,7 +97,7 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
     (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
     lowest, step, zone, c4 = about[LOWEST], about[STEP], about[ZONE], about[STIFFNESS_GAIN]
-    table = about[TABLE:RIG].reshape((8, SCHEDULE))
+    table = carray(pointer(constants + 8 * TABLE, np.float64), (8, SCHEDULE))
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])

@@ -7,31 +7,29 @@ their bytes, little-endian, so that every bit arrives. The files of ``static/wor
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import birthsim_env
-from agents.policy.files import WEIGHTS, load_policy
-from agents.policy.network import CLIP, EPSILON
-from agents.policy.seeds import best_policy
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy, shipped_names
+from agents.policy.stage import policy_stage
 from agents.residual.law import ResidualLaw
 from baselines.staged import LawStage, StagedController
+from birthsim_build.image import function_name
 from birthsim_env import info
 from birthsim_env.assembly import policy_periods
 from birthsim_env.loop import rows
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage
-from birthsim_env.observation import SIZE
 from birthsim_env.parts.actuation import VALVE_LAYOUTS, ValveActuation
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics import options, spools
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -52,27 +50,28 @@ WITHOUT = "only with birthsim-live"
 """What the page says of a controller that is not compiled."""
 
 class Packer:
-    """Packs stages, and keeps the ``functions`` that they call."""
+    """Packs stages, and keeps the ``functions`` (``module:name``) that they call, in the order of their numbers."""
 
     def __init__(self) -> None:
-        self.functions: dict[str, Callable[..., int]] = {}
+        self.functions: list[str] = []
 
     def stage(self, stage: Stage | LawStage) -> dict[str, Any]:
         """A stage as JSON."""
         memory = stage.fresh if isinstance(stage, LawStage) else stage.memory
         tables = () if isinstance(stage, LawStage) else stage.tables
         return {
-            "function": self.function(stage.function),
+            "function": self.number(stage),
             "constants": packed(stage.constants),
             "memory": None if memory is None else packed(memory),
             "tables": [{"shape": list(table.shape), "data": packed(table)} for table in tables],
         }
 
-    def function(self, function: Any) -> str:
-        """The name of a stage's function in the code."""
-        name = f"{function.py_func.__module__}.{function.py_func.__name__}".replace(".", "_")
-        self.functions[name] = function
-        return name
+    def number(self, stage: Stage | LawStage) -> int:
+        """The number of a stage's function in the code."""
+        name = function_name(stage)
+        if name not in self.functions:
+            self.functions.append(name)
+        return self.functions.index(name)
 
 
 def packed(array: NDArray[Any]) -> str:
@@ -99,7 +98,6 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
         "hello": hello,
         "settings": default_settings(rig).model_dump(),
         "stiffnesses": STIFFNESSES,
-        "block": BLOCK,
         "period": period,
         "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},
         "info": {name: [part.start, part.stop - part.start] for name, part in info.SLICES.items()},
@@ -109,7 +107,6 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
             "plant": packer.stage(plant_stage(Plant(rig), period)),
             "begin": packer.stage(Stage(stages.begin, parameter_column(rig))),
             "show": packer.stage(Stage(stages.show, memory=np.zeros((info.ROWS, 1)))),
-            "neurons": packer.function(stages.neurons),
             "valves": {name: packer.stage(ValveActuation(name).stages(1, False)[0]) for name in VALVE_LAYOUTS},
         },
         "scenarios": {name: scenario(name, packer) for name in SCENARIOS},
@@ -187,30 +184,27 @@ def _law(law: StagedController, packer: Packer) -> dict[str, Any]:
 
 
 def residual(policy: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
-    """A law with a policy on top: what the policy sees is a stage too, and its network is in ``file``."""
+    """A law with a policy on top, whose stage is in a file of its own."""
     settings = load_policy(best_policy(policy)).settings
     law = ResidualLaw(rig, settings)
-    shown, column = law.shown.shape[0], parameter_column(rig)
-    observation = np.zeros((1, SIZE + settings.size + shown), dtype=np.float32)
-    see = Stage(stages.see, np.array([settings.size, shown, *column]), tables=(observation,))
-    return {
-        **_law(law, packer),
-        "policy": {
-            "file": f"policies/{policy}.safetensors",
-            "size": settings.size,
-            "shown": shown,
-            "periods": policy_periods(settings.policy_period, rig),
-            "force_sensor": settings.force_sensor,
-            "see": packer.stage(see),
-            "clip": CLIP,
-            "epsilon": EPSILON,
-        },
-    }
+    told = {"size": settings.size, "shown": law.shown.shape[0], "force_sensor": settings.force_sensor}
+    return {**_law(law, packer), "policy": {"file": policy_file(policy), **told}}
 
 
-def network_file(policy: str) -> bytes:
-    """The content of the safetensors file of a policy that comes with the package."""
-    return (best_policy(policy) / WEIGHTS).read_bytes()
+def policy_file(policy: str) -> str:
+    """Where the stage of a policy is, below the folder of the rig."""
+    return f"policies/{policy}.json"
+
+
+def packed_policies(rig: Parameters, packer: Packer) -> dict[str, dict[str, Any]]:
+    """File -> the stage of every policy that comes with the package, of several seeds the best."""
+    files = {}
+    for name in shipped_names():
+        stored = load_policy(best_policy(name))
+        periods, law = policy_periods(stored.settings.policy_period, rig), ResidualLaw(rig, stored.settings)
+        stage = policy_stage(stored.network, periods, stored.settings.size, law.shown.shape[0], parameter_column(rig), 1)
+        files[policy_file(name)] = packer.stage(stage)
+    return files
 
 
 def numbers_of_the_page() -> dict[str, float]:

@@ -1,32 +1,23 @@
-"""Stages that only a rig in the browser needs: its start, what a frame shows, what a policy sees, and a layer of its network.
+"""Stages that only a rig in the browser needs: its start, and what a frame shows.
 
 They wrap the kernels of the packages, so that the browser computes what Python computes.
 """
 
 from __future__ import annotations
 
-from agents.policy.network import layer
 from birthsim_env.info import ROWS, describe
 from birthsim_env.loop.rows import (
-    ACTION,
     FORCE,
     IMPACT,
     MOTION,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
     REFERENCE,
     SEEN,
-    SHOWN,
     SINCE_JUMP,
     STATE,
     TIME,
-    USER_FORCE,
-    VELOCITY,
     WORLD,
 )
-from birthsim_env.loop.stage import block, numbers, scratch, singles, table2
-from birthsim_env.observation import SCALES, SIZE, look
+from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, V1, V2, Y1, Y2
 from birthsim_env.physics.equilibrium import balance
@@ -58,29 +49,4 @@ def show(world: int, seen: int, memory: int, constants: int, tables: int, lane: 
         s[REFERENCE : REFERENCE + 15, :n], w[FORCE : FORCE + 2, :n], w[IMPACT : IMPACT + 2, :n], w[:PARAMETERS, :n],
         rows[:, :n],
     )  # fmt: skip
-    return 0
-
-
-@kernel
-def see(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """What a policy sees, of one lane. Constants: length of an action, rows shown of the law, the rig as its owner describes
-    it. Table: the observation, of single precision, (1, D)."""
-    s, about, scales = block(seen, SEEN), numbers(constants, 2 + PARAMETERS), scratch(SIZE)[:, 0]
-    for k in range(SIZE):
-        scales[k] = SCALES[k]
-    size, shown = int(about[0]), int(about[1])
-    look(
-        s[POSITION:VELOCITY, :1], s[VELOCITY:POSITION_TIME, :1], s[PRESSURE:USER_FORCE, :1],
-        s[REFERENCE : REFERENCE + 15, :1], s[USER_FORCE:REFERENCE, :1], s[ACTION : ACTION + size, :1],
-        s[SHOWN : SHOWN + shown, :1], about[2:], scales, singles(tables, 0),
-    )  # fmt: skip
-    return 0
-
-
-@kernel
-def neurons(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """A layer of a policy's network. Constant: 1 for tanh. Tables: inputs (1, m), W (m, n) and b (1, n) of single precision,
-    outputs (1, n)."""
-    squashed = numbers(constants, 1)[0] > 0.0
-    layer(table2(tables, 0), singles(tables, 1), singles(tables, 2)[0], squashed, table2(tables, 3))
     return 0

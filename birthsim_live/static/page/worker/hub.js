@@ -7,9 +7,9 @@ import { Session } from "./session.js";
 import { checked } from "./settings.js";
 
 export class Hub {
-  /** `network(file)` fetches the content of a policy's file, `post` sends a message to the page. */
-  constructor(pack, machine, network, post) {
-    Object.assign(this, { pack, network, post });
+  /** `fetched(file)` fetches the stage of a policy, `post` sends a message to the page. */
+  constructor(pack, machine, fetched, post) {
+    Object.assign(this, { pack, fetched, post });
     this.session = new Session(pack, machine);
     this.clock = new Clock(this.session, frameOf, (frame) => this.onFrame(frame));
     this.told = {};
@@ -56,13 +56,13 @@ export class Hub {
     this.post({ type: "pong", id });
   }
 
-  /** One after the other: a policy's network may have to be fetched first. */
+  /** One after the other: a policy may have to be fetched first. */
   on_set({ settings }) {
     const changes = checked(settings, this.pack);
     const set = async () => {
       const file = this.pack.controllers[changes.controller]?.policy?.file;
       const known = file && this.session.laws[changes.controller];
-      this.session.change(changes, file && !known ? await this.network(file) : null);
+      this.session.change(changes, file && !known ? await this.fetched(file) : null);
     };
     const done = this.setting.then(set);
     this.setting = done.catch(() => {});

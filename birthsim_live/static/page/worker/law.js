@@ -1,10 +1,8 @@
 // A controller: the stages of its law, and the policy that works on top of some (agents/policy/controller.py).
 
-import { Network } from "./network.js";
-
 export class Law {
-  /** `packed` is the pack's controller, `layer` the function of a network's layer, `content` its policy's file, if any. */
-  constructor(rig, packed, layer, content) {
+  /** `packed` is the pack's controller, `policy` the stage of its policy, where it has one. */
+  constructor(rig, packed, policy) {
     const { machine } = rig;
     this.rig = rig;
     this.damped = packed.damped;
@@ -12,18 +10,15 @@ export class Law {
     this.made = {};
     this.seen = machine.rows(rig.rows.SEEN);
     this.policy = packed.policy ?? null;
-    if (this.policy) {
-      this.see = machine.stage(this.policy.see);
-      this.network = new Network(machine, layer, content, this.policy);
-    }
+    if (this.policy) this.decide = machine.stage(policy);
     this.reset();
   }
 
   /** Forget the past. */
   reset() {
     this.sampled = null;
-    this.calls = 0;
     if (!this.policy) return;
+    this.decide.restart();
     const { ACTION, SHOWN } = this.rig.rows;
     const { size, shown } = this.policy;
     this.seen.fill(ACTION, new Array(size).fill(0));
@@ -45,20 +40,9 @@ export class Law {
     const stages = this.stages(sampled);
     own.copy(seen, 0, rows.ASKED);
     if (this.policy?.force_sensor === false) own.fill(rows.USER_FORCE, [0, 0]);
-    if (this.policy) this.decide();
+    this.decide?.run(own);
     own.fill(rows.ASKED, own.some(rows.REFERENCE, rows.ASKED - rows.REFERENCE));
     own.fill(rows.FEEDFORWARD, [0, 0, 0, 0, this.damped ? damping : 0]);
     return stages.every((stage) => stage.run(own)) ? own.some(rows.OPENING, 4) : null;
-  }
-
-  /** Ask the policy, where it is due. */
-  decide() {
-    if (this.calls % this.policy.periods === 0) {
-      this.see.run(this.seen);
-      const { address, shape } = this.see.tables[0];
-      const observation = new Float32Array(this.rig.machine.buffer, address, shape[1]);
-      this.seen.fill(this.rig.rows.ACTION, this.network.actions(observation));
-    }
-    this.calls += 1;
   }
 }

@@ -1,4 +1,4 @@
-// One memory with blocks of rows, constants and tables, and the stages of WebAssembly that run on them (birthsim_env/loop).
+// One memory with rows, constants and tables of one lane, and the stages of WebAssembly that run on them (birthsim_env/loop).
 
 const PAGES = 256; // of 64 KiB: 16 MiB
 const TABLE = 5; // whole numbers that describe a table
@@ -14,18 +14,16 @@ export function doublesOf(text) {
 }
 
 export class Machine {
-  /** `code` of the stages, `block` lanes between two rows of a block. */
-  static async of(code, block) {
+  /** `code` of the stages. */
+  static async of(code) {
     const memory = new WebAssembly.Memory({ initial: PAGES });
     const { instance } = await WebAssembly.instantiate(code, { env: { memory } });
-    return new Machine(instance.exports, memory, block);
+    return new Machine(instance.exports, memory);
   }
 
-  constructor(exports, memory, block) {
+  constructor(exports, memory) {
     this.exports = exports;
-    this.block = block;
     this.buffer = memory.buffer;
-    this.doubles = new Float64Array(this.buffer);
     this.free = exports.__heap_base.value;
     this.nothing = { place: 0n };
   }
@@ -50,57 +48,56 @@ export class Machine {
   }
 
   /** A stage of the pack. */
-  stage({ function: name, constants, memory, tables }) {
-    const placed = tables.map(({ shape, data }) => ({ shape, address: this.put(bytesOf(data)) }));
-    return new Stage(this, name, doublesOf(constants), placed, memory === null ? new Float64Array() : doublesOf(memory));
+  stage(packed) {
+    return new Stage(this, packed);
   }
 }
 
-/** A block of rows of one lane. */
+/** Rows of one lane. */
 export class Rows {
   constructor(machine, count) {
-    this.count = count;
-    this.address = machine.take(8 * count * machine.block);
-    this.place = BigInt(this.address);
-    this.doubles = machine.doubles;
-    this.first = this.address / 8;
-    this.stride = machine.block;
+    const address = machine.take(8 * count);
+    this.place = BigInt(address);
+    this.values = new Float64Array(machine.buffer, address, count);
   }
 
   get(row) {
-    return this.doubles[this.first + row * this.stride];
+    return this.values[row];
   }
 
   set(row, value) {
-    this.doubles[this.first + row * this.stride] = value;
+    this.values[row] = value;
   }
 
   /** `count` rows from `row` on, as an array. */
   some(row, count) {
-    return Array.from({ length: count }, (_, k) => this.get(row + k));
+    return Array.from(this.values.subarray(row, row + count));
   }
 
   fill(row, values) {
-    for (let k = 0; k < values.length; k += 1) this.set(row + k, values[k]);
+    this.values.set(values, row);
   }
 
-  /** Rows `from` to `to` as those of another block. */
+  /** Rows `from` to `to` as those of another lane. */
   copy(other, from, to) {
-    for (let row = from; row < to; row += 1) this.set(row, other.get(row));
+    this.values.set(other.values.subarray(from, to), from);
   }
 }
 
-/** A stage with what is its own: constants, memory and tables (shape and address), in the machine's memory. */
+/** A stage with what is its own: constants, memory and tables, in the machine's memory. */
 export class Stage {
-  constructor(machine, name, constants, tables, fresh = new Float64Array()) {
+  constructor(machine, { function: number, constants, memory, tables }) {
     this.machine = machine;
-    this.function = machine.exports[name];
-    this.constants = BigInt(machine.put(new Uint8Array(constants.buffer)));
-    this.fresh = fresh;
-    this.memory = machine.rows(fresh.length);
-    this.tables = tables;
+    this.function = machine.exports[`birthsim_stage_${number}`];
+    this.constants = BigInt(machine.put(bytesOf(constants)));
+    this.fresh = memory === null ? new Float64Array() : doublesOf(memory);
+    this.memory = machine.rows(this.fresh.length);
     const about = new BigInt64Array(TABLE * Math.max(tables.length, 1));
-    tables.forEach(({ shape, address }, k) => about.set([address, ...shape].map(BigInt), TABLE * k));
+    this.tables = tables.map(({ shape, data }, k) => {
+      const address = machine.put(bytesOf(data));
+      about.set([address, ...shape].map(BigInt), TABLE * k);
+      return address;
+    });
     this.about = BigInt(machine.put(new Uint8Array(about.buffer)));
     this.restart();
   }
@@ -113,11 +110,11 @@ export class Stage {
   /** Put the bytes of base64 text into table `k`. */
   fill(k, text) {
     const bytes = bytesOf(text);
-    new Uint8Array(this.machine.buffer, this.tables[k].address, bytes.length).set(bytes);
+    new Uint8Array(this.machine.buffer, this.tables[k], bytes.length).set(bytes);
   }
 
   /** One control period; false where the stage could not serve it. A law is run with no world. */
   run(seen, world = this.machine.nothing) {
-    return this.function(world.place, seen.place, this.memory.place, this.constants, this.about, 0n, 1n) === 0n;
+    return this.function(world.place, seen.place, this.memory.place, this.constants, this.about) === 0n;
   }
 }

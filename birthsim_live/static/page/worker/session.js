@@ -6,8 +6,7 @@ import { Course, Hands, Setpoints } from "./parts.js";
 import { merged } from "./settings.js";
 
 export class Session {
-  /** `law` is that of the settings with which the pack begins. */
-  constructor(pack, machine, network) {
+  constructor(pack, machine) {
     this.pack = pack;
     this.machine = machine;
     this.numbers = pack.numbers;
@@ -30,7 +29,7 @@ export class Session {
     this.scenarios = {};
     this.models = {};
     this.laws = {};
-    this.law = this.lawOf(this.settings.controller, network);
+    this.law = this.lawOf(this.settings.controller);
     const { trajectory, force, schedule, duration } = this.scenario(this.settings.scenario);
     this.duration = duration;
     this.course = new Course(this, trajectory);
@@ -63,9 +62,9 @@ export class Session {
     return this.scenarios[name];
   }
 
-  /** A controller, made once, fresh; `network` is the content of its policy's file, where it has one. */
-  lawOf(name, network) {
-    this.laws[name] ??= new Law(this, this.pack.controllers[name], this.pack.stages.neurons, network);
+  /** A controller, made once, fresh; `policy` is the stage of its policy, where it has one. */
+  lawOf(name, policy) {
+    this.laws[name] ??= new Law(this, this.pack.controllers[name], policy);
     this.laws[name].reset();
     return this.laws[name];
   }
@@ -150,11 +149,11 @@ export class Session {
     });
   }
 
-  /** Apply checked settings; the rig keeps its state and its motion. `network` as of `lawOf`. */
-  change(changes, network) {
+  /** Apply checked settings; the rig keeps its state and its motion. `policy` as of `lawOf`. */
+  change(changes, policy) {
     const before = this.settings;
     const after = merged(before, changes, this.scenarioSetpoints());
-    if (after.controller !== before.controller) this.law = this.lawOf(after.controller, network);
+    if (after.controller !== before.controller) this.law = this.lawOf(after.controller, policy);
     this.settings = after;
     this.describeRig();
     if (after.scenario !== before.scenario) {

@@ -8,17 +8,12 @@ const place = (name) => new URL(`../../rig/${name}`, import.meta.url);
 async function fetched(name) {
   const answer = await fetch(place(name));
   if (!answer.ok) throw new Error(`${name} is missing (${answer.status}); the folder is incomplete`);
-  return answer;
+  return name.endsWith(".json") ? answer.json() : answer.arrayBuffer();
 }
 
 async function begin() {
-  const [pack, code] = await Promise.all([
-    fetched("pack.json").then((answer) => answer.json()),
-    fetched("loop.wasm").then((answer) => answer.arrayBuffer()),
-  ]);
-  const machine = await Machine.of(code, pack.block);
-  const network = (file) => fetched(file).then((answer) => answer.arrayBuffer());
-  return new Hub(pack, machine, network, (message) => postMessage(message));
+  const [pack, code] = await Promise.all([fetched("pack.json"), fetched("loop.wasm")]);
+  return new Hub(pack, await Machine.of(code), fetched, (message) => postMessage(message));
 }
 
 const hub = begin();
