@@ -34,7 +34,7 @@ const readouts = new Readouts(byId("readouts"), byId("status"));
 const notices = new Notices(byId("notices"));
 const send = (message) => connection.send(message);
 const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
-const transport = new Transport(send);
+const transport = new Transport(send, (name) => connection.address(name));
 const drag = new Drag(byId("rig"), {
   scene,
   send,
@@ -45,12 +45,15 @@ const drag = new Drag(byId("rig"), {
 });
 
 const connection = new Connection({
-  opened: () => {},
   closed: (seconds) => {
     rig.connected = false;
     drag.release();
     banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
     readouts.say("offline", "connection lost");
+  },
+  failed: ({ message }) => {
+    banner("offline", `The rig cannot be shown: ${message}`);
+    readouts.say("offline", "no rig");
   },
   hello: (message) => {
     rig.hello = message;

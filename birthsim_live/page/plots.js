@@ -1,6 +1,6 @@
 // Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
 
-import uPlot from "/static/vendor/uPlot.esm.js";
+import uPlot from "./vendor/uPlot.esm.js";
 import { PLOTS } from "./curves.js";
 import { FONT, INK } from "./pen.js";
 import { formula } from "./symbols.js";

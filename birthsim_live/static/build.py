@@ -10,9 +10,9 @@ from typing import Any
 
 from birthsim_build.code.compiler import compile_object, zig
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.server.app import PAGE
 from birthsim_live.static.pack import Packer, pack, packed_policies
 
+PAGE = Path(__file__).resolve().parent.parent / "page"
 OVER = Path(__file__).resolve().parent / "page"
 """Files that are laid over those of the page: the connection to a worker, and the worker."""
 

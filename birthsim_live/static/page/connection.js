@@ -6,7 +6,8 @@ export class Connection {
     this.recordings = new Map();
     this.worker = new Worker(new URL("./worker/worker.js", import.meta.url), { type: "module" });
     this.worker.addEventListener("message", ({ data }) => this.receive(data, handlers));
-    this.worker.addEventListener("error", (event) => handlers.failed(event.message || "its program cannot be loaded"));
+    // A worker that cannot be loaded says no more than that.
+    this.worker.addEventListener("error", (event) => handlers.failed({ message: event.message || "its program cannot be loaded" }));
   }
 
   receive(message, handlers) {
