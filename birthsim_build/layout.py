@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import accumulate
 
-from birthsim_env.loop.rows import HANDED, MOST_ACTIONS, MOST_HANDED, MOST_SHOWN, SEEN, WORLD
+from birthsim_env.loop.rows import MOST_ACTIONS, MOST_HANDED, MOST_SHOWN, SEEN, WORLD
 from birthsim_env.loop.signals import REFERENCE_NAMES, REFERENCES
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES
 
@@ -76,6 +76,9 @@ _SEEN = (
     Row("handed", "SI", "what stages of a law hand on", MOST_HANDED),
 )
 _INPUTS = (
+    Row("begins", "s", "when the scenario began, on the clock of the loop: its target, setpoints and hand count from there"),
+    Row("episode_time", "s", "since then; written by the loop"),
+    Row("clock", "s", "time, while the scenario's parts run; written by the loop"),
     Row("pointer_held", "1", "1 where a person's hand holds the end effector by a spring to the pointer, else 0"),
     *(Row(f"pointer_{axis}", "m", f"{axis} of the pointer") for axis in "xy"),
     Row("pointer_stiffness", "N/m", "of that spring"),
@@ -103,11 +106,9 @@ ROWS = WORLD + SEEN + INPUTS
 """How many inputs, and rows in all."""
 
 (
-    HELD, POINTER, STIFFNESS, DAMPING, LIMIT, PULL, KEEP_FORCE, ADD_FORCE, KEEP, ADD
-) = accumulate((1, 2, 1, 1, 1, 2, 1, 2, REFERENCES), initial=0)  # fmt: skip
+    BEGINS, EPISODE, CLOCK, HELD, POINTER, STIFFNESS, DAMPING, LIMIT, PULL, KEEP_FORCE, ADD_FORCE, KEEP, ADD
+) = accumulate((1, 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, REFERENCES), initial=0)  # fmt: skip
 """Rows of the inputs at which their parts begin."""
 
 FIRST = {KEEP_FORCE: 1.0, STIFFNESS: 500.0, DAMPING: 20.0, LIMIT: 100.0, **{KEEP + k: 1.0 for k in range(REFERENCES)}}
 """Values of inputs with which a loop begins; the others are zero. Those of the pointer are as in ``birthsim-live``."""
-
-assert sum(row.count for row in _WORLD) == WORLD and sum(row.count for row in _SEEN) == SEEN == HANDED + MOST_HANDED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +16,9 @@ from agents.residual.law import ResidualLaw
 from baselines.registry import controller_names, make_controller
 from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
-from birthsim_build.stages import ask, outside, pair_valves
+from birthsim_build.stages import ask, enter_scenario, outside, pair_valves
 from birthsim_env.assembly import policy_periods
-from birthsim_env.loop.rows import MOTION, SEEN, SHOWN, STATE, WORLD
+from birthsim_env.loop.rows import ACTION, DAMPING, FEEDFORWARD, MOTION, SEEN, SHOWN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import no_force_stage, plant_stage
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array, parameter_column
@@ -26,8 +27,11 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 RESIDUAL = "residual"
 
-BEFORE, AFTER = ("law", "valves", "board", "plant", "target", "setpoints", "hand"), ("jumps", "sensors")
-"""Parts in the order in which a control period runs them; the inputs act between the two."""
+ORDER = ("law", "valves", "board", "plant", "clock", "target", "setpoints", "hand", "inputs", "jumps", "sensors")
+"""Parts in the order in which a control period runs them."""
+
+PAIRED_VALVES = Part((Stage(pair_valves, sees_world=False),), {})
+"""The part ``valves`` of a rig with one 5/3 valve per cylinder; with two there is none."""
 
 
 @dataclass(frozen=True)
@@ -39,18 +43,16 @@ class World:
     sampled: bool
 
 
-def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 0, valves: str = "two_valves") -> World:
+def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 0) -> World:
     """The nominal scenario ``environment`` (an id) where the episode seeded ``seed`` begins."""
     period = rig.electronics.control_period
     env: Any = gymnasium.make_vec(environment, num_envs=1, sensors=sensors, parameters=rig, policy_period=period)
     env.reset(seed=seed)
     simulation = env.unwrapped.simulation
     parts = {name: Part(tuple(stages), {}) for name, stages in simulation.parts().items() if name != "actuation"}
-    if valves == "one_valve":
-        parts["valves"] = Part((Stage(pair_valves, sees_world=False),), {})
+    parts["clock"] = Part((Stage(enter_scenario, memory=INPUT_MEMORY),), {})
     parts["inputs"] = Part((Stage(outside, memory=INPUT_MEMORY),), {})
-    order = [*BEFORE, "inputs", *AFTER]
-    parts = {name: parts[name] for name in order if name in parts and parts[name].stages}
+    parts = {name: parts[name] for name in ORDER if name in parts and parts[name].stages}
     return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
 
 
@@ -67,14 +69,17 @@ def law_part(controller: str, rig: Parameters, sampled: bool, policy: str | None
         shown, periods = residual.shown.shape[0], policy_periods(settings.policy_period, rig)
         told = policy_stage(stored.network, periods, settings.size, shown, parameter_column(rig), 1)
         hidden = () if settings.force_sensor else (no_force_stage(),)
-        first = {WORLD + SHOWN + settings.size + k: 1.0 for k in range(2)}
+        first = {
+            **{WORLD + ACTION + k: 0.0 for k in range(settings.size)},
+            **{WORLD + SHOWN + k: float(settings.size <= k < settings.size + 2) for k in range(shown)},
+        }
         return Part((*hidden, told, *residual.stages()), first)
     law = make_controller(controller, rig)
     if not isinstance(law, StagedController):
         compiled = [name for name in controller_names() if name == RESIDUAL or isinstance(_made(name, rig), StagedController)]
         raise ValueError(f"controller = {controller!r}; allowed: a compiled one: {', '.join(compiled)}")
     law.prepare(1, sampled)
-    return Part((Stage(ask, sees_world=False), *law.stages()), {})
+    return Part((Stage(ask, sees_world=False), *law.stages()), {WORLD + row: 0.0 for row in range(FEEDFORWARD, DAMPING)})
 
 
 def _made(name: str, rig: Parameters) -> Any:
@@ -82,11 +87,6 @@ def _made(name: str, rig: Parameters) -> Any:
         return make_controller(name, rig)
     except ValueError:
         return None
-
-
-def loop_parts(world: World, law: Part) -> dict[str, Part]:
-    """All parts of a closed loop in order."""
-    return {"law": law, **world.parts}
 
 
 def plant_world(rig: Parameters) -> World:
@@ -98,7 +98,7 @@ def plant_world(rig: Parameters) -> World:
     return World(rows, {"plant": Part((plant_stage(plant, rig.electronics.control_period),), {})}, False)
 
 
-def image_of(rows: Array | None, parts: dict[str, Part], functions: list[str]) -> Words:
-    """The image of a loop; ``functions`` are those of the code."""
-    several = list(parts.values())
+def image_of(rows: Array | None, parts: Mapping[str, Part], functions: Sequence[str]) -> Words:
+    """The image of a loop of ``parts``, run in the order of ``ORDER``; ``functions`` are those of the code."""
+    several = [parts[name] for name in ORDER if name in parts]
     return packed_image(packed_rows(rows, several), [packed_part(part, functions) for part in several])

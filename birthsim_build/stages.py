@@ -4,8 +4,23 @@ from __future__ import annotations
 
 import math
 
-from birthsim_build.layout import ADD, ADD_FORCE, DAMPING, HELD, INPUTS, KEEP, KEEP_FORCE, LIMIT, POINTER, PULL, STIFFNESS
-from birthsim_env.loop.rows import ASKED, FORCE, MOTION, OPENING, REFERENCE, SEEN, WORLD
+from birthsim_build.layout import (
+    ADD,
+    ADD_FORCE,
+    BEGINS,
+    CLOCK,
+    DAMPING,
+    EPISODE,
+    HELD,
+    INPUTS,
+    KEEP,
+    KEEP_FORCE,
+    LIMIT,
+    POINTER,
+    PULL,
+    STIFFNESS,
+)
+from birthsim_env.loop.rows import ASKED, FORCE, MOTION, OPENING, REFERENCE, SEEN, TIME, WORLD
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled.compilation import kernel
@@ -33,10 +48,21 @@ def pair_valves(world: int, seen: int, memory: int, constants: int, tables: int,
 
 
 @kernel
+def enter_scenario(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """The clock shows the time since the scenario began, until ``outside`` puts it back."""
+    s, m = block(seen, SEEN), block(memory, INPUTS)
+    for i in range(n):
+        m[CLOCK, i] = s[TIME, i]
+        s[TIME, i] -= m[BEGINS, i]
+    return 0
+
+
+@kernel
 def outside(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Inputs act on what is asked for and on the hand's force; memory: the rows of ``layout`` that are inputs."""
     w, s, m = block(world, WORLD), block(seen, SEEN), block(memory, INPUTS)
     for i in range(n):
+        m[EPISODE, i], s[TIME, i] = s[TIME, i], m[CLOCK, i]
         for row in range(REFERENCES):
             if m[KEEP + row, i] == 0.0:
                 s[REFERENCE + row, i] = m[ADD + row, i]

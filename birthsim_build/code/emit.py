@@ -2,7 +2,7 @@
 
     python -m birthsim_build.code.emit <REQUEST.json
 
-The request names functions (``module:name``), the target, whether to prefer small code, data (name -> words) and the object file.
+The request names functions (``module:name``), the target, data (an NPZ file of words by name) and the object file.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ def main() -> None:
     request: dict[str, Any] = json.load(sys.stdin)
     if BLOCK != 1:
         raise RuntimeError(f"BIRTHSIM_BLOCK = {BLOCK}; allowed: 1")
-    emit(request["functions"], TARGETS[request["target"]], request["small"], Path(request["data"]), Path(request["out"]))
+    emit(request["functions"], TARGETS[request["target"]], Path(request["data"]), Path(request["out"]))
 
 
-def emit(functions: list[str], target: Target, small: bool, data: Path, out: Path) -> None:
-    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``, an NPZ file of words."""
+def emit(functions: list[str], target: Target, data: Path, out: Path) -> None:
+    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     chosen = llvm.Target.from_triple(target.triple)
@@ -53,7 +53,8 @@ def emit(functions: list[str], target: Target, small: bool, data: Path, out: Pat
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(module, builder)
     module.verify()
-    out.with_suffix(".ll").write_text(str(module))
+    if target.triple.startswith("thumb"):
+        out.with_suffix(".s").write_text(machine.emit_assembly(module))
     out.write_bytes(machine.emit_object(module))
 
 

@@ -1,0 +1,74 @@
+"""Builds a bundle for a target into a folder."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from birthsim_build.bundle import Bundle
+from birthsim_build.code.compiler import compile_object, link
+from birthsim_build.code.elf import sections_of, undefined_in
+from birthsim_build.faces.c import write_example, write_header
+from birthsim_build.faces.javascript import write_javascript
+from birthsim_build.image import Words
+
+EXPORTS = ("birthsim_advance", "__heap_base")
+STACK = 65536
+"""Bytes of stack in WebAssembly; the largest loop takes a tenth."""
+
+Report = dict[str, Any]
+
+
+def build_wasm(bundle: Bundle, folder: Path) -> Report:
+    """Write code, data and the JavaScript module; returns their sizes in bytes."""
+    with tempfile.TemporaryDirectory() as place:
+        built = Path(place) / "birthsim.o"
+        compile_object(bundle.functions, "wasm", built)
+        exported = (f"--export={name}" for name in EXPORTS)
+        options = ("--no-entry", "--stack-first", "-z", f"stack-size={STACK}", "--strip-all", *exported)
+        link("wasm-ld", *options, "-o", str(folder / "birthsim.wasm"), str(built))
+    write_javascript(bundle, folder)
+    names = ("birthsim.wasm", "birthsim.bin", "birthsim.js", "layout.js")
+    return {"target": "wasm", "bytes": {name: (folder / name).stat().st_size for name in names}}
+
+
+def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
+    """Write a shared library for Linux, the object that it is made of, the header and an example; returns sizes in bytes."""
+    images = bundle.images()
+    built = _object(bundle, target, folder, images)
+    emulation = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}[target]
+    link(
+        "ld.lld", "-m", emulation, "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
+        str(folder / "birthsim.o"),
+    )  # fmt: skip
+    loops = [name for name in images if name != "plant" and not name.startswith("law_")]
+    write_header(images, folder, next(iter(loops), None))
+    if loops:
+        write_example(folder)
+    return {"target": target, "library": (folder / "libbirthsim.so").stat().st_size, **built}
+
+
+def build_cortex(bundle: Bundle, folder: Path) -> Report:
+    """Write the object of the laws alone and its header; returns sizes in bytes."""
+    images = {name: words for name, words in bundle.images().items() if name.startswith("law_")}
+    built = _object(bundle, "cortex-m7", folder, images)
+    write_header(images, folder)
+    return {"target": "cortex-m7", **built}
+
+
+def _object(bundle: Bundle, target: str, folder: Path, images: Mapping[str, Words]) -> Report:
+    compile_object(
+        bundle.functions, target, folder / "birthsim.o", {f"birthsim_{name}": words for name, words in images.items()}
+    )
+    content = (folder / "birthsim.o").read_bytes()
+    sizes = sections_of(content)
+
+    def total(*prefixes: str) -> int:
+        return sum(size for name, size in sizes.items() if name.startswith(prefixes))
+
+    return {
+        "text": total(".text"), "rodata": total(".rodata"), "data": total(".data"), "bss": total(".bss"),
+        "loops": {name: 8 * len(words) for name, words in images.items()}, "needs": undefined_in(content),
+    }  # fmt: skip

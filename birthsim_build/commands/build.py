@@ -1,0 +1,93 @@
+"""birthsim-build: closed loops without Python, as WebAssembly, for C, or for a microcontroller."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from agents.policy.seeds import shipped_names
+from baselines.commands.shared import run, seed_number
+from baselines.registry import CONTROLLERS, SLOW
+from baselines.work.files import make_folder, whole_results, write_json
+from birthsim_build.building import Report, build_c, build_cortex, build_wasm
+from birthsim_build.bundle import Bundle, make_bundle, scenario_of
+from birthsim_build.code.targets import TARGETS
+from birthsim_build.loops import RESIDUAL
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import load_parameters
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim-build",
+        description="Compile closed loops, laws alone and the plant alone into code that needs no Python: a WebAssembly module "
+        "with JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the laws alone.",
+        epilog="Every target computes the same bits as Python. The files are described in docs/build.md.",
+    )
+    parser.add_argument("target", metavar="TARGET", help=f"one of {', '.join(TARGETS)}")
+    parser.add_argument("--env", nargs="+", help="environment ids (default: BirthSIM/Circle-v1); not for cortex-m7")
+    parser.add_argument("--sensors", nargs="+", choices=tuple(SENSORS), help="default: ideal")
+    parser.add_argument("--controller", nargs="+", metavar="NAME", help="compiled controllers (default: backstepping)")
+    parser.add_argument(
+        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim-train wrote, or names of what "
+        "comes with the package",
+    )  # fmt: skip
+    parser.add_argument("--all", action="store_true", help="all environments, sensors, compiled controllers and policies")
+    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of the episode that begins (default: %(default)s)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the files and build.json")
+    run(parser, _build)
+
+
+def _build(arguments: argparse.Namespace) -> None:
+    target = arguments.target
+    if target not in TARGETS:
+        raise ValueError(f"target = {target!r}; allowed: {', '.join(TARGETS)}")
+    bundle = _bundle(arguments)
+    folder = make_folder(arguments.out)
+    with whole_results(folder) as place:
+        if target == "wasm":
+            report = build_wasm(bundle, place)
+        elif target == "cortex-m7":
+            report = build_cortex(bundle, place)
+        else:
+            report = build_c(bundle, target, place)
+        write_json(place / "build.json", report)
+    _show(report)
+    print(f"written to {folder}")
+
+
+def _bundle(arguments: argparse.Namespace) -> Bundle:
+    named = [name for name in ("env", "sensors", "controller", "policy") if getattr(arguments, name)]
+    if arguments.all and named:
+        raise ValueError(f"--all with --{named[0]}; allowed: one of them")
+    alone = arguments.target == "cortex-m7"
+    if alone and arguments.env:
+        raise ValueError("--env with cortex-m7; allowed: without it, the object has the laws alone")
+    rig = load_parameters(arguments.parameters)
+    scenarios = list(SCENARIOS) if arguments.all else [scenario_of(one) for one in arguments.env or ["BirthSIM/Circle-v1"]]
+    sensors = list(SENSORS) if arguments.all else arguments.sensors or ["ideal"]
+    policies = shipped_names() if arguments.all else arguments.policy
+    controllers = arguments.controller or ([] if policies else ["backstepping"])
+    if RESIDUAL in controllers:
+        raise ValueError("--controller residual; allowed: --policy NAME")
+    if arguments.all:
+        controllers = [name for name in CONTROLLERS if name not in SLOW]
+    return make_bundle(rig, scenarios, sensors, controllers, policies, arguments.seed, alone)
+
+
+def _show(report: Report) -> None:
+    for name, value in report.items():
+        if isinstance(value, dict):
+            for key, size in value.items():
+                print(f"{name + ' ' + key:60}{size:>12,} bytes")
+        elif isinstance(value, int):
+            print(f"{name:60}{value:>12,} bytes")
+        else:
+            print(f"{name:60}{', '.join(value) if isinstance(value, list) else value!s:>12}")
+
+
+if __name__ == "__main__":
+    main()
