@@ -19,10 +19,11 @@ const byId = (id) => document.getElementById(id);
 /**
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
- * `connected` whether it is there, `monitor` what the page measures of itself, `pixel([x, y])` the place of a point (m)
- * on the screen in CSS px from the corner of the window.
+ * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
+ * place of a point (m) on the screen in CSS px from the corner of the window.
  */
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), pixel };
+const send = (message) => connection.send(message);
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel };
 window.birthsim = rig;
 
 const scene = new Scene(byId("rig"));
@@ -32,7 +33,6 @@ const history = new History(NAMES, 512, 0.025);
 const plots = new Plots(byId("plots"), history);
 const readouts = new Readouts(byId("readouts"), byId("status"));
 const notices = new Notices(byId("notices"));
-const send = (message) => connection.send(message);
 const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
 const transport = new Transport(send, (name) => connection.address(name));
 const drag = new Drag(byId("rig"), {

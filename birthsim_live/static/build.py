@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from birthsim_build.code.compiler import compile_object, zig
+from birthsim_build.code.compiler import compile_object, link
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.static.pack import Packer, pack, packed_policies
 
@@ -62,7 +62,7 @@ def _write_code(functions: list[str], place: Path, out: Path) -> None:
     compiled = place / "stages.o"
     compile_object(functions, "wasm", compiled)
     exports = [f"--export=birthsim_stage_{number}" for number in range(len(functions))]
-    zig(
+    link(
         "wasm-ld", "--no-entry", "--import-memory", "--strip-all", "-z", f"stack-size={STACK}", "--export=__heap_base",
         *exports, str(compiled), "-o", str(out),
     )  # fmt: skip
