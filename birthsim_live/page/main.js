@@ -2,7 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { NAMES, rowOf } from "./curves.js";
-import { Drag, belongsToAnother } from "./drag.js";
+import { Drag, keyOfTheRig } from "./drag.js";
 import { Gauges } from "./gauges.js";
 import { History } from "./history.js";
 import { Magnifier } from "./magnifier.js";
@@ -31,7 +31,7 @@ const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
 const history = new History(NAMES, 512, 0.025);
 const plots = new Plots(byId("plots"), history);
-const readouts = new Readouts(byId("readouts"), byId("status"));
+const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
 const transport = new Transport(send, (name) => connection.address(name));
@@ -75,13 +75,20 @@ const connection = new Connection({
     magnifier.setPath(points);
   },
   frame: (message) => {
-    rig.frame = message;
+    rig.frame = withNumbers(message);
     rig.monitor.received += 1;
-    history.push(message.time, rowOf(message));
-    drag.follow(message);
+    history.push(message.time, rowOf(rig.frame));
+    drag.follow(rig.frame);
   },
   error: ({ message }) => notices.show(message),
 });
+
+/** A message has null where there is no number: NaN computes like one. */
+function withNumbers(frame) {
+  const number = (value) => value ?? NaN;
+  const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
+  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm) };
+}
 
 function showSettings(values) {
   if (!values) return;
@@ -128,13 +135,11 @@ function draw(now) {
 }
 
 window.addEventListener("keydown", (event) => {
-  if (event.repeat || belongsToAnother(event) || !rig.connected) return;
-  if (event.key === " " && event.target.tagName !== "BUTTON") {
-    event.preventDefault();
-    transport.togglePause();
-  } else if (event.key === "r" || event.key === "R") {
-    transport.reset();
-  }
+  const wish = rig.connected && keyOfTheRig(event);
+  if (!wish) return;
+  event.preventDefault();
+  if (wish === "pause") transport.togglePause();
+  else transport.reset();
 });
 
 requestAnimationFrame(draw);

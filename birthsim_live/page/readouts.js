@@ -3,7 +3,7 @@
 import { formula } from "./symbols.js";
 
 const RATE = 8; // updates per second: faster, digits cannot be read
-const SPOKEN_GAP = 2000; // ms between changes of the status line, which screen readers speak
+const WRITTEN_GAP = 2000; // ms between changes of the status line
 const KEEPS_UP = 0.98;
 
 const signed = (value, digits) =>
@@ -20,16 +20,18 @@ const FIGURES = [
 ];
 
 export class Readouts {
-  constructor(list, status) {
+  /** `status` is the line that is seen, `spoken` the one that screen readers speak. */
+  constructor(list, status, spoken) {
     this.status = status;
+    this.spoken = spoken;
     this.last = 0;
-    this.spoken = -Infinity;
+    this.written = -Infinity;
     this.values = FIGURES.map(([title, symbol, unit]) => {
       const box = document.createElement("div");
       const term = document.createElement("dt");
       term.append(`${title} `, formula(symbol));
       const value = document.createElement("dd");
-      const digits = document.createElement("output");
+      const digits = document.createElement("span");
       const inUnit = document.createElement("small");
       inUnit.textContent = ` ${unit}`;
       value.append(digits, inUnit);
@@ -49,11 +51,12 @@ export class Readouts {
     this.say(...pace(frame, state), now);
   }
 
-  /** Change the status line, at once where its kind changes, else seldom. */
+  /** Change the status line, at once where its kind changes, else seldom. Screen readers speak what kind it has become. */
   say(kind, words, now = performance.now()) {
     if (words === this.status.textContent) return;
-    if (kind === this.status.dataset.kind && now - this.spoken < SPOKEN_GAP) return;
-    this.spoken = now;
+    if (kind === this.status.dataset.kind && now - this.written < WRITTEN_GAP) return;
+    if (kind !== this.status.dataset.kind) this.spoken.textContent = words;
+    this.written = now;
     this.status.dataset.kind = kind;
     this.status.textContent = words;
   }

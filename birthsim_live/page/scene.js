@@ -15,6 +15,7 @@ export class Scene {
     this.geometry = null;
     this.path = [];
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
+    pen.onNightfall(() => this.layOut());
   }
 
   setUp(geometry, air) {

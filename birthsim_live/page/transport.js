@@ -86,6 +86,8 @@ export class Transport {
   writeTime(time) {
     const words = `${time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
     const output = byId("scrub-time");
-    if (output.textContent !== words) output.textContent = words;
+    if (output.textContent === words) return;
+    output.textContent = words;
+    this.scrub.setAttribute("aria-valuetext", words);
   }
 }

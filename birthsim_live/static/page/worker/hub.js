@@ -36,6 +36,7 @@ export class Hub {
 
   on_drag({ position, id }) {
     this.session.hands.hold = { position, id };
+    this.heard = performance.now();
   }
 
   on_release() {
@@ -94,6 +95,7 @@ export class Hub {
     const { session, clock } = this;
     const { recorder } = session;
     if (recorder?.full) this.endRecording();
+    if (performance.now() - this.heard > 1e3 * this.pack.numbers.patience) this.on_release();
     return {
       settings: { type: "settings", settings: session.shownSettings() },
       state: {
