@@ -102,8 +102,8 @@ kills: $(READY)
 	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents birthsim_live tests .ci
-	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_live tests .ci
+	$(BIN)/ruff check birthsim_env baselines agents birthsim_build birthsim_live tests .ci
+	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_build birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 

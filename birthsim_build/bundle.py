@@ -1,4 +1,4 @@
-"""What is built together: scenarios with sensors, laws for both kinds of sensors, and the plant; with the code that all need."""
+"""What is built together: scenarios with sensors, laws, and the plant; with the code that all need."""
 
 from __future__ import annotations
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork, layer
 from birthsim_env.loop.rows import ACTION, POSITION, POSITION_TIME, PRESSURE, REFERENCE, SEEN, SHOWN, USER_FORCE, VELOCITY
@@ -58,7 +61,7 @@ def policy_stage(network: PolicyNetwork, periods: int, actions: int, shown: int,
     layers = [array for weight, bias in network.layers for array in (np.ascontiguousarray(weight.T), bias[None].copy())]
     widest = max(network.inputs, *(len(bias) for _, bias in network.layers))
     about = (periods, actions, shown, len(network.layers), network.squashed)
-    tables = (
+    tables: tuple[NDArray[Any], ...] = (
         np.zeros((lanes, network.inputs), dtype=np.float32),
         network.mean,
         np.sqrt(network.variance + EPSILON),

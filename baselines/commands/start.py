@@ -18,6 +18,7 @@ ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the term
 
 _ABOVE = {
     **dict.fromkeys(("evaluate", "explain", "export", "scores", "sweep", "train"), "agents"),
+    "build": "birthsim_build",
     **dict.fromkeys(("live", "log", "replay"), "birthsim_live"),
 }
 """Command -> the package that holds it, where that is not this one."""

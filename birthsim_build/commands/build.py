@@ -31,8 +31,8 @@ def main() -> None:
     parser.add_argument("--sensors", nargs="+", choices=tuple(SENSORS), help="default: ideal")
     parser.add_argument("--controller", nargs="+", metavar="NAME", help="compiled controllers (default: backstepping)")
     parser.add_argument(
-        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim-train wrote, or names of what "
-        "comes with the package",
+        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim-train wrote, or names of "
+        "what comes with the package",
     )  # fmt: skip
     parser.add_argument("--all", action="store_true", help="all environments, sensors, compiled controllers and policies")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")

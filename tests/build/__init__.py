@@ -1,0 +1,1 @@
+"""The code that needs no Python, beside Python."""

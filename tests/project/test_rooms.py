@@ -37,7 +37,7 @@ def test_importing_a_package_loads_no_torch():
 def test_no_module_gives_a_name_twice():
     """A later constant or function of the same name would take the place of the first without a word."""
     root, twice = pathlib.Path(__file__).parents[2], []
-    for package in ("birthsim_env", "baselines", "agents", "birthsim_live"):
+    for package in ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live"):
         for path in (root / package).rglob("*.py"):
             named: set[str] = set()
             for node in ast.parse(path.read_text(encoding="utf-8")).body:

@@ -35,7 +35,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 """Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise.
 
-``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; a lane's bits do not depend on it."""
+``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
 _ROOT = Path(__file__).resolve().parents[3]
 _PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build")
@@ -106,7 +106,7 @@ class _DiskCache(NullCache):
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
-        how = (BLOCK, numba.config.LOOP_VECTORIZE, numba.config.SLP_VECTORIZE)
+        how = (BLOCK, *(os.environ.get(f"NUMBA_{kind}_VECTORIZE") for kind in ("LOOP", "SLP")))
         kind = hashlib.sha256(repr((signature, codegen.magic_tuple(), versions, how)).encode()).hexdigest()
         return self._folder / f"{self._name}-{kind[:16]}-{self._stamp}.nbc"
 
