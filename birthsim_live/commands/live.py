@@ -24,7 +24,10 @@ def main() -> None:
         "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
     )
     parser.add_argument(
-        "--static", type=Path, metavar="FOLDER", help="write the page with its rig into this new folder, for any web server, and end"
+        "--static",
+        type=Path,
+        metavar="FOLDER",
+        help="write the page with its rig into this new folder, for any web server, and end",
     )
     run(parser, _live)
 
@@ -51,7 +54,9 @@ def _build(folder: Path, parameters: str | None) -> None:
         # They need pydantic and safetensors, which come with extras only.
         from birthsim_live.static.build import build_page
     except ImportError as error:
-        raise ValueError(f"{error}; the page without a server needs extras: pip install 'birthsim[live,agents,build]'") from error
+        raise ValueError(
+            f"{error}; the page without a server needs extras: pip install 'birthsim[live,agents,build]'"
+        ) from error
     size = build_page(folder, load_parameters(parameters))
     print(f"written to {folder}: {size / 1e6:.2f} MB; python -m http.server -d {folder} shows it at http://127.0.0.1:8000")
 

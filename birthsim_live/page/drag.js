@@ -1,7 +1,7 @@
 // The hand: mouse, pen, finger and arrow keys hold the end effector through the server's spring.
 
 const LEAST_GAP = 1000 / 120; // ms between messages
-const STILL_HERE = 300; // ms; the rig lets go of a hand that it has not heard of for longer than a second
+const STILL_HERE = 300; // ms; the rig lets go of a hand that it has not heard of for 3 s
 const PUSH = 20; // N of an arrow key
 // Raw updates come when the mouse moves, other moves only when the screen is due: that costs up to a frame.
 const MOVE = "onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove";

@@ -15,7 +15,7 @@ DRAG_LIMIT = 100.0
 """N, assumed: the person's hand pulls no harder, however far the pointer is. At 120 N downwards, more than cylinder 1 can
 hold, it slams into its end stop so fast that the pressure there leaves what the model describes; at 100 N it never did."""
 
-PATIENCE = 1.0
+PATIENCE = 3.0
 """s of wall time, assumed: a hand that has not been heard of for longer lets go; the page tells of one that rests every 0.3 s.
 A window that is frozen would pull for ever."""
 

@@ -7,7 +7,7 @@ their bytes, little-endian, so that every bit arrives. The files of ``static/wor
 from __future__ import annotations
 
 import base64
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,7 @@ EPISODES = 16
 WITHOUT = "only with birthsim-live"
 """What the page says of a controller that is not compiled."""
 
+
 class Packer:
     """Packs stages, and keeps the ``functions`` (``module:name``) that they call, in the order of their numbers."""
 
@@ -68,7 +69,7 @@ class Packer:
 
     def number(self, stage: Stage | LawStage) -> int:
         """The number of a stage's function in the code."""
-        name = function_name(stage)
+        name = function_name(cast(Stage, stage))
         if name not in self.functions:
             self.functions.append(name)
         return self.functions.index(name)
@@ -85,7 +86,9 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
     Raises ``ValueError`` for a rig with options of ``physics.options``.
     """
     if not options.are_off(parameter_array(rig, 1)) or not spools.are_perfect(parameter_array(rig, 1)):
-        raise ValueError("the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed without a server: none")
+        raise ValueError(
+            "the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed without a server: none"
+        )
     choices, period = Choices(rig), rig.electronics.control_period
     controllers = {one["name"]: one for one in choices.controllers}
     made = {name: law for name in controllers if (law := controller(name, rig, packer)) is not None}
@@ -134,7 +137,7 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
 
 def scenario(name: str, packer: Packer) -> dict[str, Any]:
     """A scenario: its stages, which are the same in every episode, and the path of its target."""
-    parts = SCENARIOS[name].nominal()
+    parts: tuple[Any, ...] = SCENARIOS[name].nominal()
     for part in parts:
         part.prepare(1)
         part.begin(0, stream(SEED, 0, "reference"))
@@ -159,11 +162,10 @@ def sensors(name: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
         own = [model.stage(), *([model.board_stage()] if hasattr(model, "board_stage") else [])]
         episodes.append([[packed(table) for table in stage.tables] for stage in own])
     drawn = [
-        [k for k, tables in enumerate(zip(*every, strict=True)) if len(set(tables)) > 1] for every in zip(*episodes, strict=True)
+        [k for k, tables in enumerate(zip(*every, strict=True)) if len(set(tables)) > 1]
+        for every in zip(*episodes, strict=True)
     ]
-    begun = [
-        [{k: tables[k] for k in changing} for tables, changing in zip(every, drawn, strict=True)] for every in episodes
-    ]
+    begun = [[{k: tables[k] for k in changing} for tables, changing in zip(every, drawn, strict=True)] for every in episodes]
     return {"sampled": model.sampled, "stages": [packer.stage(stage) for stage in own], "begun": begun}
 
 

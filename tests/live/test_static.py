@@ -54,16 +54,6 @@ ROWS = """async (cases) => {
 
 
 @pytest.fixture(scope="module")
-def chromium():
-    if LACK:
-        pytest.fail(f"CI=true, and {LACK}")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright, browser.launch(playwright) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """The folder, made by the command."""
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
@@ -119,7 +109,9 @@ def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python
     assert {"backstepping", "admittance-backstepping", "lqr", "residual:circle", "residual:circle_lab"} <= set(offered)
     pushed = {"scenario_force": True}
     cases = [{"scenario": name, "sensors": sensors} for name in SCENARIOS for sensors in SENSORS]
-    cases += [{"scenario": "circle", "controller": name, "sensors": sensors} for name in offered for sensors in ("ideal", "lab")]
+    cases += [
+        {"scenario": "circle", "controller": name, "sensors": sensors} for name in offered for sensors in ("ideal", "lab")
+    ]
     cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
     several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
     texts = window.page.evaluate(ROWS, several)
