@@ -39,10 +39,12 @@ def _live(arguments: argparse.Namespace) -> None:
     need_server()
     # After that: both need pydantic, which comes with the extra only.
     from birthsim_live.rig.session import Session
+    from birthsim_live.rig.settings import opening_settings
     from birthsim_live.server.live_hub import LiveHub
 
     with listen(arguments.host, arguments.port) as listening:
-        session = Session(load_parameters(arguments.parameters))
+        rig = load_parameters(arguments.parameters)
+        session = Session(rig, opening_settings(rig))
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
         hub = LiveHub(session, arguments.record_dir)

@@ -4,7 +4,9 @@ import { Connection } from "./connection.js";
 import { NAMES, rowOf } from "./curves.js";
 import { Drag, keyOfTheRig } from "./drag.js";
 import { Gauges } from "./gauges.js";
+import { Guide } from "./guide.js";
 import { History } from "./history.js";
+import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
@@ -20,20 +22,24 @@ const byId = (id) => document.getElementById(id);
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
- * place of a point (m) on the screen in CSS px from the corner of the window.
+ * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
  */
 const send = (message) => connection.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel };
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
 window.birthsim = rig;
 
 const scene = new Scene(byId("rig"));
+rig.scene = scene;
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
 const history = new History(NAMES, 512, 0.025);
 const plots = new Plots(byId("plots"), history);
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
-const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
+const change = (changes) => send({ type: "set", settings: changes });
+const settings = new Settings(byId("settings"), change);
+const guide = new Guide(change);
+const link = new Link();
 const transport = new Transport(send, (name) => connection.address(name));
 const drag = new Drag(byId("rig"), {
   scene,
@@ -41,7 +47,10 @@ const drag = new Drag(byId("rig"), {
   frame: () => rig.frame,
   stiffness: () => rig.settings.drag_stiffness,
   enabled: () => rig.connected && rig.hello.mode === "live",
-  sent: (id, time) => rig.monitor.sent(id, time),
+  sent: (id, time) => {
+    scene.cue = false;
+    rig.monitor.sent(id, time);
+  },
 });
 
 const connection = new Connection({
@@ -64,7 +73,7 @@ const connection = new Connection({
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
-    if (message.mode === "live") settings.setUp(message);
+    if (message.mode === "live") setUpSettings(message);
     showSettings(message.settings);
     showState(message.state);
   },
@@ -83,6 +92,16 @@ const connection = new Connection({
   error: ({ message }) => notices.show(message),
 });
 
+function setUpSettings(message) {
+  settings.setUp(message);
+  guide.setUp(message);
+  if (!link.defaults) {
+    const wished = settingsIn(location.search, message.defaults);
+    if (Object.keys(wished).length) change(wished);
+  }
+  link.setUp(message.defaults);
+}
+
 /** A message has null where there is no number: NaN computes like one. */
 function withNumbers(frame) {
   const number = (value) => value ?? NaN;
@@ -93,7 +112,10 @@ function withNumbers(frame) {
 function showSettings(values) {
   if (!values) return;
   rig.settings = values;
-  if (rig.hello.mode === "live") settings.show(values);
+  if (rig.hello.mode !== "live") return;
+  settings.show(values);
+  guide.show(values);
+  link.show(values);
 }
 
 function showState(values) {

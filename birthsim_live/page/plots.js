@@ -54,6 +54,7 @@ class Plot {
     this.visible = true;
     this.range = calmRange(definition.least, definition.zero);
     const figure = document.createElement("figure");
+    figure.dataset.plot = definition.title;
     figure.append(heading(definition));
     this.place = document.createElement("div");
     this.place.className = "plot";

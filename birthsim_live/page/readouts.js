@@ -5,13 +5,34 @@ import { formula } from "./symbols.js";
 const RATE = 8; // updates per second: faster, digits cannot be read
 const WRITTEN_GAP = 2000; // ms between changes of the status line
 const KEEPS_UP = 0.98;
+const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
+const LEAST_GIVEN = 1e-4;
 
 const signed = (value, digits) =>
   Number.isFinite(value) ? `${value < 0 || Object.is(Math.round(value * 10 ** digits), -0) ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
 const pair = (values, digits, factor = 1) => values.map((value) => signed(factor * value, digits)).join("  ");
 const difference = (a, b) => [a[0] - b[0], a[1] - b[1]];
 
+/**
+ * Stiffness, N/m, that the hand feels along its force, and that it should: [felt, asked], or null where it hardly pulls or
+ * nothing gives way.
+ */
+export function stiffness({ force, position, target, compliant }) {
+  const size = Math.hypot(...force);
+  if (!(size >= LEAST_FORCE)) return null;
+  const given = ([x, y]) => ((x - target[0]) * force[0] + (y - target[1]) * force[1]) / size;
+  return given(position) >= LEAST_GIVEN ? [size / given(position), size / given(compliant)] : null;
+}
+
+const round = (value) => Number(value.toPrecision(3)).toLocaleString("en");
+
+function felt(frame) {
+  const found = stiffness(frame);
+  return found ? [round(found[0]), ` N/m, asked for ${round(found[1])}`] : ["–", " N/m"];
+}
+
 const FIGURES = [
+  ["the hand feels", [], "", felt],
   ["time", [["t"]], "s", (frame) => frame.time.toFixed(2)],
   ["user force", [["F", "us,x"], ", ", ["F", "us,y"]], "N", (frame) => pair(frame.force, 1)],
   ["displacement", [["x", "c"], " − ", ["x", "t"], ", ", ["y", "c"], " − ", ["y", "t"]], "mm", (frame) => pair(difference(frame.position, frame.target), 1, 1e3)],
@@ -26,7 +47,7 @@ export class Readouts {
     this.spoken = spoken;
     this.last = 0;
     this.written = -Infinity;
-    this.values = FIGURES.map(([title, symbol, unit]) => {
+    this.values = FIGURES.map(([title, symbol, unit], i) => {
       const box = document.createElement("div");
       const term = document.createElement("dt");
       term.append(`${title} `, formula(symbol));
@@ -36,8 +57,10 @@ export class Readouts {
       inUnit.textContent = ` ${unit}`;
       value.append(digits, inUnit);
       box.append(term, value);
+      box.dataset.figure = title;
+      if (i === 0) box.className = "felt";
       list.append(box);
-      return digits;
+      return [digits, inUnit];
     });
   }
 
@@ -45,8 +68,9 @@ export class Readouts {
     if (now - this.last < 1e3 / RATE) return;
     this.last = now;
     FIGURES.forEach(([, , , words], i) => {
-      const text = words(frame);
-      if (this.values[i].textContent !== text) this.values[i].textContent = text;
+      [words(frame)].flat().forEach((text, k) => {
+        if (this.values[i][k].textContent !== text) this.values[i][k].textContent = text;
+      });
     });
     this.say(...pace(frame, state), now);
   }

@@ -36,7 +36,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig import bridge, clock, frames, hand, recorder, recording, setpoints
 from birthsim_live.rig.controllers import build_controller, has_damping
 from birthsim_live.rig.session import HIGHEST, LOWEST, PATH_POINTS
-from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices, default_settings
+from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices
 from birthsim_live.server.hub import surroundings
 from birthsim_live.static import stages
 
@@ -99,7 +99,7 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
     return {
         "birthsim": birthsim_env.__version__,
         "hello": hello,
-        "settings": default_settings(rig).model_dump(),
+        "settings": hello["defaults"],
         "stiffnesses": STIFFNESSES,
         "period": period,
         "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},

@@ -51,6 +51,8 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
+CALM = "?controller=admittance-backstepping"
+"""What a page's address asks for so that the end effector comes to rest; the paper's law hunts."""
 PATIENCE = 120.0  # s; only a state that never comes takes so long
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.live import browser
-from tests.live.browser import Server, Window
+from tests.live.browser import CALM, Server, Window
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,8 @@ def server(tmp_path_factory):
 @pytest.fixture
 def window(chromium, server):
     """A window on a rig that runs and that nobody holds."""
-    with Window(chromium, server.url) as opened:
+    with Window(chromium, server.url + CALM) as opened:
+        opened.wait(f"birthsim.settings.controller === '{CALM.partition('=')[2]}'")
         opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
         yield opened
         assert opened.complaints == []

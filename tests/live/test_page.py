@@ -45,7 +45,8 @@ def test_displacement_is_force_over_stiffness_and_halves_at_twice_the_stiffness(
     assert displacement(soft)[0] == pytest.approx(rendered(soft)[0], rel=0.1)
 
     # Figures are written a few times a second: those of the rest follow.
-    shown = "document.querySelectorAll('#readouts dd span')[2].innerText.replaceAll('\u2212', '-').split(/\\s+/).map(Number)"
+    digits = "document.querySelector('[data-figure=displacement] dd span').innerText"
+    shown = f"{digits}.replaceAll('\u2212', '-').split(/\\s+/).map(Number)"
     wanted = [1e3 * part for part in displacement(soft)]
     window.wait(f"{wanted}.every((part, k) => Math.abs(part - ({shown})[k]) < 0.5)")
 

@@ -149,7 +149,7 @@ def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
         viewer.wait("birthsim.state.paused")
         for time, shown in ((0.5, "–"), (0.2, "+0.0")):
             viewer.page.locator("#scrub").fill(str(time))
-            viewer.wait(f"document.querySelectorAll('#readouts dd')[2].textContent.startsWith('{shown}')")
+            viewer.wait(f"document.querySelector('[data-figure=displacement] dd').textContent.startsWith('{shown}')")
         assert viewer.complaints == []
 
 

@@ -18,7 +18,7 @@ from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from tests.console import run
 from tests.live import browser
-from tests.live.browser import NARROW, Folder, Window, displacement, rendered
+from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
 
 LACK = browser.missing() or ("" if find_spec("ziglang") else "the static page's tests need pip install 'birthsim[build]'")
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -72,7 +72,8 @@ def address(built):
 
 @pytest.fixture
 def window(chromium, address):
-    with Window(chromium, address) as opened:
+    with Window(chromium, address + CALM) as opened:
+        opened.wait("birthsim.settings.controller === 'admittance-backstepping'")
         yield opened
         assert opened.complaints == []
         assert opened.foreign == []
