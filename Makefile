@@ -11,6 +11,7 @@
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
+# make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -27,7 +28,7 @@ LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --
   --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
 # What an installation here has; cluster (Ray) is left out.
-EXTRAS := agents onnx mpc tune sweep control log video live dev
+EXTRAS := agents onnx mpc tune sweep control build log video live dev
 CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti nvidia-cuda-nvrtc nvidia-cuda-runtime \
   nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 \
   nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx
@@ -36,7 +37,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -188,6 +189,9 @@ moving: $(READY)
 haptics: $(READY)
 	$(BIN)/birthsim-haptics --out $(OUT)/haptics --page docs/haptics.md
 	cp $(OUT)/haptics/*.png docs/
+
+targets: $(READY)
+	$(BIN)/python -m birthsim_build.commands.targets --out $(OUT)/targets --page docs/targets.md
 
 fuzz: $(READY)
 	mkdir -p $(OUT)

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from birthsim_build.bundle import Bundle
-from birthsim_build.code.compiler import compile_object, link
+from birthsim_build.code.compiler import EMULATIONS, compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
+from birthsim_build.code.stack import stack_bytes
+from birthsim_build.estimate import estimates
 from birthsim_build.faces.c import write_example, write_header
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
@@ -38,9 +40,8 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
     """Write a shared library for Linux, the object that it is made of, the header and an example; returns sizes in bytes."""
     images = bundle.images()
     built = _object(bundle, target, folder, images)
-    emulation = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}[target]
     link(
-        "ld.lld", "-m", emulation, "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
+        "ld.lld", "-m", EMULATIONS[target], "-shared", "-soname", "libbirthsim.so", "-o", str(folder / "libbirthsim.so"),
         str(folder / "birthsim.o"),
     )  # fmt: skip
     loops = [name for name in images if name != "plant" and not name.startswith("law_")]
@@ -51,11 +52,14 @@ def build_c(bundle: Bundle, target: str, folder: Path) -> Report:
 
 
 def build_cortex(bundle: Bundle, folder: Path) -> Report:
-    """Write the object of the laws alone and its header; returns sizes in bytes."""
+    """Write the object of the laws alone and its header; returns sizes in bytes, and what a period takes."""
     images = {name: words for name, words in bundle.images().items() if name.startswith("law_")}
     built = _object(bundle, "cortex-m7", folder, images)
     write_header(images, folder)
-    return {"target": "cortex-m7", **built}
+    assembly = folder / "birthsim.s"
+    stack = stack_bytes(assembly.read_text(), "birthsim_advance", "birthsim_stage_")
+    assembly.unlink()
+    return {"target": "cortex-m7", **built, "stack": stack, "estimate": estimates(bundle)}
 
 
 def _object(bundle: Bundle, target: str, folder: Path, images: Mapping[str, Words]) -> Report:

@@ -63,10 +63,7 @@ _SEEN = (
     *(Row(f"measured_{name}", "m", f"{name} of the end effector as measured") for name in ("x", "y")),
     *(Row(f"measured_{name}", "m/s", f"{name} of the end effector as measured") for name in ("vx", "vy")),
     Row("position_time", "s", "when the position was measured"),
-    *(
-        Row(f"measured_P{name[0].lower()}{name[1]}", "Pa", f"pressure of chamber {name} as measured, absolute")
-        for name in _CHAMBERS
-    ),
+    *(Row(f"measured_P{c}{k}", "Pa", f"pressure P{c}{k} as measured, absolute") for k in "12" for c in "pn"),
     *(Row(f"measured_force_{axis}", "N", f"force of the hand along {axis} as measured") for axis in "xy"),
     *_named(REFERENCE_NAMES, _REFERENCE_UNITS, "reference_", "what is asked for:"),
     *_named(REFERENCE_NAMES, _REFERENCE_UNITS, "asked_", "what the law is asked for:"),

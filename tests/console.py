@@ -17,6 +17,7 @@ COMMANDS = {
     **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "stability", "bench", "verify")},
     "haptics": "baselines.commands.haptics",
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
+    "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},
 }
 PATIENCE = 600.0  # s; only a state that never comes takes so long

@@ -22,25 +22,40 @@ ONE_LANE = {
 """Environment of the process that compiles for one lane, and not for the processor that it runs on."""
 
 
-def compile_object(functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None) -> None:
+EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
+"""Targets with shared libraries -> what the linker calls them."""
+
+
+def compile_object(
+    functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False
+) -> None:
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
-    Beside it stands the assembly, ``.s``.
+    For a Cortex-M7 the assembly stands beside it, ``.s``. Where it is to ``count``, the code counts its operations.
     """
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "data.npz"
         np.savez(place, **dict(data or {}))  # type: ignore[arg-type]
-        request = {"functions": list(functions), "target": target, "data": str(place), "out": str(out)}
+        request = {"functions": list(functions), "target": target, "data": str(place), "out": str(out), "count": count}
         subprocess.run(
             [sys.executable, "-m", "birthsim_build.code.emit"], input=json.dumps(request), text=True, check=True,
             env={**os.environ, **ONE_LANE},
         )  # fmt: skip
 
 
-def link(*arguments: str) -> None:
-    """Run a linker of PyPI's ``ziglang``, ``wasm-ld`` or ``ld.lld``; ``ValueError`` where it is missing or refuses."""
-    if find_spec("ziglang") is None:
+def has_linker() -> bool:
+    """Whether PyPI's ``ziglang`` is there."""
+    return find_spec("ziglang") is not None
+
+
+def require_linker() -> None:
+    """Raises ``ValueError`` where PyPI's ``ziglang`` is missing."""
+    if not has_linker():
         raise ValueError("linking needs the extra build: pip install 'birthsim[build]'")
+
+
+def link(*arguments: str) -> None:
+    """Run a linker of PyPI's ``ziglang``, ``wasm-ld`` or ``ld.lld``; ``ValueError`` where it refuses."""
     done = subprocess.run([sys.executable, "-m", "ziglang", *arguments], capture_output=True, text=True)
     if done.returncode:
         said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]

@@ -2,7 +2,8 @@
 
     python -m birthsim_build.code.emit <REQUEST.json
 
-The request names functions (``module:name``), the target, data (an NPZ file of words by name) and the object file.
+The request names functions (``module:name``), the target, data (an NPZ file of words by name), the object file,
+and whether the code counts its operations.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from birthsim_build.code.advance import advance_code
+from birthsim_build.code.counting import counted
 from birthsim_build.code.targets import TARGETS, Target
 from birthsim_env.loop.stage import SIGNATURE
 from birthsim_env.physics.compiled.compilation import BLOCK
@@ -30,11 +32,14 @@ def main() -> None:
     request: dict[str, Any] = json.load(sys.stdin)
     if BLOCK != 1:
         raise RuntimeError(f"BIRTHSIM_BLOCK = {BLOCK}; allowed: 1")
-    emit(request["functions"], TARGETS[request["target"]], Path(request["data"]), Path(request["out"]))
+    emit(request["functions"], TARGETS[request["target"]], Path(request["data"]), Path(request["out"]), request["count"])
 
 
-def emit(functions: list[str], target: Target, data: Path, out: Path) -> None:
-    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``."""
+def emit(functions: list[str], target: Target, data: Path, out: Path, count: bool) -> None:
+    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``.
+
+    Where it is to ``count``, the code counts its operations.
+    """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     chosen = llvm.Target.from_triple(target.triple)
@@ -50,9 +55,14 @@ def emit(functions: list[str], target: Target, data: Path, out: Path) -> None:
         if not one.is_declaration and not one.name.startswith(EXPORTED):
             one.linkage = llvm.Linkage.internal
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
+    for function in module.functions:
+        if not function.is_declaration:
+            function.add_function_attribute("nounwind")
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(module, builder)
     module.verify()
+    if count:
+        module = llvm.parse_assembly(counted(str(module)))
     if target.triple.startswith("thumb"):
         out.with_suffix(".s").write_text(machine.emit_assembly(module))
     out.write_bytes(machine.emit_object(module))

@@ -11,6 +11,7 @@ from baselines.registry import CONTROLLERS, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
+from birthsim_build.code.compiler import require_linker
 from birthsim_build.code.targets import TARGETS
 from birthsim_build.loops import RESIDUAL
 from birthsim_env.parts.scenarios import SCENARIOS
@@ -46,6 +47,8 @@ def _build(arguments: argparse.Namespace) -> None:
     if target not in TARGETS:
         raise ValueError(f"target = {target!r}; allowed: {', '.join(TARGETS)}")
     bundle = _bundle(arguments)
+    if target != "cortex-m7":
+        require_linker()
     folder = make_folder(arguments.out)
     with whole_results(folder) as place:
         if target == "wasm":
@@ -80,13 +83,17 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
 
 def _show(report: Report) -> None:
     for name, value in report.items():
-        if isinstance(value, dict):
+        if name == "estimate":
+            for law, found in value.items():
+                said = f"{found['operations']:,.0f} operations; at most {found['most']:,.0f} cycles, an estimate"
+                print(f"{law:60}{found['cycles']:>12,.0f} cycles a period; {said}")
+        elif isinstance(value, dict):
             for key, size in value.items():
                 print(f"{name + ' ' + key:60}{size:>12,} bytes")
         elif isinstance(value, int):
             print(f"{name:60}{value:>12,} bytes")
         else:
-            print(f"{name:60}{', '.join(value) if isinstance(value, list) else value!s:>12}")
+            print(f"{name:60}{', '.join(value) or 'nothing' if isinstance(value, list) else value:>12}")
 
 
 if __name__ == "__main__":

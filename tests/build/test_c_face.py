@@ -6,7 +6,8 @@ import subprocess
 
 import numpy as np
 
-from tests.build.targets import ROW, library_rows, need
+from birthsim_build.check.running import ROW, library_rows
+from tests.build.targets import need
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 
@@ -15,8 +16,8 @@ def _run(*line, **options):
     return subprocess.run([str(word) for word in line], check=True, capture_output=True, text=True, **options).stdout
 
 
-def _expected(library, sizes):
-    rows = library_rows(library, "circle_ideal_admittance_backstepping", sizes["circle_ideal_admittance_backstepping"] // 8)
+def _expected(library):
+    rows = library_rows(library, "circle_ideal_admittance_backstepping", 2000)
     return rows[99::100][:, [ROW["time"], ROW["x"], ROW["y"]]]
 
 
@@ -29,15 +30,15 @@ def test_the_header_is_strict_c99(library, tmp_path):
     _run("gcc", *STRICT, "-I", library, "-c", library / "example.c", "-o", tmp_path / "example.o")
 
 
-def test_the_example_builds_with_cmake(library, sizes, tmp_path):
+def test_the_example_builds_with_cmake(library, tmp_path):
     need(shutil.which("cmake") and shutil.which("cc"), "cmake or a C compiler is missing")
     _run("cmake", "-S", library, "-B", tmp_path)
     _run("cmake", "--build", tmp_path)
-    assert (_said(_run(tmp_path / "example")) == _expected(library, sizes)).all()
+    assert (_said(_run(tmp_path / "example")) == _expected(library)).all()
 
 
-def test_the_example_builds_with_pkg_config(library, sizes, tmp_path):
+def test_the_example_builds_with_pkg_config(library, tmp_path):
     need(shutil.which("pkg-config") and shutil.which("cc"), "pkg-config or a C compiler is missing")
     flags = _run("pkg-config", "--cflags", "--libs", "birthsim", env={**os.environ, "PKG_CONFIG_PATH": str(library)}).split()
     _run("cc", library / "example.c", *flags, f"-Wl,-rpath,{library}", "-o", tmp_path / "example")
-    assert (_said(_run(tmp_path / "example")) == _expected(library, sizes)).all()
+    assert (_said(_run(tmp_path / "example")) == _expected(library)).all()

@@ -1,0 +1,38 @@
+"""Bad input of birthsim-build: one line that names it, and nothing written."""
+
+import pytest
+
+from tests.console import call
+
+CASES = [
+    (("riscv",), "target = 'riscv'; allowed: wasm, x86-64, aarch64, cortex-m7"),
+    (("wasm", "--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1"),
+    (("wasm", "--controller", "nonlinear-mpc"), "controller = 'nonlinear-mpc'; allowed: a compiled one: backstepping"),
+    (("wasm", "--controller", "limited:pid"), "controller = 'limited:pid'; allowed: a compiled one: backstepping"),
+    (("wasm", "--controller", "nothing"), "controller = 'nothing'; allowed: backstepping"),
+    (("wasm", "--controller", "pid[gain=1]"), "gain = 1.0 is unknown; allowed for pid: "),
+    (("wasm", "--controller", "residual"), "--controller residual; allowed: --policy NAME"),
+    (("wasm", "--policy", "nowhere"), "policy = 'nowhere'"),
+    (("wasm", "--all", "--controller", "pid"), "--all with --controller; allowed: one of them"),
+    (("cortex-m7", "--env", "BirthSIM/Circle-v1"), "--env with cortex-m7; allowed: without it"),
+    (("wasm", "--parameters", "nowhere.toml"), "'nowhere.toml'"),
+]
+
+
+@pytest.mark.parametrize(("options", "said"), CASES)
+def test_bad_input_is_named(tmp_path, monkeypatch, capsys, options, said):
+    out = tmp_path / "out"
+    status, printed, complained = call("build", monkeypatch, capsys, *options, "--out", out)
+    assert (status, printed) == (2, "")
+    assert complained.startswith("birthsim-build: error: ")
+    assert said in complained
+    assert len(complained.splitlines()) == 1
+    assert not out.exists()
+
+
+def test_without_a_linker_it_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("birthsim_build.code.compiler.find_spec", lambda _: None)
+    status, _, complained = call("build", monkeypatch, capsys, "wasm", "--out", tmp_path / "out")
+    assert status == 2
+    assert "pip install 'birthsim[build]'" in complained
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,128 @@
+"""What acts on a built loop from outside does what the same does in Python: a person's hand, setpoints, another law."""
+
+import math
+
+import numpy as np
+import pytest
+
+from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
+from birthsim_build.check.running import ROW, library_loop, node_rows
+from birthsim_build.image import HEAD
+from birthsim_build.layout import ROWS
+from birthsim_env import StiffnessSchedule, UserForce
+from birthsim_env.parts.scenarios import SCENARIOS
+from tests.build.targets import assert_same_bits, need_program
+
+LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}
+STIFFNESS, DAMPING, LIMIT = 800.0, 20.0, 25.0
+HELD = np.where((np.arange(PERIODS) // 300) % 2, 1.0, 0.0)
+POINTER = np.array([0.5 + 0.02 * np.sin(0.01 * np.arange(PERIODS)), 0.03 * np.cos(0.013 * np.arange(PERIODS))])
+PUSH = np.where(np.arange(PERIODS) > 900, 7.0, 0.0)
+
+
+@pytest.fixture
+def in_node(wasm, tmp_path):
+    need_program("node", "nodejs")
+    return lambda choice=LOOP, **options: node_rows(wasm, ["loop", choice], tmp_path, PERIODS, **options)[0]
+
+
+class Held(UserForce):
+    """The scenario's hand, another push along y, and a spring to the pointer that pulls no harder than its limit."""
+
+    closed_loop = True
+
+    def __init__(self):
+        self.own = SCENARIOS["circle"].nominal()[1]
+        self.jump_rate = self.own.jump_rate
+
+    def prepare(self, num_envs):
+        self.own.prepare(num_envs)
+
+    def begin(self, lane, rng):
+        self.own.begin(lane, rng)
+
+    def force(self, time, position, velocity):
+        forces, now = self.own.force(time, position, velocity), round(float(time[0, 0]) * 1000) - 1
+        if now >= 0:
+            forces[0, 1, 0] += PUSH[now]
+            if HELD[now]:
+                pull = STIFFNESS * (POINTER[:, now] - position[:, 0]) - DAMPING * velocity[:, 0]
+                size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])
+                forces[0, :, 0] += pull * (LIMIT / size) if size > LIMIT else pull
+        return forces
+
+
+def test_a_person_s_hand(in_node):
+    constants = {"pointer_stiffness": STIFFNESS, "pointer_damping": DAMPING, "pointer_limit": LIMIT}
+    inputs = {name: np.full(PERIODS, value) for name, value in constants.items()}
+    inputs |= {"pointer_held": HELD, "pointer_x": POINTER[0], "pointer_y": POINTER[1], "add_force_y": PUSH}
+    rows = in_node(inputs=inputs)
+    expected = loop_rows("circle", "ideal", LOOP["controller"], user_force=Held())
+    assert_same_bits(rows[:, SHARED], expected[:, SHARED])
+
+
+ASKED = np.where(np.arange(PERIODS) >= 700, 3100.0, 2000.0)
+
+
+class Chosen(StiffnessSchedule):
+    """A person's Kclx from the first period on, and 150 N/m more than the scenario asks for along y."""
+
+    def __init__(self):
+        self.own = SCENARIOS["circle"].nominal()[2]
+
+    def prepare(self, num_envs):
+        self.own.prepare(num_envs)
+
+    def begin(self, lane, rng):
+        self.own.begin(lane, rng)
+
+    def sample(self, time):
+        rows, now = np.array(self.own.sample(time)), round(float(time[0]) * 1000) - 1
+        if 0 <= now < PERIODS:
+            rows[0], rows[1] = ASKED[now], rows[1] + 150.0
+        return rows
+
+
+def test_setpoints_of_a_person(in_node):
+    inputs = {"keep_Kclx": np.zeros(PERIODS), "add_Kclx": ASKED, "add_Kcly": np.full(PERIODS, 150.0)}
+    rows = in_node(inputs=inputs)
+    expected = loop_rows("circle", "ideal", LOOP["controller"], stiffness=Chosen())
+    assert_same_bits(rows[:, SHARED], expected[:, SHARED])
+
+
+def test_one_valve_per_cylinder(in_node):
+    rows = in_node({**LOOP, "valves": "one_valve"})
+    assert_same_bits(rows[:, SHARED], loop_rows("circle", "ideal", LOOP["controller"], valves="one_valve")[:, SHARED])
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_another_law_takes_over(in_node, sensors):
+    exchange = {"at": 777, "controller": "residual:circle", "sensors": sensors}
+    rows = in_node({**LOOP, "sensors": sensors}, exchange=exchange)
+    assert_same_bits(rows[:, SHARED], loop_rows("circle", sensors, LOOP["controller"], exchange=exchange)[:, SHARED])
+
+
+@pytest.fixture
+def loop(library):
+    """``advance`` of the library, and a loop of its as words."""
+    advance, first = library_loop(library, "circle_lab_admittance_backstepping")
+    return lambda words, periods: advance(words.ctypes.data, periods), first
+
+
+def test_a_copy_goes_on_by_itself(loop):
+    advance, one = loop
+    advance(one, 500)
+    other = one.copy()
+    advance(one, 500)
+    one_rows = one[HEAD : HEAD + ROWS].copy()
+    one[:] = 0
+    advance(other, 500)
+    assert (other[HEAD : HEAD + ROWS] == one_rows).all()
+
+
+def test_a_setpoint_that_cannot_be_served_is_counted(loop):
+    advance, words = loop
+    rows = words[HEAD : HEAD + ROWS].view(np.float64)
+    assert advance(words, 5) == 0
+    rows[ROW["keep_Kclx"]], rows[ROW["add_Kclx"]] = 0.0, -100.0
+    assert advance(words, 5) == 4  # the law sees in the next period what is asked for in this one
