@@ -29,7 +29,7 @@ TRANSITION = 0.1
 def drag_force(pointer: Array, position: Array, velocity: Array, stiffness: float) -> Array:
     """Force of the person's hand, N: spring and damper from ``position`` to ``pointer``, m, no more than ``DRAG_LIMIT``."""
     pull = stiffness * (pointer - position) - DRAG_DAMPING * velocity
-    size = math.hypot(pull[0], pull[1])
+    size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])  # as the page without a server: hypot rounds otherwise
     return np.asarray(pull * (DRAG_LIMIT / size) if size > DRAG_LIMIT else pull)
 
 

@@ -14,8 +14,10 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_live.rig.frames import COLUMNS
+from birthsim_live.rig.hand import Hold
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import opening_settings
 from tests.console import run
 from tests.live import browser
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
@@ -33,11 +35,12 @@ ROWS = """async (cases) => {
   const read = async (name) => await fetch(new URL(`rig/${name}`, location));
   const [pack, code] = [await (await read("pack.json")).json(), await (await read("loop.wasm")).arrayBuffer()];
   const found = [];
-  for (const { settings, periods } of cases) {
+  for (const { settings, periods, pointer } of cases) {
     const session = new Session(pack, await Machine.of(code));
     const file = pack.controllers[settings.controller]?.policy?.file;
     session.change(settings, file && (await (await read(file)).json()));
     session.reset();
+    if (pointer) session.hands.hold = { position: pointer, id: 1 };
     const rows = [];
     for (let k = 0; k < periods; k += 1) {
       session.advance(1, Infinity);
@@ -84,11 +87,13 @@ def same(found, expected):
     return bool(np.all((found == expected) | (np.isnan(found) & np.isnan(expected))))
 
 
-def rows_of(settings, periods):
-    """Rows of every period of a session in Python, (periods, COLUMNS)."""
-    session = Session(load_parameters(None))
+def rows_of(settings, periods, pointer=None):
+    """Rows of every period of a session in Python, (periods, COLUMNS); a hand at ``pointer``, m, pulls from the start."""
+    rig = load_parameters(None)
+    session = Session(rig, opening_settings(rig))
     session.change(settings)
     session.reset()
+    session.hands.hold = Hold(np.array(pointer), 1) if pointer else None
     rows = np.empty((periods, COLUMNS))
     for row in rows:
         session.advance(1)
@@ -115,6 +120,7 @@ def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python
     ]
     cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
     several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
+    several += [{"settings": {}, "periods": PERIODS, "pointer": place} for place in ([0.56, 0.02], [0.7, -0.2])]
     texts = window.page.evaluate(ROWS, several)
     for one, text in zip(several, texts, strict=True):
         found = np.frombuffer(base64.b64decode(text)).reshape(-1, COLUMNS)
@@ -156,7 +162,8 @@ def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
     rows = recording.rows[begun:]
     assert len(rows) > 300
     instants = np.round(rows[:, 0] / 0.001).astype(int)
-    expected = rows_of({"scenario": "circle", "scenario_force": True}, int(instants[-1]))
+    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2]}
+    expected = rows_of(settings, int(instants[-1]))
     moved = instants > 0
     assert same(rows[moved], expected[instants[moved] - 1])
 
