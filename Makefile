@@ -10,6 +10,7 @@
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
+# make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -28,7 +29,7 @@ LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --
   --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
 # What an installation here has; cluster (Ray) is left out.
-EXTRAS := agents onnx mpc tune sweep control build log video live dev
+EXTRAS := agents onnx mpc tune sweep control build log video live docs dev
 CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti nvidia-cuda-nvrtc nvidia-cuda-runtime \
   nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 \
   nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx
@@ -37,7 +38,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -107,6 +108,8 @@ lint: $(READY)
 	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_build birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/ruff check docs/conf.py docs/_generate
+	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready
@@ -152,7 +155,7 @@ compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v1 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
-	cat $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md >docs/bound.md
+	{ echo "# Tables of the planner"; echo; sed 's/^#/##/' $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md; } >docs/bound.md
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 policies: $(READY)
@@ -170,7 +173,8 @@ learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done >docs/learned.md
+	{ echo "# Tables of the residual"; echo; \
+	  for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done; } >docs/learned.md
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 scores: $(READY)
@@ -196,6 +200,15 @@ targets: $(READY)
 fuzz: $(READY)
 	mkdir -p $(OUT)
 	$(BIN)/python -m tests.fuzz --cases 5000 --out $(OUT)/fuzz.json
+
+# A warning fails it: a page that no list names, a link or an anchor that leads nowhere, a cell that fails.
+docs: $(READY)
+	rm -rf $(OUT)/docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs $(OUT)/docs
+	@echo "open $(OUT)/docs/index.html"
+
+docs-links: $(READY)
+	$(BIN)/python -m sphinx --builder linkcheck --define nb_execution_mode=off docs $(OUT)/docs-links
 
 # Interrupted, the same command carries on.
 soak: $(READY)

@@ -1,6 +1,7 @@
 """What several tests share: property tests that repeat themselves and may take their time, a short training, a last word."""
 
 import os
+import signal
 
 # LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -10,6 +11,9 @@ import pytest
 from hypothesis import settings
 
 from tests.console import run
+
+# A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples every time, and as long as a busy machine needs.
 settings.register_profile("birthsim", deadline=None, derandomize=True, database=None)

@@ -19,6 +19,7 @@ COMMANDS = {
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
     "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},
+    "fmu": "birthsim_build.commands.fmu",
 }
 PATIENCE = 600.0  # s; only a state that never comes takes so long
 RESIDUAL = "BirthSIM/ProbeResidual-v1"

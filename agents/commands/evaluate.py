@@ -117,9 +117,9 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     world = {
         "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize], **environment_parts(arguments),
     }  # fmt: skip
-    check_world(arguments.env, parameters=rig, **world)
     span = arguments.episodes, arguments.seed
     pieces = {name: evaluation_tasks(name, controller_settings(name, rig), arguments.env, world, *span) for name in names}
+    check_world(arguments.env, parameters=rig, **world)  # which compiles: names are looked at before
     known = len(pieces)
     if policies:
         from agents.policy.files import WEIGHTS

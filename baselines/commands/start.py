@@ -20,6 +20,7 @@ _ABOVE = {
     **dict.fromkeys(("evaluate", "explain", "export", "scores", "sweep", "train"), "agents"),
     "build": "birthsim_build",
     **dict.fromkeys(("live", "log", "replay"), "birthsim_live"),
+    "fmu": "birthsim_build",
 }
 """Command -> the package that holds it, where that is not this one."""
 

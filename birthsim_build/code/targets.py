@@ -20,8 +20,12 @@ _WASM = "+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals"
 TARGETS = {
     "wasm": Target("wasm32-unknown-unknown", "generic", _WASM, "static"),
     "x86-64": Target("x86_64-unknown-linux-gnu", "x86-64-v2", "", "pic"),
+    "x86-64-windows": Target("x86_64-pc-windows-gnu", "x86-64-v2", "", "pic"),
     "aarch64": Target("aarch64-unknown-linux-gnu", "generic", "", "pic"),
     "cortex-m7": Target("thumbv7em-unknown-none-eabihf", "cortex-m7", "+fp-armv8d16", "static"),
 }
 """WebAssembly as browsers have it since 2021, x86-64 since 2009 (which rounds in an instruction), every aarch64, and a
 Cortex-M7 with double precision. No target fuses a product with a sum: the code does not allow it, and LLVM then does not."""
+
+BUILT = ("wasm", "x86-64", "aarch64", "cortex-m7")
+"""Targets of ``birthsim-build``; Windows has its FMUs only."""

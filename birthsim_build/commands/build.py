@@ -12,7 +12,7 @@ from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker
-from birthsim_build.code.targets import TARGETS
+from birthsim_build.code.targets import BUILT
 from birthsim_build.loops import RESIDUAL
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -27,7 +27,7 @@ def main() -> None:
         "with JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the laws alone.",
         epilog="Every target computes the same bits as Python. The files are described in docs/build.md.",
     )
-    parser.add_argument("target", metavar="TARGET", help=f"one of {', '.join(TARGETS)}")
+    parser.add_argument("target", metavar="TARGET", help=f"one of {', '.join(BUILT)}")
     parser.add_argument("--env", nargs="+", help="environment ids (default: BirthSIM/Circle-v1); not for cortex-m7")
     parser.add_argument("--sensors", nargs="+", choices=tuple(SENSORS), help="default: ideal")
     parser.add_argument("--controller", nargs="+", metavar="NAME", help="compiled controllers (default: backstepping)")
@@ -44,8 +44,8 @@ def main() -> None:
 
 def _build(arguments: argparse.Namespace) -> None:
     target = arguments.target
-    if target not in TARGETS:
-        raise ValueError(f"target = {target!r}; allowed: {', '.join(TARGETS)}")
+    if target not in BUILT:
+        raise ValueError(f"target = {target!r}; allowed: {', '.join(BUILT)}")
     bundle = _bundle(arguments)
     if target != "cortex-m7":
         require_linker()

@@ -9,16 +9,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXTS = {page: page.read_text(encoding="utf-8") for page in PAGES}
 BLOCKS = {
-    f"{page.stem} {k}": block
+    f"{page.relative_to(ROOT)} {k}": block
     for page, text in TEXTS.items()
     for k, block in enumerate(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
 }
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+TRAINS = {name for name, block in BLOCKS.items() if ".learn(" in block}
+"""Blocks that take more than a few seconds."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in TRAINS else ()) for name in BLOCKS])
 def test_python_blocks_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
@@ -42,7 +46,3 @@ def test_linked_files_exist():
         assert [link for link in links if not (page.parent / link).exists()] == [], page
         named = re.findall(r"`((?:tests|examples|docs|agents|baselines|birthsim_build|birthsim_env|birthsim_live)/[\w/.]+)`", text)
         assert [name for name in named if not (ROOT / name).exists()] == [], page
-
-
-def test_every_page_is_in_the_index():
-    assert [page.name for page in PAGES[1:] if f"]({page.name})" not in TEXTS[ROOT / "docs" / "index.md"]] == ["index.md"]

@@ -129,18 +129,19 @@ def parameter_column(parameters: Parameters) -> Array:
     line's conductance, ``line_gain`` r T/V of the reservoir, ``mode_rate`` 2 pi f, ``handle`` the handle's share of the mass,
     ``tube_rate`` c/L; the dead volume has that of the tube in it.
     """
-    return np.array(_rows(parameters), dtype=np.float64)
+    return np.array(rows_of(parameters), dtype=np.float64)
 
 
 def parameter_columns(parameters: Parameters, num_lanes: int) -> Array:
     """``parameter_column`` of lanes (PARAMETERS, num_lanes); fields of ``parameters`` but geometry may be (num_lanes,)."""
     columns = np.empty((PARAMETERS, num_lanes))
-    for row, value in zip(columns, _rows(parameters), strict=True):
+    for row, value in zip(columns, rows_of(parameters), strict=True):
         row[:] = value
     return columns
 
 
-def _rows(parameters: Parameters) -> tuple[Any, ...]:
+def rows_of(parameters: Any) -> tuple[Any, ...]:
+    """The rows of ``parameter_column`` in order; what has the sections of ``Parameters`` may hold arrays or expressions."""
     g, c1, c2, m = parameters.geometry, parameters.cylinder1, parameters.cylinder2, parameters.mechanics
     f, ch, v, a = parameters.friction, parameters.chambers, parameters.valves, parameters.air
     fc1, fc2 = c1.coulomb_friction, c2.coulomb_friction

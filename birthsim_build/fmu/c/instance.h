@@ -1,0 +1,75 @@
+/* One instance of the model, as FMI 2 and FMI 3 share it. model.h, which is generated, describes the model. */
+#ifndef BIRTHSIM_INSTANCE_H
+#define BIRTHSIM_INSTANCE_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model.h"
+
+enum { SETTING_UP, INITIALIZING, RUNNING, OVER };
+
+typedef struct {
+  double parameters[MODEL_PARAMETERS];
+  double memory[MODEL_MEMORY];
+  double began, time; /* s */
+  long long periods;  /* control periods that are complete */
+  int state;
+} Model;
+
+typedef struct {
+  Model model;
+  char name[128];
+  void *environment;
+  void *log;
+} Instance;
+
+/* Everything as it was when the model was built. */
+static void model_reset(Model *m) {
+  memcpy(m->parameters, model_default_parameters, sizeof m->parameters);
+  model_start(m->memory);
+  m->began = m->time = 0.0;
+  m->periods = 0;
+  m->state = SETTING_UP;
+}
+
+/* The parameters count from here on. */
+static void model_begin(Model *m) {
+  model_derive(m->parameters, m->memory);
+  m->state = RUNNING;
+}
+
+/* Where variable k is, or NULL: variable 0 is the time, then come parameters, then places in memory. */
+static double *model_variable(Model *m, unsigned k) {
+  if (k == 0) return &m->time;
+  if (k <= MODEL_PARAMETERS) return &m->parameters[k - 1];
+  return k < MODEL_VARIABLES ? &m->memory[model_place[k - 1 - MODEL_PARAMETERS]] : NULL;
+}
+
+/* NULL, or why variable k must not become value now. */
+static const char *model_refusal(const Model *m, unsigned k, double value) {
+  if (k == 0 || k >= MODEL_VARIABLES || k > MODEL_PARAMETERS + MODEL_INPUTS) return "only parameters and inputs can be set";
+  if (k <= MODEL_PARAMETERS && m->state >= RUNNING) return "parameters can be set before the simulation begins";
+  if (!(value >= model_least[k - 1] && value <= model_most[k - 1])) return "the value is outside of its limits";
+  return NULL;
+}
+
+/* Whole control periods up to now + step, s; NULL, or why not. */
+static const char *model_advance(Model *m, double now, double step) {
+  double due = (now + step - m->began) / MODEL_PERIOD;
+  if (!(step >= 0.0) || !(due - (double)m->periods < 1e9)) return "the communication step must be a finite number from 0 on, s";
+  /* Times come in as sums of steps: a period that lacks a thousandth is complete. */
+  long long count = (long long)floor(due + 1e-3) - m->periods;
+  if (count > 0) {
+    int missed = model_run(m->memory, (int32_t)count);
+    m->periods += count;
+    if (missed) return "the law cannot serve these setpoints: the stiffness must be positive definite";
+  }
+  m->time = now + step;
+  for (int k = 0; k < MODEL_OUTPUTS; k++)
+    if (!isfinite(m->memory[model_place[MODEL_INPUTS + k]])) return "a state is not finite any more";
+  return NULL;
+}
+
+#endif

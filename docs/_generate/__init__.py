@@ -1,0 +1,35 @@
+"""Parts of the site that come from code: each function of ``PARTS`` returns the Markdown of one file.
+
+`make docs` writes them into out/docs-generated, and the pages of docs/reference include them.
+"""
+
+from functools import partial
+from pathlib import Path
+
+from _generate.api import api
+from _generate.commands import commands
+from _generate.environments import environments
+from _generate.metrics import metrics
+from _generate.pictures import pictures
+from _generate.rig import rig
+from _generate.root_pages import PAGES, root_page
+
+PARTS = {
+    "api_birthsim_env.md": partial(api, "birthsim_env"),
+    "api_baselines.md": partial(api, "baselines"),
+    "api_agents.md": partial(api, "agents"),
+    "commands.md": commands,
+    "environments.md": environments,
+    "metrics.md": metrics,
+    "rig.md": rig,
+    **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},
+}
+"""File -> what returns its text."""
+
+
+def write(folder: Path) -> None:
+    """Write every part, and the moving pictures of the environments, into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, part in PARTS.items():
+        (folder / name).write_text(part(), encoding="utf-8")
+    pictures(folder)

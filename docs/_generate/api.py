@@ -1,0 +1,94 @@
+"""The public names of a package, with their docstrings, as MyST's directives of Python objects."""
+
+import dataclasses
+import inspect
+import re
+from importlib import import_module
+
+BEYOND = {
+    "birthsim_env": (
+        "env.BirthSIMEnv",
+        "vector_env.BirthSIMVectorEnv",
+        "parts.actuation.Actuation",
+        "parts.least_air.least_air",
+        "parts.labour.model.Labour",
+    ),
+    "baselines": ("staged.StagedController", "staged.LawStage", "bench.evaluation.table"),
+    "agents": (),
+}
+"""Package -> names that pages speak of, beside those in its ``__all__``."""
+
+
+class _Bare(str):
+    """An annotation, printed without quotes."""
+
+    __repr__ = str.__str__
+
+
+def api(package: str) -> str:
+    """A directive for every public name of a package, in the order of the alphabet."""
+    module = import_module(package)
+    known = {name: (f"{package}.{name}", getattr(module, name)) for name in module.__all__}
+    for dotted in BEYOND[package]:
+        place, _, name = dotted.rpartition(".")
+        known[name] = (f"{package}.{dotted}", getattr(import_module(f"{package}.{place}"), name))
+    words = "\n".join(f"- {{py:obj}}`{known[name][0]}`: {_first(known[name][1])}" for name in sorted(known))
+    return "\n\n".join([inspect.getdoc(module) or "", words, *(_entry(*known[name]) for name in sorted(known))])
+
+
+def _entry(dotted: str, thing: object) -> str:
+    kind = "class" if inspect.isclass(thing) else "function"
+    inside = [_text(thing)]
+    if inspect.isclass(thing):
+        inside += [_member(name, member) for name, member in vars(thing).items() if not name.startswith("_")]
+    title = f"## `{dotted.rpartition('.')[2]}`"
+    return f"{title}\n\n::::{{py:{kind}}} {dotted}{_signature(thing)}\n" + "\n\n".join(filter(None, inside)) + "\n::::"
+
+
+def _member(name: str, member: object) -> str:
+    """The directive of a documented method or property; nothing for what a base class documents."""
+    inner = getattr(member, "fget", None) or getattr(member, "__func__", member)
+    if not inspect.isfunction(inner) or not inspect.getdoc(inner):
+        return ""
+    if isinstance(member, property):
+        return f":::{{py:property}} {name}\n{_text(inner)}\n:::"
+    option = "\n:classmethod:\n" if isinstance(member, classmethod) else ""
+    return f":::{{py:method}} {name}{_signature(inner, bound=True)}{option}\n{_text(inner)}\n:::"
+
+
+def _signature(thing: object, bound: bool = False) -> str:
+    try:
+        signature = inspect.signature(thing)
+    except ValueError:
+        return "()"
+    given = [_shown(one) for one in signature.parameters.values()][int(bound) :]
+    back = signature.return_annotation
+    returned = signature.empty if back is signature.empty or inspect.isclass(thing) else _plain(back)
+    return str(signature.replace(parameters=given, return_annotation=returned))
+
+
+def _shown(one: inspect.Parameter) -> inspect.Parameter:
+    noted = one.annotation if one.annotation is one.empty else _plain(one.annotation)
+    # A default that is an object of ours says more by its class than by its address.
+    simple = one.default is one.empty or isinstance(one.default, (bool, int, float, str, tuple, type(None)))
+    return one.replace(annotation=noted, default=one.default if simple else _Bare(f"{type(one.default).__name__}(...)"))
+
+
+def _plain(annotation: object) -> _Bare:
+    return _Bare(annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation)))
+
+
+def _text(thing: object) -> str:
+    """The docstring as Markdown: its headings become bold lines, since a page has one order of headings."""
+    if dataclasses.is_dataclass(thing) and (thing.__doc__ or "").startswith(f"{getattr(thing, '__name__', '')}("):
+        return ""
+    text, _, listed = (inspect.getdoc(thing) or "").partition("\nArguments:\n")
+    if listed:
+        # A block of arguments becomes a list; what stands further in belongs to the argument above it.
+        text += "\nArguments:\n\n" + re.sub(r"^    (\w+): ", r"- ``\1``: ", listed, flags=re.MULTILINE)
+    return re.sub(r"^#+ (.*)$", r"**\1**\n", text, flags=re.MULTILINE)
+
+
+def _first(thing: object) -> str:
+    """The first sentence of a docstring."""
+    return re.split(r"(?<=[.:;])\s", " ".join((inspect.getdoc(thing) or "").split()))[0].rstrip(":;")

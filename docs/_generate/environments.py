@@ -1,0 +1,82 @@
+"""One section per registered environment id: what is seen, done and paid, and what it is made of by default."""
+
+import inspect
+import re
+
+import gymnasium
+
+import birthsim_env
+from birthsim_env import observation, reward
+from birthsim_env.assembly import assemble
+from birthsim_env.env import BirthSIMEnv
+from birthsim_env.info import FIELDS
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+
+LEFT_OUT = ("scenario", "num_envs", "unknown")
+
+
+def environments() -> str:
+    """What all share, then a section per id."""
+    return "\n\n".join([_shared(), *(_section(name) for name in SCENARIOS)])
+
+
+def _shared() -> str:
+    scales = [f"{entry.scale:g} {entry.unit}".replace("1 half strokes", "half a stroke") for entry in observation.ENTRIES]
+    rows = [
+        f"| {k} | {entry.name} | {scale} |" for k, (entry, scale) in enumerate(zip(observation.ENTRIES, scales, strict=True))
+    ]
+    info = [f"| `{name}` | {size} | {words} |" for name, (size, words) in FIELDS.items()]
+    terms = (reward.__doc__ or "").strip()
+    return "\n".join([
+        "## What all have in common", "",
+        f"Version of the package: {birthsim_env.__version__}. The full contract of an environment is its docstring, "
+        f"{{py:class}}`birthsim_env.env.BirthSIMEnv`.", "",
+        "### Observation", "",
+        f"Entries are what the sensors say over the scale in the last column, clipped to ±{observation.LIMIT:g}; "
+        "the last action follows them.", "",
+        "| index | entry | value that maps to 1 |", "|---|---|---|", *rows, "",
+        "### Reward", "", terms, "",
+        "### Arguments and their defaults", "",
+        ", ".join(f"`{name}={value}`" for name, value in _arguments().items()) + ".", "",
+        "### Info", "", "The true state, whatever the sensors say.", "",
+        "| key | numbers | unit and meaning |", "|---|---|---|", *info, *(f"| `{name}` | 1 | term of the reward |" for name in
+        reward.REWARD_TERMS), "| `is_success` | 1 | settled error below 1 mm so far, and not terminated |",
+    ])  # fmt: skip
+
+
+def _section(scenario: str) -> str:
+    name = environment_id(scenario)
+    facts = {
+        "experiment": _experiment(name),
+        "duration": f"{SCENARIOS[scenario].duration:g} s, {round(SCENARIOS[scenario].duration / 0.01)} steps of 10 ms",
+        **_spaces(name),
+        **{f"{kind}, law inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},
+    }
+    rows = [f"| {fact} | {text} |" for fact, text in facts.items()]
+    picture = f"![{name} under admittance-backstepping, in real time](../../out/docs-generated/{scenario}.webp)"
+    made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
+    return "\n".join([
+        f"## `{name}`", "", picture, "", "| | |", "|---|---|", *rows, "",
+        "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py",
+        "\n\n".join(made).rstrip(), "```",
+    ])  # fmt: skip
+
+
+def _experiment(name: str) -> str:
+    """What the contract of the environment says of an id."""
+    (row,) = re.findall(rf"^\s*\| `{name}` \| (.*) \| \d+ \|$", BirthSIMEnv.__doc__ or "", re.MULTILINE)
+    return row
+
+
+def _spaces(name: str) -> dict[str, str]:
+    env = gymnasium.make(name)
+    entries = [one.removeprefix("last action: ") for one in env.unwrapped.observation_names if one.startswith("last action")]
+    spaces = {"action": f"`{env.action_space}`: {'; '.join(entries)}", "observation": f"`{env.observation_space}`"}
+    env.close()
+    return spaces
+
+
+def _arguments() -> dict[str, str]:
+    """Argument of ``gymnasium.make`` -> its default."""
+    signature = inspect.signature(assemble).parameters.values()
+    return {one.name: repr(one.default) for one in signature if one.name not in LEFT_OUT}

@@ -1,0 +1,286 @@
+"""FMUs: FMPy accepts them, and they compute the bits of the plant and of the closed loop in Python."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines.registry import make_controller
+from birthsim_build.commands.fmu import main
+from birthsim_build.fmu import archive
+from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
+from birthsim_build.fmu.units import exponents
+from birthsim_env import Parameters
+from birthsim_env.loop.rows import FORCE, STATE
+from birthsim_env.loop.signals import REFERENCE_NAMES
+from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
+from birthsim_env.physics.plant import Plant
+from tests.console import call
+
+fmpy = pytest.importorskip("fmpy")
+validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
+pytest.importorskip("ziglang")
+
+RIG, PERIOD = Parameters(), 1e-3
+OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
+CIRCLE = "BirthSIM/Circle-v1"
+HEADERS = Path(archive.__file__).parent / "fmi_headers"
+
+
+class Unit:
+    """An instance of an FMU, by FMPy, where a simulation begins: variables by their names."""
+
+    def __init__(self, path, **parameters):
+        about = fmpy.read_model_description(path)
+        self._numbers = {variable.name: variable.valueReference for variable in about.modelVariables}
+        self.folder, self.ticks = fmpy.extract(path), 0
+        self.two = about.fmiVersion == "2.0"
+        kind = fmpy.fmi2.FMU2Slave if self.two else fmpy.fmi3.FMU3Slave
+        name = about.coSimulation.modelIdentifier
+        self.unit = kind(guid=about.guid, unzipDirectory=self.folder, modelIdentifier=name, instanceName="one")
+        self.unit.instantiate()
+        if self.two:
+            self.unit.setupExperiment(startTime=0.0)
+        self.unit.enterInitializationMode()
+        self.set(list(parameters), list(parameters.values()))
+        self.unit.exitInitializationMode()
+
+    def get(self, names):
+        return np.array((self.unit.getReal if self.two else self.unit.getFloat64)([self._numbers[name] for name in names]))
+
+    def set(self, names, values):
+        if names:
+            set_all = self.unit.setReal if self.two else self.unit.setFloat64
+            set_all([self._numbers[name] for name in names], [float(value) for value in values])
+
+    def step(self, periods=1):
+        self.unit.doStep(currentCommunicationPoint=self.ticks * PERIOD, communicationStepSize=periods * PERIOD)
+        self.ticks += periods
+
+    def close(self):
+        self.unit.terminate()
+        self.unit.freeInstance()
+        shutil.rmtree(self.folder)
+
+
+@pytest.fixture
+def unit():
+    """Makes instances, and ends them."""
+    made = []
+
+    def make(path, **parameters):
+        made.append(Unit(path, **parameters))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Makes FMU files with the command, each once."""
+    folder, made = tmp_path_factory.mktemp("fmu"), {}
+
+    def write(*options):
+        if options not in made:
+            with pytest.MonkeyPatch.context() as patch:
+                path = folder / f"{len(made)}.fmu"
+                patch.setattr(sys, "argv", ["birthsim-fmu", *map(str, options), "--out", str(path)])
+                main()
+                made[options] = path
+        return made[options]
+
+    return write
+
+
+@pytest.mark.parametrize("options", [(), ("--controller", "backstepping", "--sensors", "lab")], ids=["plant", "loop"])
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_file_is_valid_and_runs_as_a_user_runs_it(written, options, version):
+    path = written(*options, "--fmi", version)
+    assert validate_fmu(str(path)) == []
+    result = fmpy.simulate_fmu(str(path), stop_time=0.05, step_size=PERIOD, output=["y", "Pp1"])
+    assert len(result) == 51
+    assert np.isfinite(result["y"]).all()
+    assert result["Pp1"][0] > 1e5
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_plant_computes_the_bits_of_python(written, unit, version):
+    rng, plant = np.random.default_rng(version), Plant(RIG)
+    one = unit(written("--fmi", version))
+    plant.state = one.get(STATE_NAMES)[:, None]
+    for _ in range(300):
+        openings, force = rng.uniform(-0.3, 0.3, 4), rng.uniform(-20, 20, 2)
+        one.set(OPENINGS + FORCES, [*openings, *force])
+        one.step()
+        plant.advance(openings[:, None], force[:, None], PERIOD)
+        assert one.get(STATE_NAMES).tolist() == plant.state[:, 0].tolist()
+    assert one.get(["measured_x", "measured_y"]).tolist() == plant.end_effector()[:2, 0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("controller", "sensors", "periods"),
+    [
+        ("backstepping", "lab", 600),
+        ("admittance-adaptive", "honest", 600),
+        pytest.param("backstepping", "ideal", 15_990, marks=pytest.mark.slow, id="all of Fig. 4"),
+    ],
+)
+def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, sensors, periods):
+    """Under the target and the hand of the circle, as seen from Python."""
+    one = unit(written("--controller", controller, "--sensors", sensors))
+    env = gymnasium.make_vec(CIRCLE, num_envs=1, sensors=sensors, policy_period=PERIOD)
+    env.reset(seed=0)
+    simulation = env.unwrapped.simulation
+    law = make_controller(controller, RIG)
+    references = [f"reference_{name}" for name in REFERENCE_NAMES]
+    for _ in range(periods):
+        reference, seen = simulation.reference, simulation.measurement
+        one.set(references + FORCES, [*reference.rows[:, 0], *simulation.rows()[0][FORCE : FORCE + 2, 0]])
+        one.step()
+        env.step(law.command(seen, reference).T)
+        assert one.get(["measured_x", "measured_y"]).tolist() == seen.position[:, 0].tolist()
+        assert one.get(STATE_NAMES).tolist() == simulation.rows()[0][STATE : STATE + 18, 0].tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("wine") is None, reason="runs Windows' binary where Wine is installed")
+def test_windows_computes_the_bits_of_linux(written, tmp_path):
+    path = written("--controller", "backstepping", "--sensors", "lab", "--target", "x86-64", "x86-64-windows")
+    about, unpacked = fmpy.read_model_description(path), Path(fmpy.extract(path, tmp_path / "fmu"))
+    (linux,), (windows,) = (unpacked / "binaries" / "linux64").iterdir(), (unpacked / "binaries" / "win64").iterdir()
+    printed = []
+    for target, library, host in (("x86_64-linux-gnu", linux, []), ("x86_64-windows-gnu", windows, ["wine"])):
+        folder = library.parent
+        line = [sys.executable, "-m", "ziglang", "cc", "-target", target, f"-I{HEADERS}", Path(__file__).parent / "host.c"]
+        subprocess.run([*line, library, f"-Wl,-rpath,{folder}", "-o", folder / "host.exe"], check=True)
+        quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
+        done = subprocess.run([*host, folder / "host.exe", about.guid], cwd=folder, env=quiet, capture_output=True, check=True)
+        printed.append(done.stdout.split())
+    assert len(printed[0]) == 400 * 37
+    assert printed[0] == printed[1]
+
+
+def test_parameters_act_as_in_python(written, unit):
+    changed = {
+        "mechanics.mass": 2.2,
+        "cylinder1.coulomb_friction": 20.0,
+        "valves.time_constant": 0.006,
+        "air.temperature": 300.0,
+    }
+    one = unit(written("--fmi", 2), **{f"rig.{name}": value for name, value in changed.items()})
+    plant = Plant(RIG.replace(changed))
+    plant.state = one.get(STATE_NAMES)[:, None]
+    for _ in range(50):
+        one.step()
+        plant.advance(np.zeros((4, 1)), np.zeros((2, 1)), PERIOD)
+    assert one.get(STATE_NAMES).tolist() == plant.state[:, 0].tolist()
+    assert one.get(["vy"])[0] != 0.0
+
+
+def test_the_c_code_derives_parameters_as_python_does(tmp_path):
+    names = parameter_names(RIG)
+    rng = np.random.default_rng(0)
+    rows = "\n".join(f"r[{k}] = {term};" for k, term in enumerate(derived_parameters(RIG)))
+    (tmp_path / "derive.c").write_text(f"""#include <math.h>\n#include <stdio.h>
+int main(void) {{ double p[{len(names)}], r[65]; for (int k = 0; k < {len(names)}; k++) scanf("%la", p + k);
+{rows}
+for (int k = 0; k < 65; k++) printf("%a\\n", r[k]); return 0; }}""")
+    subprocess.run(["gcc", "-O1", "-o", tmp_path / "derive", tmp_path / "derive.c", "-lm"], check=True)
+    for _ in range(5):
+        free = [name for name in names if "diameter" not in name and "ratio" not in name]
+        rig = RIG.replace({name: value_of(RIG, name) * rng.uniform(0.98, 1.02) for name in free})
+        given = "\n".join(value_of(rig, name).hex() for name in names)
+        done = subprocess.run([tmp_path / "derive"], input=given, capture_output=True, text=True, check=True)
+        assert [float.fromhex(line) for line in done.stdout.split()] == parameter_column(rig).tolist()
+
+
+def value_of(rig, name):
+    section, _, field = name.partition(".")
+    return float(getattr(getattr(rig, section), field))
+
+
+def test_steps_of_any_length_run_the_control_periods_that_are_complete(written, unit):
+    path = written("--fmi", 3)
+    whole, odd = unit(path), unit(path)
+    for one in (whole, odd):
+        one.set(OPENINGS, [0.1, -0.1, 0.05, -0.05])
+    for _ in range(30):
+        whole.step()
+    time = 0.0
+    for step in (0.0004, 0.0006, 0.0105, 0.0005, 0.018):
+        odd.unit.doStep(currentCommunicationPoint=time, communicationStepSize=step)
+        time += step
+    assert odd.get(STATE_NAMES).tolist() == whole.get(STATE_NAMES).tolist()
+    assert odd.get(["time"])[0] == pytest.approx(0.03, rel=1e-12)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_state_comes_back_and_goes_through_bytes(written, unit, version):
+    one = unit(written("--controller", "backstepping", "--sensors", "lab", "--fmi", version))
+    one.step(20)
+    get, put = (one.unit.getFMUstate, one.unit.setFMUstate) if one.two else (one.unit.getFMUState, one.unit.setFMUState)
+    before = get()
+    one.step(30)
+    after = one.get(STATE_NAMES)
+    put(before)
+    one.ticks = 20
+    one.step(30)
+    assert one.get(STATE_NAMES).tolist() == after.tolist()
+
+
+@pytest.mark.parametrize(("name", "value"), [("opening_P1", 1.5), ("rig.mechanics.mass", 4.0), ("x", 0.0), ("time", 1.0)])
+def test_what_must_not_be_set_in_a_simulation_is_refused_and_changes_nothing(written, unit, name, value):
+    one = unit(written("--fmi", 2))
+    one.step()
+    before = one.get([name])
+    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
+        one.set([name], [value])
+    assert one.get([name]) == before
+
+
+def test_impossible_parameters_are_refused(written, unit):
+    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
+        unit(written("--fmi", 2), **{"rig.mechanics.mass": -1.0})
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (("--out", "x.zip"), "--out 'x.zip'; allowed: a file that ends in .fmu"),
+        (
+            ("--controller", "nonlinear-mpc", "--out", "x.fmu"),
+            "controller = 'nonlinear-mpc'; allowed: a compiled one: backstepping,",
+        ),
+        (("--controller", "pid", "--policy", "circle", "--out", "x.fmu"), "--controller with --policy; allowed: one of them"),
+        (("--env", "BirthSIM/Square-v1", "--out", "x.fmu"), "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v1"),
+    ],
+)
+def test_bad_input_is_refused_in_a_line(options, complaint, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    status, _, complained = call("fmu", monkeypatch, capsys, *options)
+    assert status == 2
+    assert complained.startswith(f"birthsim-fmu: error: {complaint}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_units_are_those_of_the_rig():
+    """Against the definitions of the derived units, each written out."""
+    assert exponents("W/(m2 K)") == {"kg": 1, "s": -3, "K": -1}
+    assert exponents("m3/(s Pa)") == {"m": 4, "s": 1, "kg": -1}
+    assert exponents("N s/m") == {"kg": 1, "s": -1}
+    assert exponents("1") == exponents("-") == {}
+    for section in ("mechanics", "friction", "chambers", "valves", "air", "cylinder1"):
+        for field in fields(getattr(RIG, section)):
+            exponents(field.metadata["unit"])
+    with pytest.raises(ValueError, match="unit = 'furlong'; allowed: "):
+        exponents("furlong")

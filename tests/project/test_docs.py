@@ -1,0 +1,126 @@
+"""The documentation site: every page has its place, the generated parts know everything, tables sort, and it builds."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+from baselines.bench.metrics import UNITS
+from birthsim_env import Parameters
+from tests.live import browser
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+DOCS = ROOT / "docs"
+PAGES = {page.relative_to(DOCS).with_suffix("").as_posix(): page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md")}
+
+FIGURE = re.compile(r"\b\d+\.\d+\b")
+
+TABLE = """<!doctype html><article><table class="docutils"><thead><tr><th>law</th><th>error, mm</th></tr></thead>
+<tbody>{}</tbody></table></article><script>{}</script>"""
+
+
+def listed(page):
+    """The pages that the toctrees of a page name."""
+    folder = (DOCS / page).parent
+    for block in re.findall(r"^```\{toctree\}\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL):
+        for line in filter(None, block.splitlines()):
+            if not line.startswith(":"):
+                named = re.sub(r".*<(.*)>", r"\1", line)
+                yield (folder / named).resolve().relative_to(DOCS).as_posix()
+
+
+def test_the_toctrees_name_every_page_once():
+    found = sorted(one for page in PAGES for one in listed(page))
+    assert found == sorted(set(PAGES) - {"index"})
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "{toctree}" in PAGES[page]])
+def test_what_a_toctree_names_is_linked_for_readers_without_one(page):
+    folder = (DOCS / page).parent
+    links = re.findall(r"\]\(([^)#:]+\.md)\)", PAGES[page])
+    linked = {(folder / link).resolve().relative_to(DOCS).with_suffix("").as_posix() for link in links}
+    assert set(listed(page)) - linked == set()
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("explanation/") and not page.endswith("index")])
+def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
+    prose = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
+    links = {(DOCS / page).parent / link for link in re.findall(r"\]\(([^)#:]+\.md)", prose)}
+    known = {figure for link in links for figure in FIGURE.findall(link.read_text(encoding="utf-8"))}
+    assert set(FIGURE.findall(prose)) - known == set()
+
+
+@pytest.fixture(scope="module")
+def parts():
+    """The generated parts of the site."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        import _generate
+    return {name: part() for name, part in _generate.PARTS.items()}
+
+
+def test_generated_parts_know_everything(parts):
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    ids = [name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name]
+    fields = [name for section in Parameters().to_dict().values() for name in section]
+    for part, names in (("commands.md", scripts), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)):
+        assert [name for name in names if f"`{name}`" not in parts[part]] == [], part
+
+
+def test_every_part_has_its_page(parts):
+    included = {Path(file).name for page in PAGES.values() for file in re.findall(r"\{include\} (\S+)", page)}
+    assert included == set(parts)
+
+
+@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
+def test_a_table_sorts_by_numbers_and_words(page_of):
+    cells = {"b": "12 [9, 15]", "c": "lost", "a": "0.5; 3", "d": ""}
+    rows = "".join(f"<tr><td>{law}</td><td>{error}</td></tr>" for law, error in cells.items())
+    page = page_of(TABLE.format(rows, (DOCS / "_static" / "tables.js").read_text(encoding="utf-8")))
+
+    def order():
+        return "".join(page.locator("tbody td:first-child").all_text_contents())
+
+    page.get_by_role("button", name="error, mm").click()
+    assert order() == "abcd"
+    page.get_by_role("button", name="error, mm").click()
+    assert order() == "dcba"
+    assert page.get_by_role("columnheader", name="error, mm").get_attribute("aria-sort") == "descending"
+    page.get_by_role("button", name="law").click()
+    assert order() == "abcd"
+
+
+@pytest.fixture
+def page_of():
+    """A function that shows HTML in a browser."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = browser.launch(playwright)
+
+        def shown(content):
+            page = chromium.new_page()
+            page.set_content(content)
+            return page
+
+        yield shown
+        chromium.close()
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_its_notebooks_run(tmp_path):
+    pytest.importorskip("sphinx")
+    pytest.importorskip("myst_nb")
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", str(DOCS), str(tmp_path)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr[-4000:]
+    notebooks = [page for page, text in PAGES.items() if "{code-cell}" in text]
+    assert len(notebooks) >= 5
+    assert [page for page in notebooks if 'class="cell_output' not in (tmp_path / f"{page}.html").read_text("utf-8")] == []
