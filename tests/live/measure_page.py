@@ -65,13 +65,15 @@ def row(run, report):
 
 
 def picture(window, path):
-    """A screenshot with something to see: the paper's law on a circle, a pull, and the plots full."""
-    window.page.locator("select[name=controller]").select_option("backstepping")
-    window.page.locator("select[name=scenario]").select_option("circle")
-    window.page.locator("body").press("r")
-    window.wait("birthsim.settings.scenario === 'circle' && birthsim.frame.time > 6.5")
+    """A screenshot with something to see: the first lesson, a pull, and the plots full."""
+    window.page.locator("#guide").select_option("Feel the friction")
+    window.wait("birthsim.settings.controller === 'backstepping' && birthsim.frame.pointer === null")
+    window.page.locator("#reset").click()
+    window.wait("birthsim.frame.time < 1")
+    window.page.locator("#reset").blur()
+    window.wait("birthsim.frame.time > 6")
     window.hold(across=45, up=30)
-    window.live(1.8)
+    window.live(2.0)
     window.page.screenshot(path=path)
     window.page.mouse.up()
 
