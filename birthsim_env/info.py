@@ -35,7 +35,8 @@ FIELDS = {
 
 ROWS = sum(size for size, _ in FIELDS.values())
 _STARTS = np.cumsum([0] + [size for size, _ in FIELDS.values()])
-_SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _STARTS[1:], strict=False)}
+SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _STARTS[1:], strict=False)}
+"""Name -> rows of ``describe``."""
 
 
 @kernel
@@ -89,7 +90,7 @@ def vector_info(rows: Array) -> dict[str, Array]:
     """Name -> (N,) for single values, (N, size) for several."""
     return {
         name: rows[part.start] if size == 1 else rows[part].T
-        for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)
+        for (name, part), (size, _) in zip(SLICES.items(), FIELDS.values(), strict=True)
     }
 
 
@@ -99,5 +100,5 @@ def single_info(rows: Array) -> dict[str, float | Array]:
     values = column.tolist()
     return {
         name: values[part.start] if size == 1 else column[part]
-        for (name, part), (size, _) in zip(_SLICES.items(), FIELDS.values(), strict=True)
+        for (name, part), (size, _) in zip(SLICES.items(), FIELDS.values(), strict=True)
     }

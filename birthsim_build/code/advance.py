@@ -141,7 +141,7 @@ def _wrapper(number: int, symbol: str) -> str:
     types = ", ".join(["i64"] * ARGUMENTS)
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, {types})
-define internal i64 @birthsim_stage_{number}({given}) {{
+define hidden i64 @birthsim_stage_{number}({given}) {{
   %missed = alloca i64
   %error = alloca ptr
   store i64 0, ptr %missed

@@ -16,7 +16,7 @@ REST_SPEED = 1e-9
 
 
 @kernel
-def _balance(state: Array, stiffness: Array, p: Array) -> None:
+def balance(state: Array, stiffness: Array, p: Array) -> None:
     """Fills pressures, temperatures and bristles of a state whose positions and speeds are set."""
     for i in range(state.shape[1]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
@@ -74,5 +74,5 @@ def balanced_state(
         state[[at.V1, at.V2]] = speed
     if pneumatic_stiffness is None:
         pneumatic_stiffness = np.repeat([[4600.0], [2300.0]], lanes, axis=1)
-    _balance(state, np.ascontiguousarray(pneumatic_stiffness, dtype=np.float64), lane_parameters)
+    balance(state, np.ascontiguousarray(pneumatic_stiffness, dtype=np.float64), lane_parameters)
     return state

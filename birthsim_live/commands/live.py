@@ -23,21 +23,44 @@ def main() -> None:
     parser.add_argument(
         "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
     )
+    parser.add_argument(
+        "--static",
+        type=Path,
+        metavar="FOLDER",
+        help="write the page with its rig into this new folder, for any web server, and end",
+    )
     run(parser, _live)
 
 
 def _live(arguments: argparse.Namespace) -> None:
+    if arguments.static is not None:
+        _build(arguments.static, arguments.parameters)
+        return
     need_server()
     # After that: both need pydantic, which comes with the extra only.
     from birthsim_live.rig.session import Session
+    from birthsim_live.rig.settings import opening_settings
     from birthsim_live.server.live_hub import LiveHub
 
     with listen(arguments.host, arguments.port) as listening:
-        session = Session(load_parameters(arguments.parameters))
+        rig = load_parameters(arguments.parameters)
+        session = Session(rig, opening_settings(rig))
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
         hub = LiveHub(session, arguments.record_dir)
         serve(hub, listening, arguments.host, "birthsim-live", arguments.record_dir)
+
+
+def _build(folder: Path, parameters: str | None) -> None:
+    try:
+        # They need pydantic and safetensors, which come with extras only.
+        from birthsim_live.static.build import build_page
+    except ImportError as error:
+        raise ValueError(
+            f"{error}; the page without a server needs extras: pip install 'birthsim[live,agents,build]'"
+        ) from error
+    size = build_page(folder, load_parameters(parameters))
+    print(f"written to {folder}: {size / 1e6:.2f} MB; python -m http.server -d {folder} shows it at http://127.0.0.1:8000")
 
 
 if __name__ == "__main__":

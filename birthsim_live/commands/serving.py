@@ -65,7 +65,7 @@ def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings:
             "recordings; there is no password and no encryption. Pages must be opened by exactly this name.",
             flush=True,
         )
-    app = create_app(hub, LOOPBACK if loopback else (host,), recordings)
+    app = create_app(hub, {host, *LOOPBACK} if loopback else {host}, recordings)
     options = uvicorn.Config(
         app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
         timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,

@@ -1,6 +1,7 @@
 // The hand: mouse, pen, finger and arrow keys hold the end effector through the server's spring.
 
 const LEAST_GAP = 1000 / 120; // ms between messages
+const STILL_HERE = 300; // ms; the rig lets go of a hand that it has not heard of for 3 s
 const PUSH = 20; // N of an arrow key
 // Raw updates come when the mouse moves, other moves only when the screen is due: that costs up to a frame.
 const MOVE = "onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove";
@@ -83,6 +84,7 @@ export class Drag {
 
   /** Ask for a position of the spring's far end; of several within one gap the last one goes out. */
   aim(position, time) {
+    this.aimed = position;
     const gap = performance.now() - this.lastSent;
     const waiting = this.pending !== null;
     this.pending = { position, time };
@@ -121,8 +123,12 @@ export class Drag {
     this.keys.delete(event.key);
   }
 
-  /** Called with every frame: arrow keys push with a constant force, so the spring's far end moves along. */
+  /**
+   * Called with every frame: arrow keys push with a constant force, so the spring's far end moves along. A pointer that rests
+   * tells the rig now and then that it is still there.
+   */
   follow(frame) {
+    if (this.pointer !== null && performance.now() - this.lastSent > STILL_HERE) this.aim(this.aimed, performance.now());
     if (this.keys.size === 0) return;
     let [dx, dy] = [0, 0];
     for (const key of this.keys) {
@@ -134,7 +140,14 @@ export class Drag {
   }
 }
 
+const modified = (event) => event.altKey || event.ctrlKey || event.metaKey;
+
 /** Sliders and lists keep their arrow keys. */
-export function belongsToAnother(event) {
-  return event.altKey || event.ctrlKey || event.metaKey || event.target.closest?.("input, select, textarea") != null;
+const belongsToAnother = (event) => modified(event) || event.target.closest?.("input, select") != null;
+
+/** Space presses a focused button or box and opens a focused list; R would choose from a list by its first letter. */
+export function keyOfTheRig(event) {
+  if (event.repeat || modified(event)) return null;
+  if (event.key === " ") return event.target.closest?.("button, select, a, [type=checkbox]") ? null : "pause";
+  return event.key.toLowerCase() === "r" ? "reset" : null;
 }

@@ -37,7 +37,7 @@ export class Magnifier {
     const scale = Math.min(width, height) / window;
     const world = new Pen(context, [width / 2 - scale * centre[0], height / 2 + scale * centre[1]], scale);
     const step = window / 4;
-    context.fillStyle = "white";
+    context.fillStyle = pen.SHEET;
     context.fillRect(0, 0, width, height);
     this.drawGrid(world, centre, step);
     world.line(this.path, pen.PATH, 2);
@@ -59,10 +59,10 @@ export class Magnifier {
     const frame = new Axis(centre, [1, 0]);
     const [across, up] = [width / 2 / world.scale, height / 2 / world.scale];
     for (let i = -Math.floor(across / step); i <= across / step; i += 1) {
-      world.line([frame.at(i * step, -up), frame.at(i * step, up)], "rgb(236, 239, 242)");
+      world.line([frame.at(i * step, -up), frame.at(i * step, up)], pen.GRID);
     }
     for (let i = -Math.floor(up / step); i <= up / step; i += 1) {
-      world.line([frame.at(-across, i * step), frame.at(across, i * step)], "rgb(236, 239, 242)");
+      world.line([frame.at(-across, i * step), frame.at(across, i * step)], pen.GRID);
     }
   }
 

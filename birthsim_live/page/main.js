@@ -2,9 +2,11 @@
 
 import { Connection } from "./connection.js";
 import { NAMES, rowOf } from "./curves.js";
-import { Drag, belongsToAnother } from "./drag.js";
+import { Drag, keyOfTheRig } from "./drag.js";
 import { Gauges } from "./gauges.js";
+import { Guide } from "./guide.js";
 import { History } from "./history.js";
+import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
@@ -19,38 +21,48 @@ const byId = (id) => document.getElementById(id);
 /**
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
- * `connected` whether it is there, `monitor` what the page measures of itself, `pixel([x, y])` the place of a point (m)
- * on the screen in CSS px from the corner of the window.
+ * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
+ * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
  */
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), pixel };
+const send = (message) => connection.send(message);
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
 window.birthsim = rig;
 
 const scene = new Scene(byId("rig"));
+rig.scene = scene;
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
 const history = new History(NAMES, 512, 0.025);
 const plots = new Plots(byId("plots"), history);
-const readouts = new Readouts(byId("readouts"), byId("status"));
+const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
-const send = (message) => connection.send(message);
-const settings = new Settings(byId("settings"), (changes) => send({ type: "set", settings: changes }));
-const transport = new Transport(send);
+const change = (changes) => send({ type: "set", settings: changes });
+const settings = new Settings(byId("settings"), change);
+const guide = new Guide(change);
+const link = new Link();
+const transport = new Transport(send, (name) => connection.address(name));
 const drag = new Drag(byId("rig"), {
   scene,
   send,
   frame: () => rig.frame,
   stiffness: () => rig.settings.drag_stiffness,
   enabled: () => rig.connected && rig.hello.mode === "live",
-  sent: (id, time) => rig.monitor.sent(id, time),
+  sent: (id, time) => {
+    scene.cue = false;
+    rig.monitor.sent(id, time);
+  },
 });
 
 const connection = new Connection({
-  opened: () => {},
   closed: (seconds) => {
     rig.connected = false;
     drag.release();
     banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
     readouts.say("offline", "connection lost");
+  },
+  failed: ({ message }) => {
+    banner("offline", `The rig cannot be shown: ${message}`);
+    readouts.say("offline", "no rig");
   },
   hello: (message) => {
     rig.hello = message;
@@ -61,7 +73,7 @@ const connection = new Connection({
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
-    if (message.mode === "live") settings.setUp(message);
+    if (message.mode === "live") setUpSettings(message);
     showSettings(message.settings);
     showState(message.state);
   },
@@ -72,18 +84,38 @@ const connection = new Connection({
     magnifier.setPath(points);
   },
   frame: (message) => {
-    rig.frame = message;
+    rig.frame = withNumbers(message);
     rig.monitor.received += 1;
-    history.push(message.time, rowOf(message));
-    drag.follow(message);
+    history.push(message.time, rowOf(rig.frame));
+    drag.follow(rig.frame);
   },
   error: ({ message }) => notices.show(message),
 });
 
+function setUpSettings(message) {
+  settings.setUp(message);
+  guide.setUp(message);
+  if (!link.defaults) {
+    const wished = settingsIn(location.search, message.defaults);
+    if (Object.keys(wished).length) change(wished);
+  }
+  link.setUp(message.defaults);
+}
+
+/** A message has null where there is no number: NaN computes like one. */
+function withNumbers(frame) {
+  const number = (value) => value ?? NaN;
+  const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
+  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm) };
+}
+
 function showSettings(values) {
   if (!values) return;
   rig.settings = values;
-  if (rig.hello.mode === "live") settings.show(values);
+  if (rig.hello.mode !== "live") return;
+  settings.show(values);
+  guide.show(values);
+  link.show(values);
 }
 
 function showState(values) {
@@ -125,13 +157,11 @@ function draw(now) {
 }
 
 window.addEventListener("keydown", (event) => {
-  if (event.repeat || belongsToAnother(event) || !rig.connected) return;
-  if (event.key === " " && event.target.tagName !== "BUTTON") {
-    event.preventDefault();
-    transport.togglePause();
-  } else if (event.key === "r" || event.key === "R") {
-    transport.reset();
-  }
+  const wish = rig.connected && keyOfTheRig(event);
+  if (!wish) return;
+  event.preventDefault();
+  if (wish === "pause") transport.togglePause();
+  else transport.reset();
 });
 
 requestAnimationFrame(draw);

@@ -4,6 +4,7 @@ const KEPT = 4096;
 
 export class Monitor {
   constructor() {
+    this.first = null; // ms from the address to the first frame that is drawn
     this.restart();
   }
 
@@ -24,6 +25,7 @@ export class Monitor {
   /** A frame is on the canvas: every drag message that it includes has now become motion. */
   drew(frame) {
     this.drawn += 1;
+    this.first ??= performance.now();
     const index = this.waiting.findIndex(({ id }) => id === frame.pointer_id);
     if (index < 0) return;
     const now = performance.now();

@@ -1,18 +1,38 @@
-// Colours, markers and the force arrow: the same as birthsim_env/drawing/pen.py, so that page and video look alike.
+// Colours, markers and the force arrow, as in birthsim_env/drawing/pen.py, so that page and video look alike.
 
-export const PAPER = "rgb(250, 251, 252)";
-export const INK = "rgb(38, 44, 52)";
-export const GREY = "rgb(128, 136, 146)";
-export const FAINT = "rgb(222, 226, 231)";
-export const STEEL = "rgb(196, 202, 209)";
-export const CAP = "rgb(92, 100, 110)";
-export const SKIN = "rgb(246, 214, 190)";
-export const SKIN_EDGE = "rgb(158, 104, 74)";
-export const END_EFFECTOR = "rgb(14, 14, 18)";
-export const TARGET = "rgb(0, 112, 128)";
-export const COMPLIANT = "rgb(255, 150, 0)";
-export const PATH = "rgb(176, 184, 194)";
-export const FORCE = "rgb(196, 16, 72)";
+const NAMES = [
+  "paper", "sheet", "ink", "grey", "faint", "grid", "steel", "cap", "skin", "skin-edge", "ground", "ground-edge", "line",
+  "end-effector", "target", "compliant", "path", "force",
+];
+export let PAPER, SHEET, INK, GREY, FAINT, GRID, STEEL, CAP, SKIN, SKIN_EDGE, GROUND, GROUND_EDGE, LINE;
+export let END_EFFECTOR, TARGET, COMPLIANT, PATH, FORCE;
+
+const known = new Map();
+
+/** A colour of colours.css, by day or by night. */
+export function colour(name) {
+  if (!known.has(name)) known.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return known.get(name);
+}
+
+function read() {
+  known.clear();
+  [
+    PAPER, SHEET, INK, GREY, FAINT, GRID, STEEL, CAP, SKIN, SKIN_EDGE, GROUND, GROUND_EDGE, LINE,
+    END_EFFECTOR, TARGET, COMPLIANT, PATH, FORCE,
+  ] = NAMES.map(colour);
+}
+
+read();
+
+/** Calls `redraw` when day turns to night or back. */
+export function onNightfall(redraw) {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    read();
+    redraw();
+  });
+}
+
 const LOW_PRESSURE = [240, 246, 252];
 const HIGH_PRESSURE = [14, 52, 128];
 
@@ -125,14 +145,14 @@ export class Pen {
 
   /** Text at a pixel, with a light rim that lifts it off what lies below. */
   text(words, [x, y], look) {
-    const { image, width, height, ratio } = lettered(words, { ...PLAIN, ...look });
+    const { image, width, height, ratio } = lettered(words, { colour: INK, ...PLAIN, ...look });
     const shift = { left: 2, center: width / 2, right: width - 2 }[look?.align ?? PLAIN.align];
     const whole = (value) => Math.round(value * ratio) / ratio; // between pixels of the screen letters blur
     this.context.drawImage(image, whole(x - shift), whole(y - height / 2), image.width / ratio, image.height / ratio);
   }
 }
 
-const PLAIN = { colour: INK, size: 12, weight: 600, align: "center" };
+const PLAIN = { size: 12, weight: 600, align: "center" };
 const MOST_TEXTS = 500;
 const texts = new Map();
 

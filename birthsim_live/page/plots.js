@@ -1,8 +1,8 @@
 // Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
 
-import uPlot from "/static/vendor/uPlot.esm.js";
+import uPlot from "./vendor/uPlot.esm.js";
 import { PLOTS } from "./curves.js";
-import { FONT, INK } from "./pen.js";
+import { FONT, colour } from "./pen.js";
 import { formula } from "./symbols.js";
 
 const WINDOW = 8; // s
@@ -10,7 +10,7 @@ const RATE = 15; // redraws of each plot per second, where the machine bears it
 const LATE = 25; // ms between frames of the screen that show that it does not: the rig comes first
 const LEAST_SHARE = 0.25; // of RATE
 const HEADING_FONT = `11px ${FONT}`;
-const GRID = { stroke: "rgb(232, 235, 239)", width: 1 };
+const GRID = { stroke: () => colour("grid"), width: 1 };
 
 /** Round range around the data that grows at once and shrinks only when the data leave much of it empty. */
 function calmRange(least, zero) {
@@ -54,6 +54,7 @@ class Plot {
     this.visible = true;
     this.range = calmRange(definition.least, definition.zero);
     const figure = document.createElement("figure");
+    figure.dataset.plot = definition.title;
     figure.append(heading(definition));
     this.place = document.createElement("div");
     this.place.className = "plot";
@@ -67,7 +68,7 @@ class Plot {
   }
 
   options() {
-    const axis = { stroke: INK, font: HEADING_FONT, grid: GRID, ticks: { ...GRID, size: 4 } };
+    const axis = { stroke: () => colour("ink"), font: HEADING_FONT, grid: GRID, ticks: { ...GRID, size: 4 } };
     return {
       width: Math.max(this.place.clientWidth, 120),
       height: Math.max(this.place.clientHeight, 60),
@@ -83,7 +84,7 @@ class Plot {
         { ...axis, size: 20, gap: 2, space: 45, values: (_, splits) => splits.map((s) => `${s} s`) },
         { ...axis, size: 46, gap: 4, space: 24, values: (_, splits) => splits.map((value) => String(Math.round(1e6 * value) / 1e6)) },
       ],
-      series: [{}, ...this.definition.curves.map(({ colour, width, dash }) => ({ stroke: colour, width, dash, points: { show: false } }))],
+      series: [{}, ...this.definition.curves.map(({ colour: name, width, dash }) => ({ stroke: () => colour(name), width, dash, points: { show: false } }))],
     };
   }
 
@@ -128,7 +129,7 @@ function heading({ title, unit, curves }) {
   return caption;
 }
 
-function key({ symbol, colour, width, dash }) {
+function key({ symbol, colour: name, width, dash }) {
   const item = document.createElement("span");
   item.className = "key";
   const space = "http://www.w3.org/2000/svg";
@@ -136,8 +137,9 @@ function key({ symbol, colour, width, dash }) {
   swatch.setAttribute("viewBox", "0 0 18 8");
   swatch.setAttribute("aria-hidden", "true");
   const line = document.createElementNS(space, "path");
-  const look = { d: "M0 4H18", stroke: colour, "stroke-width": width, "stroke-dasharray": dash.join(" ") };
+  const look = { d: "M0 4H18", "stroke-width": width, "stroke-dasharray": dash.join(" ") };
   for (const [attribute, value] of Object.entries(look)) line.setAttribute(attribute, value);
+  line.style.stroke = `var(--${name})`;
   swatch.append(line);
   item.append(swatch, formula(symbol));
   return item;

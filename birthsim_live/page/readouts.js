@@ -3,15 +3,36 @@
 import { formula } from "./symbols.js";
 
 const RATE = 8; // updates per second: faster, digits cannot be read
-const SPOKEN_GAP = 2000; // ms between changes of the status line, which screen readers speak
+const WRITTEN_GAP = 2000; // ms between changes of the status line
 const KEEPS_UP = 0.98;
+const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
+const LEAST_GIVEN = 1e-4;
 
 const signed = (value, digits) =>
   Number.isFinite(value) ? `${value < 0 || Object.is(Math.round(value * 10 ** digits), -0) ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
 const pair = (values, digits, factor = 1) => values.map((value) => signed(factor * value, digits)).join("  ");
 const difference = (a, b) => [a[0] - b[0], a[1] - b[1]];
 
+/**
+ * Stiffness, N/m, that the hand feels along its force, and that it should: [felt, asked], or null where it hardly pulls or
+ * nothing gives way.
+ */
+export function stiffness({ force, position, target, compliant }) {
+  const size = Math.hypot(...force);
+  if (!(size >= LEAST_FORCE)) return null;
+  const given = ([x, y]) => ((x - target[0]) * force[0] + (y - target[1]) * force[1]) / size;
+  return given(position) >= LEAST_GIVEN ? [size / given(position), size / given(compliant)] : null;
+}
+
+const round = (value) => Number(value.toPrecision(3)).toLocaleString("en");
+
+function felt(frame) {
+  const found = stiffness(frame);
+  return found ? [round(found[0]), ` N/m, asked for ${round(found[1])}`] : ["–", " N/m"];
+}
+
 const FIGURES = [
+  ["the hand feels", [], "", felt],
   ["time", [["t"]], "s", (frame) => frame.time.toFixed(2)],
   ["user force", [["F", "us,x"], ", ", ["F", "us,y"]], "N", (frame) => pair(frame.force, 1)],
   ["displacement", [["x", "c"], " − ", ["x", "t"], ", ", ["y", "c"], " − ", ["y", "t"]], "mm", (frame) => pair(difference(frame.position, frame.target), 1, 1e3)],
@@ -20,22 +41,26 @@ const FIGURES = [
 ];
 
 export class Readouts {
-  constructor(list, status) {
+  /** `status` is the line that is seen, `spoken` the one that screen readers speak. */
+  constructor(list, status, spoken) {
     this.status = status;
+    this.spoken = spoken;
     this.last = 0;
-    this.spoken = -Infinity;
-    this.values = FIGURES.map(([title, symbol, unit]) => {
+    this.written = -Infinity;
+    this.values = FIGURES.map(([title, symbol, unit], i) => {
       const box = document.createElement("div");
       const term = document.createElement("dt");
       term.append(`${title} `, formula(symbol));
       const value = document.createElement("dd");
-      const digits = document.createElement("output");
+      const digits = document.createElement("span");
       const inUnit = document.createElement("small");
       inUnit.textContent = ` ${unit}`;
       value.append(digits, inUnit);
       box.append(term, value);
+      box.dataset.figure = title;
+      if (i === 0) box.className = "felt";
       list.append(box);
-      return digits;
+      return [digits, inUnit];
     });
   }
 
@@ -43,17 +68,19 @@ export class Readouts {
     if (now - this.last < 1e3 / RATE) return;
     this.last = now;
     FIGURES.forEach(([, , , words], i) => {
-      const text = words(frame);
-      if (this.values[i].textContent !== text) this.values[i].textContent = text;
+      [words(frame)].flat().forEach((text, k) => {
+        if (this.values[i][k].textContent !== text) this.values[i][k].textContent = text;
+      });
     });
     this.say(...pace(frame, state), now);
   }
 
-  /** Change the status line, at once where its kind changes, else seldom. */
+  /** Change the status line, at once where its kind changes, else seldom. Screen readers speak what kind it has become. */
   say(kind, words, now = performance.now()) {
     if (words === this.status.textContent) return;
-    if (kind === this.status.dataset.kind && now - this.spoken < SPOKEN_GAP) return;
-    this.spoken = now;
+    if (kind === this.status.dataset.kind && now - this.written < WRITTEN_GAP) return;
+    if (kind !== this.status.dataset.kind) this.spoken.textContent = words;
+    this.written = now;
     this.status.dataset.kind = kind;
     this.status.textContent = words;
   }

@@ -1,14 +1,14 @@
 // The linkage: cylinders, pins, fetal head and the column that carries them (birthsim_env/drawing/rig.py).
 // Every dimension and the outline of the head come from the server.
 
-import { Axis, CAP, FAINT, INK, PAPER, SKIN, SKIN_EDGE, STEEL, finite } from "./pen.js";
+import { Axis, CAP, FAINT, GROUND, GROUND_EDGE, INK, LINE, PAPER, SKIN, SKIN_EDGE, STEEL, finite } from "./pen.js";
 
 const NEAR_STOP = 1e-4; // m
 
 /** Axes of both cylinders and their piston positions, or null where the linkage has no pose. */
 export function poseOf(frame, geometry) {
+  if (!frame.linkage) return null;
   const [, joint, pivot, endEffector] = frame.linkage;
-  if (!finite(joint) || !finite(endEffector)) return null;
   const along = ([ax, ay], [bx, by]) => {
     const length = Math.hypot(bx - ax, by - ay) || 1;
     return [(bx - ax) / length, (by - ay) / length];
@@ -29,10 +29,10 @@ export function extent(geometry) {
 
 /** Workspace of the end effector and the column. */
 export function drawGround(pen, geometry) {
-  pen.polygon(geometry.workspace, "rgb(241, 244, 240)", "rgb(214, 221, 212)");
+  pen.polygon(geometry.workspace, GROUND, GROUND_EDGE);
   const column = new Axis([0, 0], [Math.cos(geometry.gamma3), Math.sin(geometry.gamma3)]);
   const half = 0.8 * geometry.barrels[1].half_bore;
-  pen.polygon(column.box(-2 * half, geometry.d3 + 2 * half, half), FAINT, "rgb(200, 205, 211)");
+  pen.polygon(column.box(-2 * half, geometry.d3 + 2 * half, half), FAINT, LINE);
 }
 
 /** Everything that moves; `colours` of the chambers P1, N1, P2, N2. */

@@ -8,13 +8,18 @@ import { Sheet } from "./sheet.js";
 
 const MARGIN = 10;
 const STRIP = 8; // px below the rig, for scale bar and notes
+const CUE_TIME = 2200; // ms of the hint's motion, and px that it goes
+const CUE_LENGTH = 90;
+const STILL = matchMedia("(prefers-reduced-motion: reduce)");
 const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
 
 export class Scene {
   constructor(canvas) {
     this.geometry = null;
     this.path = [];
+    this.cue = true; // shows what to do until somebody has done it
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
+    pen.onNightfall(() => this.layOut());
   }
 
   setUp(geometry, air) {
@@ -87,6 +92,7 @@ export class Scene {
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
     if (pose) this.drawNames(pose);
+    if (this.cue && pose && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
     if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));
   }
@@ -126,6 +132,23 @@ export class Scene {
     context.stroke();
     const end = [frame.pointer[0] + hx, frame.pointer[1] + hy];
     this.pen.disc(end, 5, pen.PAPER, pen.CAP, 2);
+  }
+
+  /** A finger that pulls the head to the right, again and again; it rests where the person wants no motion. */
+  drawCue({ position }) {
+    const part = STILL.matches ? 0.7 : (performance.now() % CUE_TIME) / CUE_TIME;
+    const passed = Math.min(1, part / 0.7);
+    const ahead = (CUE_LENGTH * this.unit * passed * passed * (3 - 2 * passed)) / this.pen.scale;
+    const { context } = this.pen;
+    const from = [position[0], position[1]];
+    const to = [position[0] + ahead, position[1]];
+    context.globalAlpha = part > 0.85 ? (1 - part) / 0.15 : 1;
+    this.pen.line([from, to], pen.INK, 3);
+    this.pen.disc(to, 11, pen.PAPER, pen.INK, 2.5);
+    this.pen.disc(to, 4, pen.INK);
+    const [x, y] = this.pen.pixel(to);
+    this.pen.text("pull", [x, y - 24], { size: 15, weight: 700 });
+    context.globalAlpha = 1;
   }
 
   drawNames(pose) {

@@ -52,8 +52,9 @@ export class NumberField {
     const label = document.createElement("label");
     label.htmlFor = `set-${name}`;
     label.append(formula(title));
-    this.output = document.createElement("output");
-    this.output.htmlFor = `set-${name}`;
+    this.output = document.createElement("span");
+    this.output.className = "value";
+    this.output.setAttribute("aria-hidden", "true");
     this.input = document.createElement("input");
     Object.assign(this.input, { type: "range", id: `set-${name}`, name, min: 0, max: this.scale.length - 1, step: 1 });
     this.input.addEventListener("input", () => this.ask());

@@ -3,8 +3,10 @@
 const byId = (id) => document.getElementById(id);
 
 export class Transport {
-  constructor(send) {
+  /** `address(name)` is where a recording can be saved from. */
+  constructor(send, address) {
     this.send = send;
+    this.address = address;
     this.state = { paused: false, speed: 1, recording: null };
     byId("pause").addEventListener("click", () => this.togglePause());
     byId("reset").addEventListener("click", () => this.reset());
@@ -67,7 +69,7 @@ export class Transport {
     const download = byId("download");
     download.hidden = Boolean(recording) || !last;
     if (last) {
-      download.href = `/recordings/${encodeURIComponent(last)}`;
+      download.href = this.address(last);
       download.download = last;
       download.textContent = `save ${last}`;
     }
@@ -84,6 +86,8 @@ export class Transport {
   writeTime(time) {
     const words = `${time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
     const output = byId("scrub-time");
-    if (output.textContent !== words) output.textContent = words;
+    if (output.textContent === words) return;
+    output.textContent = words;
+    this.scrub.setAttribute("aria-valuetext", words);
   }
 }

@@ -15,6 +15,10 @@ DRAG_LIMIT = 100.0
 """N, assumed: the person's hand pulls no harder, however far the pointer is. At 120 N downwards, more than cylinder 1 can
 hold, it slams into its end stop so fast that the pressure there leaves what the model describes; at 100 N it never did."""
 
+PATIENCE = 3.0
+"""s of wall time, assumed: a hand that has not been heard of for longer lets go; the page tells of one that rests every 0.3 s.
+A window that is frozen would pull for ever."""
+
 DRAG_DAMPING = 20.0
 """N s/m, assumed: a hand is no bare spring; it acts only while the pointer holds."""
 
@@ -25,7 +29,7 @@ TRANSITION = 0.1
 def drag_force(pointer: Array, position: Array, velocity: Array, stiffness: float) -> Array:
     """Force of the person's hand, N: spring and damper from ``position`` to ``pointer``, m, no more than ``DRAG_LIMIT``."""
     pull = stiffness * (pointer - position) - DRAG_DAMPING * velocity
-    size = math.hypot(pull[0], pull[1])
+    size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])  # as the page without a server: hypot rounds otherwise
     return np.asarray(pull * (DRAG_LIMIT / size) if size > DRAG_LIMIT else pull)
 
 

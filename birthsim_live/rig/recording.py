@@ -121,7 +121,7 @@ def _checked(rows: Array, header: Any, events: list[Any]) -> Recording:
 def _fits(kind: str, value: Any) -> bool:
     """Whether an event of a kind may have this value."""
     if kind == "settings":
-        return isinstance(value, dict) and all(isinstance(entry, (str, float, bool)) for entry in value.values())
+        return isinstance(value, dict) and all(isinstance(entry, (str, int, float)) for entry in value.values())
     if kind == "path":
         return isinstance(value, list) and bool(value) and np.array(value, dtype=np.float64).shape == (len(value), 2)
     return value is None or isinstance(value, str)

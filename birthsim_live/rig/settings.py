@@ -81,6 +81,11 @@ def default_settings(rig: Parameters) -> Settings:
     return Settings(mass=rig.mechanics.mass)
 
 
+def opening_settings(rig: Parameters) -> Settings:
+    """What a visitor of the page meets: the paper's law, whose error under a pull can be seen."""
+    return default_settings(rig).model_copy(update={"controller": "backstepping"})
+
+
 def controller_choices() -> list[dict[str, str]]:
     """Every controller of the registry, and every policy that comes with the package: name, title, and what is ``missing``."""
     choices = []

@@ -15,7 +15,7 @@ from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.clock import Clock, Source
 from birthsim_live.rig.hand import DRAG_LIMIT
-from birthsim_live.rig.settings import Choices
+from birthsim_live.rig.settings import Choices, opening_settings
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client
 from birthsim_live.server.shapes import shapes
@@ -137,6 +137,7 @@ def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
             "valves": choices.words["valves"],
             "sensors": choices.words["sensors"],
         },
+        "defaults": opening_settings(rig).model_dump(),
         "ranges": {name: asdict(slider) for name, slider in choices.sliders.items()},
         "geometry": {
             "pivot1": pivot1,

@@ -15,7 +15,7 @@ import numpy as np
 from baselines.work.files import LEFTOVERS, remove_leftovers
 from birthsim_live.rig.clock import LOG
 from birthsim_live.rig.controllers import build_controller
-from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.hand import PATIENCE, Hold
 from birthsim_live.rig.recorder import Recorder
 from birthsim_live.rig.recording import SUFFIX
 from birthsim_live.rig.session import Session
@@ -35,6 +35,7 @@ class LiveHub(Hub):
         self.folder = folder
         self._session = session
         self._holder: Client | None = None
+        self._heard = 0.0
         self._pending: dict[str, Any] = {}
         self._askers: set[Client] = set()
         self._wake, self._idle = asyncio.Event(), asyncio.Event()
@@ -74,7 +75,7 @@ class LiveHub(Hub):
     async def act(self, client: Client, message: protocol.Message) -> None:
         match message:
             case protocol.Drag(position=position, id=identity):
-                self._holder = client
+                self._holder, self._heard = client, time.monotonic()
                 self._session.hands.hold = Hold(np.array(position), identity)
             case protocol.Release():
                 self._release(client)
@@ -114,6 +115,11 @@ class LiveHub(Hub):
             "state": state,
             "path": {"type": "path", "points": self._path},
         }
+
+    def _publish(self, texts: list[tuple[str, str]], frame: str) -> None:
+        if self._holder is not None and time.monotonic() - self._heard > PATIENCE:
+            self._release(self._holder)
+        super()._publish(texts, frame)
 
     def _release(self, client: Client) -> None:
         if self._holder is client:

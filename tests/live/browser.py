@@ -7,7 +7,10 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
@@ -48,6 +51,8 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 400, "height": 800}
+CALM = "?controller=admittance-backstepping"
+"""What a page's address asks for so that the end effector comes to rest; the paper's law hunts."""
 PATIENCE = 120.0  # s; only a state that never comes takes so long
 
 
@@ -127,6 +132,28 @@ class Server:
                 process.communicate(timeout=PATIENCE)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+class Folder:
+    """A server of the files in a folder, as ``python -m http.server``; entering gives its address."""
+
+    def __init__(self, folder):
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+
+    def __enter__(self):
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+        return f"http://127.0.0.1:{self._server.server_port}/"
+
+    def __exit__(self, *_):
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    """Says nothing of what it is asked."""
+
+    def log_message(self, *_):
+        pass
 
 
 def launch(playwright):

@@ -1,19 +1,21 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
 ``python -m tests.live.measure_page`` starts a server, drags the end effector around for some seconds, several times, and
-prints a table; ``--picture FILE`` also writes the screenshot of docs/live.md.
+prints a table; ``--static FOLDER`` does so with a folder of ``birthsim-live --static``; ``--picture FILE`` also writes the
+screenshot of docs/live.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import statistics
 import tempfile
 import time
 
 from tests.live import browser
-from tests.live.browser import Server, Window
+from tests.live.browser import CALM, Folder, Server, Window
 
 ROUND = 2.0  # s per circle of the mouse
 RADIUS = 45.0  # px
@@ -63,20 +65,35 @@ def row(run, report):
 
 
 def picture(window, path):
-    """A screenshot with something to see: a circle, a pull, and the plots full."""
-    window.page.locator("select[name=scenario]").select_option("circle")
-    window.page.locator("body").press("r")
-    window.wait("birthsim.settings.scenario === 'circle' && birthsim.frame.time > 6.5")
+    """A screenshot with something to see: the first lesson, a pull, and the plots full."""
+    window.page.locator("#guide").select_option("Feel the friction")
+    window.wait("birthsim.settings.controller === 'backstepping' && birthsim.frame.pointer === null")
+    window.page.locator("#reset").click()
+    window.wait("birthsim.frame.time < 1")
+    window.page.locator("#reset").blur()
+    window.wait("birthsim.frame.time > 6")
     window.hold(across=45, up=30)
-    window.live(1.8)
+    window.live(2.0)
     window.page.screenshot(path=path)
     window.page.mouse.up()
+
+
+@contextlib.contextmanager
+def _served(static, folder):
+    """The address of a page: of the files in ``static``, or of a server that records into ``folder``."""
+    if static:
+        with Folder(static) as url:
+            yield url
+        return
+    with Server("live", "--record-dir", folder) as server:
+        yield server.url
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=15.0, help="length of a run (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="how many (default: %(default)s)")
+    parser.add_argument("--static", metavar="FOLDER", help="the page without a server, in this folder")
     parser.add_argument("--picture", help="write a screenshot, 1280x800, to this PNG")
     arguments = parser.parse_args()
     if lack := browser.missing():
@@ -85,15 +102,17 @@ def main():
 
     with (
         tempfile.TemporaryDirectory() as folder,
-        Server("live", "--record-dir", folder) as server,
+        _served(arguments.static, folder) as url,
         sync_playwright() as playwright,
     ):
         chromium = browser.launch(playwright)
-        with Window(chromium, server.url) as window:
+        with Window(chromium, url + CALM) as window:
+            first = window.wait("birthsim.monitor.first")
             rows = [row(k + 1, drag(window, arguments.seconds)) for k in range(arguments.runs)]
             if arguments.picture:
                 picture(window, arguments.picture)
         chromium.close()
+    print(f"first frame drawn {first / 1e3:.2f} s after the address was opened\n")
     print("| " + " | ".join(HEADINGS) + " |")
     print("|" + "---|" * len(HEADINGS))
     for figures in rows:

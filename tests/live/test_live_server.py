@@ -21,7 +21,7 @@ from birthsim_live.rig.frames import FIELDS, SLICES
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
-from birthsim_live.server import protocol
+from birthsim_live.server import live_hub, protocol
 from birthsim_live.server.addresses import is_loopback, listen
 from birthsim_live.server.app import create_app
 from birthsim_live.server.live_hub import LiveHub
@@ -78,16 +78,25 @@ def test_a_window_is_told_everything_and_then_sees_frames(live: TestClient) -> N
         assert second["time"] >= first["time"]
 
 
+def test_a_window_that_falls_silent_lets_go(live: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_hub, "PATIENCE", 0.2)
+    with live.websocket_connect(SOCKET) as ws:
+        say(ws, "drag", position=[0.53, 0.0], id=5)
+        assert until(ws, of("state", dragging=True))
+        assert until(ws, of("state", dragging=False))
+        assert until(ws, of("frame", pointer=None, force=[0.0, 0.0]))
+
+
 def test_drag_settings_pause_reset(live: TestClient) -> None:
     with live.websocket_connect(SOCKET) as ws:
         say(ws, "drag", position=[0.53, 0.0], id=5)
         assert until(ws, of("state", dragging=True))
         frame = until(ws, lambda m: m["type"] == "frame" and m["pointer_id"] == 5 and m["drag_force"][0] > 15)
         assert frame["pointer"] == [0.53, 0.0]
-        say(ws, "set", settings={"Kclx": 4000, "controller": "lqr"})
-        assert until(ws, of("settings", Kclx=4000.0, controller="lqr", stiffness_source="sliders"))
         say(ws, "release")
         assert until(ws, of("state", dragging=False))
+        say(ws, "set", settings={"Kclx": 4000, "controller": "lqr"})
+        assert until(ws, of("settings", Kclx=4000.0, controller="lqr", stiffness_source="sliders"))
         say(ws, "pause", paused=True)
         assert until(ws, of("state", paused=True))
         stood = until(ws, of("frame", real_time=None))["time"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,40 +18,6 @@ pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", r
 DRAWN = """[...document.querySelectorAll('.plot canvas')].some((canvas) =>
     canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0))"""
 """Only plots that can be seen are drawn."""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    if LACK:
-        pytest.fail(f"CI=true, and {LACK}")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright, browser.launch(playwright) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory):
-    with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
-        yield running
-
-
-@pytest.fixture
-def window(chromium, server):
-    """A window on a rig that runs and that nobody holds."""
-    with Window(chromium, server.url) as opened:
-        opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
-        yield opened
-        assert opened.complaints == []
-        assert opened.foreign == []
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
-    """Folder for screenshots: BIRTHSIM_SCREENSHOTS, or one that pytest throws away."""
-    folder = Path(os.environ.get("BIRTHSIM_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def slide(window, name, value):
@@ -80,7 +45,8 @@ def test_displacement_is_force_over_stiffness_and_halves_at_twice_the_stiffness(
     assert displacement(soft)[0] == pytest.approx(rendered(soft)[0], rel=0.1)
 
     # Figures are written a few times a second: those of the rest follow.
-    shown = "document.querySelectorAll('#readouts output')[2].innerText.replaceAll('\u2212', '-').split(/\\s+/).map(Number)"
+    digits = "document.querySelector('[data-figure=displacement] dd span').innerText"
+    shown = f"{digits}.replaceAll('\u2212', '-').split(/\\s+/).map(Number)"
     wanted = [1e3 * part for part in displacement(soft)]
     window.wait(f"{wanted}.every((part, k) => Math.abs(part - ({shown})[k]) < 0.5)")
 

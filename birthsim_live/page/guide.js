@@ -1,0 +1,84 @@
+// Five things to try: settings, two sentences, and where to look.
+
+const LESSONS = [
+  {
+    name: "Feel the friction",
+    says: "Pull the head and hold it. This is the paper's law: dry friction keeps the dot short of the diamond, and the hand feels more stiffness than was asked for.",
+    settings: {},
+    look: ".felt",
+  },
+  {
+    name: "Halve the stiffness",
+    says: "Pull as hard as before: the head gives way twice as far. The rendered stiffness settles near 1000 N/m.",
+    settings: { Kclx: 1000, Kcly: 1000 },
+    look: "[data-plot='rendered stiffness']",
+  },
+  {
+    name: "What the force sensor buys",
+    says: "This law measures the hand's force and moves the rig to where the spring would be. Pull again: the dot stays on the diamond.",
+    settings: { controller: "admittance-backstepping" },
+    look: ".magnified",
+  },
+  {
+    name: "What learning adds",
+    says: "A trained policy corrects the paper's law on a rig that is heavier and rougher than the law believes. Choose the controller backstepping: the error grows about fourfold.",
+    settings: { scenario: "circle", controller: "residual:circle", scenario_force: true, mass: 4, friction: 1.5 },
+    look: "[data-figure='error']",
+  },
+  {
+    name: "Forceps pull",
+    says: "Pulls of 175 N act on the head, as in a forceps delivery. The law holds it with 4000 N/m; pull along and feel how far that gives way.",
+    settings: { scenario: "forceps", controller: "admittance-backstepping", scenario_force: true },
+    look: "[data-plot='user force']",
+  },
+];
+const OWN = { name: "Your own settings", says: "Pull the head: the difference between dot and diamond is the error.", look: ".felt" };
+
+const BASE = ["scenario", "controller", "valves", "sensors", "scenario_force", "damping", "mass", "friction"];
+
+export class Guide {
+  /** `change(settings)` asks the rig. */
+  constructor(change) {
+    this.change = change;
+    this.list = document.getElementById("guide");
+    this.words = document.getElementById("lesson");
+    this.list.addEventListener("change", () => this.go(LESSONS[this.list.selectedIndex]));
+    document.getElementById("next").addEventListener("click", () => this.next());
+  }
+
+  setUp({ choices, defaults }) {
+    this.defaults = Object.fromEntries(BASE.map((name) => [name, defaults[name]]));
+    const known = choices.controller.filter(({ missing }) => !missing).map(({ name }) => name);
+    this.list.replaceChildren(...[...LESSONS, OWN].map(({ name }) => new Option(name)));
+    LESSONS.forEach(({ settings: { controller } }, k) => {
+      this.list.options[k].disabled = Boolean(controller) && !known.includes(controller);
+    });
+    this.list.options[LESSONS.length].disabled = true;
+  }
+
+  /** The settings of a lesson: those that the page opens with, but for its own. */
+  settingsOf({ settings }) {
+    return { ...this.defaults, ...("Kclx" in settings ? {} : { stiffness_source: "scenario" }), ...settings };
+  }
+
+  go(lesson) {
+    this.change(this.settingsOf(lesson));
+  }
+
+  next() {
+    const open = LESSONS.filter((_, k) => !this.list.options[k].disabled);
+    this.go(open[(open.indexOf(this.lesson) + 1) % open.length]);
+  }
+
+  /** Tell what the settings are an example of. */
+  show(settings) {
+    const fits = (lesson) => Object.entries(this.settingsOf(lesson)).every(([name, value]) => settings[name] === value);
+    const lesson = LESSONS.find(fits) ?? OWN;
+    if (lesson === this.lesson) return;
+    this.lesson = lesson;
+    this.list.value = lesson.name;
+    this.words.textContent = lesson.says;
+    document.querySelector(".look")?.classList.remove("look");
+    document.querySelector(lesson.look)?.classList.add("look");
+  }
+}

@@ -1,0 +1,38 @@
+// The settings as a link: the address names those that differ from what the page opens with.
+
+const GAP = 500; // ms between changes of the address; browsers allow a hundred in half a minute
+const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
+
+/** The settings that an address asks for; what is no setting is refused by the rig, by name. */
+export function settingsIn(search, defaults) {
+  const value = (name, text) =>
+    typeof defaults[name] === "number" ? Number(text) : typeof defaults[name] === "boolean" ? text === "true" : text;
+  return Object.fromEntries([...new URLSearchParams(search)].map(([name, text]) => [name, value(name, text)]));
+}
+
+/** What stands in an address for settings. */
+function searchOf(settings, defaults) {
+  const given = settings.stiffness_source === "scenario" ? SETPOINTS : [];
+  const names = Object.keys(defaults).filter((name) => settings[name] !== defaults[name] && !given.includes(name));
+  const search = new URLSearchParams(names.map((name) => [name, settings[name]]));
+  return names.length ? `?${search}` : "";
+}
+
+export class Link {
+  setUp(defaults) {
+    this.defaults = defaults;
+    this.timer = null;
+  }
+
+  /** Let the address follow, soon. */
+  show(settings) {
+    this.settings = settings;
+    this.timer ??= setTimeout(() => this.write(), GAP);
+  }
+
+  write() {
+    this.timer = null;
+    const search = searchOf(this.settings, this.defaults);
+    if (search !== location.search) history.replaceState(null, "", location.pathname + search);
+  }
+}

@@ -1,0 +1,220 @@
+"""What a rig in the browser is made of, as JSON: rows, the rig, scenarios, sensors, controllers, and the page's greeting.
+
+A stage is the name of its function, its constants, the memory of a lane that starts, and its tables. Arrays are base64 of
+their bytes, little-endian, so that every bit arrives. The files of ``static/worker`` read it.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+import birthsim_env
+from agents.policy.files import load_policy
+from agents.policy.seeds import best_policy, shipped_names
+from agents.policy.stage import policy_stage
+from agents.residual.law import ResidualLaw
+from baselines.staged import LawStage, StagedController
+from birthsim_build.image import function_name
+from birthsim_env import info
+from birthsim_env.assembly import policy_periods
+from birthsim_env.loop import rows
+from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.world import plant_stage
+from birthsim_env.parts.actuation import VALVE_LAYOUTS, ValveActuation
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics import options, spools
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig import bridge, clock, frames, hand, recorder, recording, setpoints
+from birthsim_live.rig.controllers import build_controller, has_damping
+from birthsim_live.rig.session import HIGHEST, LOWEST, PATH_POINTS
+from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices
+from birthsim_live.server.hub import surroundings
+from birthsim_live.static import stages
+
+SEED = 0
+"""Of the world: that of ``Session``."""
+
+EPISODES = 16
+"""So many episodes have sensors of their own; then those of the first come again."""
+
+WITHOUT = "only with birthsim-live"
+"""What the page says of a controller that is not compiled."""
+
+
+class Packer:
+    """Packs stages, and keeps the ``functions`` (``module:name``) that they call, in the order of their numbers."""
+
+    def __init__(self) -> None:
+        self.functions: list[str] = []
+
+    def stage(self, stage: Stage | LawStage) -> dict[str, Any]:
+        """A stage as JSON."""
+        memory = stage.fresh if isinstance(stage, LawStage) else stage.memory
+        tables = () if isinstance(stage, LawStage) else stage.tables
+        return {
+            "function": self.number(stage),
+            "constants": packed(stage.constants),
+            "memory": None if memory is None else packed(memory),
+            "tables": [{"shape": list(table.shape), "data": packed(table)} for table in tables],
+        }
+
+    def number(self, stage: Stage | LawStage) -> int:
+        """The number of a stage's function in the code."""
+        name = function_name(cast(Stage, stage))
+        if name not in self.functions:
+            self.functions.append(name)
+        return self.functions.index(name)
+
+
+def packed(array: NDArray[Any]) -> str:
+    """The bytes of an array."""
+    return base64.b64encode(np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()).decode()
+
+
+def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
+    """All that a rig in the browser is made of; the functions of its stages are the packer's.
+
+    Raises ``ValueError`` for a rig with options of ``physics.options``.
+    """
+    if not options.are_off(parameter_array(rig, 1)) or not spools.are_perfect(parameter_array(rig, 1)):
+        raise ValueError(
+            "the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed without a server: none"
+        )
+    choices, period = Choices(rig), rig.electronics.control_period
+    controllers = {one["name"]: one for one in choices.controllers}
+    made = {name: law for name in controllers if (law := controller(name, rig, packer)) is not None}
+    for name, one in controllers.items():
+        if name not in made:
+            one["missing"] = WITHOUT
+    hello = surroundings(rig, choices)
+    return {
+        "birthsim": birthsim_env.__version__,
+        "hello": hello,
+        "settings": hello["defaults"],
+        "stiffnesses": STIFFNESSES,
+        "period": period,
+        "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},
+        "info": {name: [part.start, part.stop - part.start] for name, part in info.SLICES.items()},
+        "rig": rig_numbers(rig),
+        "range": {"low": packed(LOWEST), "high": packed(HIGHEST), "names": at.STATE_NAMES},
+        "stages": {
+            "plant": packer.stage(plant_stage(Plant(rig), period)),
+            "begin": packer.stage(Stage(stages.begin, parameter_column(rig))),
+            "show": packer.stage(Stage(stages.show, memory=np.zeros((info.ROWS, 1)))),
+            "valves": {name: packer.stage(ValveActuation(name).stages(1, False)[0]) for name in VALVE_LAYOUTS},
+        },
+        "scenarios": {name: scenario(name, packer) for name in SCENARIOS},
+        "sensors": {name: sensors(name, rig, packer) for name in SENSORS},
+        "controllers": made,
+        "numbers": numbers_of_the_page(),
+        "header": {
+            "format": recording.FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(),
+            "columns": list(frames.FIELDS), "interval": recorder.EVERY * period,
+        },
+    }  # fmt: skip
+
+
+def rig_numbers(rig: Parameters) -> dict[str, Any]:
+    """The rig's column, and what of it follows from the mass and friction that are set (``settings.true_rig``)."""
+    cylinders = (rig.cylinder1, rig.cylinder2)
+    return {
+        "column": packed(parameter_column(rig)),
+        "rows": {name: row for row, name in enumerate(PARAMETER_NAMES)},
+        "coulomb": [one.coulomb_friction for one in cylinders],
+        "viscous": [one.viscous_friction for one in cylinders],
+        "static_ratio": rig.friction.static_ratio,
+    }
+
+
+def scenario(name: str, packer: Packer) -> dict[str, Any]:
+    """A scenario: its stages, which are the same in every episode, and the path of its target."""
+    parts: tuple[Any, ...] = SCENARIOS[name].nominal()
+    for part in parts:
+        part.prepare(1)
+        part.begin(0, stream(SEED, 0, "reference"))
+    instants = np.linspace(0.0, SCENARIOS[name].duration, PATH_POINTS)
+    points = np.round(np.concatenate([parts[0].sample(np.array([t]))[:2] for t in instants], axis=1).T, 6)
+    trajectory, force, schedule = (packer.stage(part.stage()) for part in parts)
+    return {
+        "duration": SCENARIOS[name].duration,
+        "trajectory": trajectory,
+        "force": force,
+        "schedule": schedule,
+        "path": (points if np.ptp(points, axis=0).any() else points[:1]).tolist(),
+    }
+
+
+def sensors(name: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
+    """A sensor model: its stages, and for each episode what its random numbers have put into their tables."""
+    model: Any = SENSORS[name](rig.electronics, 1)
+    episodes = []
+    for episode in range(EPISODES):
+        model.begin(0, stream(SEED, episode, "sensors"))
+        own = [model.stage(), *([model.board_stage()] if hasattr(model, "board_stage") else [])]
+        episodes.append([[packed(table) for table in stage.tables] for stage in own])
+    drawn = [
+        [k for k, tables in enumerate(zip(*every, strict=True)) if len(set(tables)) > 1]
+        for every in zip(*episodes, strict=True)
+    ]
+    begun = [[{k: tables[k] for k in changing} for tables, changing in zip(every, drawn, strict=True)] for every in episodes]
+    return {"sampled": model.sampled, "stages": [packer.stage(stage) for stage in own], "begun": begun}
+
+
+def controller(name: str, rig: Parameters, packer: Packer) -> dict[str, Any] | None:
+    """A controller whose law is compiled, for measured and for sampled positions; None where it is not."""
+    if name.startswith(f"{RESIDUAL}:"):
+        return residual(name.partition(":")[2], rig, packer)
+    try:
+        law = build_controller(name, rig)
+    except (ImportError, ValueError):
+        return None
+    return _law(law, packer) if isinstance(law, StagedController) else None
+
+
+def _law(law: StagedController, packer: Packer) -> dict[str, Any]:
+    kinds = {kind: [packer.stage(one) for one in law.law_stages(kind == "sampled")] for kind in ("measured", "sampled")}
+    return {**kinds, "damped": has_damping(law)}
+
+
+def residual(policy: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
+    """A law with a policy on top, whose stage is in a file of its own."""
+    settings = load_policy(best_policy(policy)).settings
+    law = ResidualLaw(rig, settings)
+    told = {"size": settings.size, "shown": law.shown.shape[0], "force_sensor": settings.force_sensor}
+    return {**_law(law, packer), "policy": {"file": policy_file(policy), **told}}
+
+
+def policy_file(policy: str) -> str:
+    """Where the stage of a policy is, below the folder of the rig."""
+    return f"policies/{policy}.json"
+
+
+def packed_policies(rig: Parameters, packer: Packer) -> dict[str, dict[str, Any]]:
+    """File -> the stage of every policy that comes with the package, of several seeds the best."""
+    files = {}
+    for name in shipped_names():
+        stored = load_policy(best_policy(name))
+        periods, law = policy_periods(stored.settings.policy_period, rig), ResidualLaw(rig, stored.settings)
+        stage = policy_stage(stored.network, periods, stored.settings.size, law.shown.shape[0], parameter_column(rig), 1)
+        files[policy_file(name)] = packer.stage(stage)
+    return files
+
+
+def numbers_of_the_page() -> dict[str, float]:
+    """Constants of ``birthsim_live.rig``, which the worker shares."""
+    return {
+        "least_time": bridge.LEAST_TIME, "pace": bridge.PACE, "negligible": bridge.NEGLIGIBLE,
+        "setpoint_transition": setpoints.TRANSITION, "hand_transition": hand.TRANSITION,
+        "drag_limit": hand.DRAG_LIMIT, "patience": hand.PATIENCE, "drag_damping": hand.DRAG_DAMPING,
+        "least_force": frames.LEAST_FORCE, "least_given": frames.LEAST_GIVEN,
+        "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
+    }  # fmt: skip

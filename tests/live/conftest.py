@@ -1,0 +1,46 @@
+"""A browser, a rig and a window on it, for the tests of the page."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.live import browser
+from tests.live.browser import CALM, Server, Window
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    if lack := browser.missing():
+        pytest.fail(f"CI=true, and {lack}")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright, browser.launch(playwright) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
+        yield running
+
+
+@pytest.fixture
+def window(chromium, server):
+    """A window on a rig that runs and that nobody holds."""
+    with Window(chromium, server.url + CALM) as opened:
+        opened.wait(f"birthsim.settings.controller === '{CALM.partition('=')[2]}'")
+        opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
+        yield opened
+        assert opened.complaints == []
+        assert opened.foreign == []
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """Folder for screenshots: BIRTHSIM_SCREENSHOTS, or one that pytest throws away."""
+    folder = Path(os.environ.get("BIRTHSIM_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,95 @@
+"""What the page teaches: it opens with a problem that can be seen, leads through five lessons, and is a link."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.session import Session
+from tests.live import browser
+from tests.live.browser import Server, Window
+
+LACK = browser.missing()
+pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
+
+FELT = "document.querySelector('[data-figure=\"the hand feels\"] dd').textContent"
+MARKED = "document.querySelectorAll('.look').length"
+LESSON = "document.querySelector('#guide').value"
+
+
+def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, tmp_path, pictures):
+    with Server("live", "--record-dir", tmp_path) as server, Window(chromium, server.url) as window:
+        assert window.value(LESSON) == "Feel the friction"
+        assert window.value("birthsim.settings.controller") == "backstepping"
+        assert window.value("location.search") == ""
+        assert window.value("birthsim.scene.cue")
+        assert window.value(FELT).startswith("–")
+        window.page.screenshot(path=pictures / "opens.png")
+        window.hold(across=50)
+        assert not window.value("birthsim.scene.cue")
+        window.wait(f"/^2,[1-9]\\d0 N.m, asked for 2,000$/.test({FELT})")
+        window.page.screenshot(path=pictures / "pulled.png")
+        window.page.mouse.up()
+        assert window.complaints == []
+
+
+def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window):
+    wanted = {
+        "Feel the friction": {"controller": "backstepping", "mass": 3, "stiffness_source": "scenario"},
+        "Halve the stiffness": {"controller": "backstepping", "Kclx": 1000, "Kcly": 1000, "stiffness_source": "sliders"},
+        "What the force sensor buys": {"controller": "admittance-backstepping", "stiffness_source": "scenario"},
+        "What learning adds": {"controller": "residual:circle", "scenario": "circle", "mass": 4, "friction": 1.5},
+        "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1},
+    }
+    window.page.locator("#guide").select_option("Feel the friction")
+    places = set()
+    for name, settings in wanted.items():
+        set_so = f"Object.entries({json.dumps(settings)}).every(([name, value]) => birthsim.settings[name] === value)"
+        window.wait(f"{set_so} && {LESSON} === '{name}' && {MARKED} === 1")
+        places.add(window.value("document.querySelector('.look').outerHTML.slice(0, 60)"))
+        assert window.value("document.querySelector('#lesson').textContent.split(/[.:] /).length") >= 2
+        window.page.locator("#next").click()
+    assert len(places) == len(wanted)
+    window.wait(f"{LESSON} === 'Feel the friction'")
+    window.page.locator("select[name=controller]").select_option("lqr")
+    window.wait(f"{LESSON} === 'Your own settings'")
+    window.page.locator("select[name=controller]").select_option("admittance-backstepping")
+    window.wait(f"{LESSON} === 'What the force sensor buys'")
+
+
+def test_the_settings_are_a_link(chromium, server):
+    asked = "?controller=pid&Kclx=3000&friction=0.5&scenario_force=true"
+    with Window(chromium, server.url + asked) as window:
+        window.wait("birthsim.settings.controller === 'pid' && birthsim.settings.Kclx === 3000")
+        now = window.value("birthsim.settings")
+        assert (now["friction"], now["scenario_force"], now["Kcly"]) == (0.5, True, 2000)
+        window.page.locator("select[name=sensors]").select_option("lab")
+        window.wait("location.search.includes('sensors=lab') && location.search.includes('controller=pid')")
+        window.page.locator("#guide").select_option("Feel the friction")
+        window.wait("location.search === ''")
+        assert window.complaints == []
+
+
+@pytest.mark.parametrize(("asked", "said"), [("mass=900", "mass = 900; allowed: 1.5 to 6 kg"), ("foo=1", "foo is unknown")])
+def test_a_link_that_asks_for_the_impossible_is_refused_by_name(chromium, server, asked, said):
+    with Window(chromium, f"{server.url}?{asked}") as window:
+        window.wait(f"document.querySelector('#notices').textContent.includes({said!r})")
+        assert window.value("birthsim.settings.mass") == 3
+
+
+def test_on_the_heavy_rig_of_the_lesson_the_policy_takes_three_quarters_of_the_error():
+    def error(controller):
+        session = Session(Parameters())
+        session.change({"scenario": "circle", "scenario_force": True, "mass": 4.0, "friction": 1.5, "controller": controller})
+        session.reset()
+        found = []
+        for _ in range(400):
+            session.advance(20)
+            found.append(session.frame()["error_mm"])
+        return np.sqrt(np.mean(np.square(found)))
+
+    assert 3.0 < error("backstepping") / error("residual:circle") < 5.0

@@ -1,0 +1,206 @@
+"""The page without a server in headless Chromium: a folder of files, a rig in a worker, and Python's bits."""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_live.rig.frames import COLUMNS
+from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.recording import load_recording
+from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import opening_settings
+from tests.console import run
+from tests.live import browser
+from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
+
+LACK = browser.missing() or ("" if find_spec("ziglang") else "the static page's tests need pip install 'birthsim[build]'")
+pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
+
+LARGEST = 1.5e6  # bytes
+SOONEST = 2.0  # s from the address to a rig that moves
+PERIODS = 400  # of each pair of rigs that are compared
+ROWS = """async (cases) => {
+  const { Machine } = await import(new URL("static/worker/machine.js", location));
+  const { Session } = await import(new URL("static/worker/session.js", location));
+  const { rowOf } = await import(new URL("static/worker/frames.js", location));
+  const read = async (name) => await fetch(new URL(`rig/${name}`, location));
+  const [pack, code] = [await (await read("pack.json")).json(), await (await read("loop.wasm")).arrayBuffer()];
+  const found = [];
+  for (const { settings, periods, pointer } of cases) {
+    const session = new Session(pack, await Machine.of(code));
+    const file = pack.controllers[settings.controller]?.policy?.file;
+    session.change(settings, file && (await (await read(file)).json()));
+    session.reset();
+    if (pointer) session.hands.hold = { position: pointer, id: 1 };
+    const rows = [];
+    for (let k = 0; k < periods; k += 1) {
+      session.advance(1, Infinity);
+      rows.push(...rowOf(session));
+    }
+    const bytes = new Uint8Array(Float64Array.from(rows).buffer);
+    let text = "";
+    for (let k = 0; k < bytes.length; k += 8192) text += String.fromCharCode(...bytes.subarray(k, k + 8192));
+    found.push(btoa(text));
+  }
+  return found;
+}"""
+"""Rows of every period of sessions with settings, beside the one that is shown."""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The folder, made by the command."""
+    folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
+    done = run("live", "--static", folder)
+    assert done.returncode == 0, done.stderr
+    assert f"written to {folder}" in done.stdout
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(built):
+    """Of the page on a server of files, which has it below another folder."""
+    with Folder(built.parent) as served:
+        yield f"{served}{built.name}/"
+
+
+@pytest.fixture
+def window(chromium, address):
+    with Window(chromium, address + CALM) as opened:
+        opened.wait("birthsim.settings.controller === 'admittance-backstepping'")
+        yield opened
+        assert opened.complaints == []
+        assert opened.foreign == []
+
+
+def same(found, expected):
+    """Whether two arrays have the same bits, apart from those of NaN."""
+    return bool(np.all((found == expected) | (np.isnan(found) & np.isnan(expected))))
+
+
+def rows_of(settings, periods, pointer=None):
+    """Rows of every period of a session in Python, (periods, COLUMNS); a hand at ``pointer``, m, pulls from the start."""
+    rig = load_parameters(None)
+    session = Session(rig, opening_settings(rig))
+    session.change(settings)
+    session.reset()
+    session.hands.hold = Hold(np.array(pointer), 1) if pointer else None
+    rows = np.empty((periods, COLUMNS))
+    for row in rows:
+        session.advance(1)
+        row[:] = session.row()
+    return rows
+
+
+def test_the_folder_is_small_and_the_rig_moves_soon(chromium, built, address):
+    assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
+    soonest = []
+    for _ in range(3):  # a busy machine may be late once
+        with Window(chromium, address) as window:
+            soonest.append(window.wait("birthsim.monitor.first"))
+    assert min(soonest) < 1e3 * SOONEST
+
+
+def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(window):
+    offered = window.value("birthsim.hello.choices.controller.filter(({ missing }) => !missing).map(({ name }) => name)")
+    assert {"backstepping", "admittance-backstepping", "lqr", "residual:circle", "residual:circle_lab"} <= set(offered)
+    pushed = {"scenario_force": True}
+    cases = [{"scenario": name, "sensors": sensors} for name in SCENARIOS for sensors in SENSORS]
+    cases += [
+        {"scenario": "circle", "controller": name, "sensors": sensors} for name in offered for sensors in ("ideal", "lab")
+    ]
+    cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
+    several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
+    several += [{"settings": {}, "periods": PERIODS, "pointer": place} for place in ([0.56, 0.02], [0.7, -0.2])]
+    texts = window.page.evaluate(ROWS, several)
+    for one, text in zip(several, texts, strict=True):
+        found = np.frombuffer(base64.b64decode(text)).reshape(-1, COLUMNS)
+        assert same(found, rows_of(**one)), one["settings"]
+
+
+def test_displacement_is_force_over_stiffness(window):
+    spring = window.page.locator("#set-drag_stiffness")
+    spring.press("Home")
+    window.wait("birthsim.settings.drag_stiffness === birthsim.hello.ranges.drag_stiffness.min")
+    window.hold(across=90)
+    frame = window.settle(least=10)
+    assert displacement(frame)[0] > 5e-3
+    assert displacement(frame)[0] == pytest.approx(rendered(frame)[0], rel=0.1)
+    window.page.mouse.up()
+    window.wait("birthsim.frame.pointer === null && Math.hypot(...birthsim.frame.force) === 0")
+    drawn = window.value("birthsim.monitor.report().drawn")
+    window.wait(f"birthsim.monitor.report().drawn > {drawn + 20} && birthsim.frame.real_time > 0.5")
+
+
+def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
+    page = window.page
+    page.locator("select[name=scenario]").select_option("circle")
+    page.locator("input[name=scenario_force]").check()
+    window.wait("birthsim.settings.scenario === 'circle' && birthsim.settings.scenario_force")
+    window.live(0.3)
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording !== null")
+    page.locator("#reset").click()
+    window.wait("birthsim.frame.time < 0.3")
+    window.wait("birthsim.frame.time > 1.5")
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording === null && birthsim.state.last_recording !== null")
+    with page.expect_download() as download:
+        page.locator("#download").click()
+    download.value.save_as(tmp_path / "circle.rec")
+    recording = load_recording(tmp_path / "circle.rec")
+    begun = int(np.argmin(recording.rows[:, 0]))
+    rows = recording.rows[begun:]
+    assert len(rows) > 300
+    instants = np.round(rows[:, 0] / 0.001).astype(int)
+    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2]}
+    expected = rows_of(settings, int(instants[-1]))
+    moved = instants > 0
+    assert same(rows[moved], expected[instants[moved] - 1])
+
+
+def test_every_choice_runs_in_the_window(window):
+    for name in ("scenario", "controller", "valves", "sensors"):
+        choices = window.value(f"birthsim.hello.choices.{name}.filter((c) => !c.missing).map((c) => c.name ?? c)")
+        for choice in choices:
+            window.page.locator(f"select[name={name}]").select_option(choice)
+            window.wait(f"birthsim.settings.{name} === {choice!r}")
+            begun = window.frame()
+            window.wait(f"birthsim.frame.time > {begun['time'] + 0.1} || birthsim.frame.lost")
+            assert window.frame()["lost"] is None, (name, choice)
+
+
+def test_what_is_not_allowed_is_named_and_changes_nothing(chromium, address):
+    with Window(chromium, address, NARROW) as window:
+        before = window.value("birthsim.settings")
+        window.page.evaluate("() => window.birthsim.send({ type: 'set', settings: { mass: 900 } })")
+        window.wait("document.querySelector('#notices').textContent.includes('mass = 900; allowed: 1.5 to 6 kg')")
+        assert window.value("birthsim.settings") == before
+
+
+def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
+    folder = tmp_path / "page"
+    shutil.copytree(built, folder)
+    (folder / "rig" / "loop.wasm").unlink()
+    with Folder(folder) as served:
+        page = chromium.new_page()
+        page.goto(served)
+        page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
+        page.close()
+
+
+def test_a_folder_with_something_in_it_is_refused(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    done = run("live", "--static", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
