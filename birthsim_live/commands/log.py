@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_live.logs.reading import read_log
-from birthsim_live.logs.writing import WRITERS, write_log
+from baselines.logs.writing import WRITERS, write_log
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from baselines.bench.evaluation import TRACE
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.logs.log import Column, Event, Log, Series
+from baselines.logs.log import Column, Event, Log, Series
 from birthsim_live.rig.frames import SLICES
 from birthsim_live.rig.recording import EVENTS, SUFFIX, load_recording
 

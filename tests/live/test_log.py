@@ -14,8 +14,9 @@ from baselines.bench import pieces
 from baselines.work import tasks
 from baselines.work.files import write_json
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.logs import reading, writing
-from birthsim_live.logs.log import Log
+from baselines.logs import writing
+from birthsim_live.logs import reading
+from baselines.logs.log import Log
 from birthsim_live.rig import frames
 from birthsim_live.rig.recording import load_recording
 from tests.console import call

@@ -1,0 +1,112 @@
+"""The start states of windows, eliminated: for given parameters each window begins where its measurements say.
+
+A start state has 14 free numbers, in the order of ``windows.FREE``. They are found by Gauss-Newton steps with what is known of
+them beforehand, ``SPREAD`` about the guess, in the measurements' company: rows of residuals over their standard deviations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.identification.prediction import predict
+from baselines.identification.windows import FREE, Windows
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+
+SPREAD = np.array([5e-3, 0.1, 5e-3, 0.1, 2e-4, 2e-4, *[2e4] * 4, *[12.0] * 4])
+"""m, m/s, m, m/s, bristles m, Pa, K: standard deviations of a start state about its guess, assumed."""
+
+DIFFERENCE = 1e-4
+"""Step of differences, in ``SPREAD``."""
+
+CLOSE = 3e-2
+"""Where a step moves every window's start by less than this many standard deviations the search ends."""
+
+SHRINKS = 0.5
+"""A step longer than this fraction of the one before asks for new slopes."""
+
+MOST_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of what is measured: pressures, Pa, and positions, m."""
+
+    pressure: float
+    position: float
+
+
+def residuals(windows: Windows, noise: Noise, pressures: Array, positions: Array) -> Array:
+    """Measured less predicted, over the noise, (V, W, R): pressures (V, W, K, 4), then positions (V, W, F, 2)."""
+    shape = (*pressures.shape[:2], -1)
+    first = (windows.pressures - pressures) / noise.pressure
+    second = np.where(windows.valid[..., None], (windows.positions - positions) / noise.position, 0.0)
+    return np.concatenate([first.reshape(shape), second.reshape(shape)], axis=2)
+
+
+def predicted(windows: Windows, noise: Noise, rigs: list[Parameters], free: Array) -> Array:
+    """Residuals (V, W, R + 14) for V rigs and free start states (V, W, 14) in units of ``SPREAD`` about the guess."""
+    states = np.repeat(windows.state[:, None], len(rigs), axis=1)
+    states[list(FREE)] += (free * SPREAD).transpose(2, 0, 1)
+    pressures, positions, _ = predict(windows, rigs, states)
+    return np.concatenate([residuals(windows, noise, pressures, positions), -free], axis=2)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """How residuals (W, R + 14) follow the free start states: an orthonormal basis (W, R + 14, 14) of what these can explain,
+    and a triangle (W, 14, 14) with basis @ triangle the derivatives."""
+
+    basis: Array
+    triangle: Array
+
+    def step(self, residual: Array) -> tuple[Array, Array]:
+        """Gauss-Newton steps (W, 14) for residuals (W, R + 14), and their lengths (W,) in standard deviations."""
+        along = self.explained(residual[..., None])
+        return -np.linalg.solve(self.triangle, along)[..., 0], np.linalg.norm(along[..., 0], axis=1)
+
+    def explained(self, columns: Array) -> Array:
+        """Coordinates (W, 14, C) in the basis of columns (W, R + 14, C)."""
+        return np.asarray(self.basis.transpose(0, 2, 1) @ columns)
+
+    def unexplained(self, columns: Array) -> Array:
+        """What start states cannot explain of columns (W, R + 14, C)."""
+        return np.asarray(columns - self.basis @ self.explained(columns))
+
+
+def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Slopes:
+    """The slopes at start states ``free`` (W, 14)."""
+    count = len(FREE)
+    several = np.repeat(free[None], 1 + count, axis=0)
+    several[1:] += DIFFERENCE * np.eye(count)[:, None]
+    found = predicted(windows, noise, [rig] * (1 + count), several)
+    return Slopes(*np.linalg.qr((found[1:] - found[0]).transpose(1, 2, 0) / DIFFERENCE))
+
+
+def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:
+    """Start states (W, 14) that fit best under a rig, and residuals (W, R + 14) with them.
+
+    The search goes on from ``free``, first with given ``slopes``. A window that a step does not make better takes a shorter
+    one, and one whose steps do not shrink gets new slopes.
+    """
+    free, residual = free.copy(), predicted(windows, noise, [rig], free[None])[0]
+    left, part, scale = np.arange(len(free)), windows, np.ones(len(free))
+    slopes = slopes or slopes_at(windows, noise, rig, free)
+    for _ in range(MOST_STEPS):
+        step, length = slopes.step(residual[left])
+        away = length > CLOSE
+        if not away.any():
+            break
+        trial = free[left] + scale[left, None] * step
+        found = predicted(part, noise, [rig], trial[None])[0]
+        better = np.sum(found**2, axis=1) <= np.sum(residual[left] ** 2, axis=1)
+        free[left[better]], residual[left[better]] = trial[better], found[better]
+        scale[left] = np.where(better, np.minimum(1.0, 2.0 * scale[left]), 0.25 * scale[left])
+        slow = away & ~(slopes.step(residual[left])[1] < SHRINKS * length)
+        if slow.any():
+            left = left[slow]
+            part = windows.some(left)
+            slopes = slopes_at(part, noise, rig, free[left])
+    return free, residual
