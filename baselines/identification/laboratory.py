@@ -77,7 +77,9 @@ def _measured(models: Sequence[Any], tick: int, now: float, plant: Plant) -> Mea
     """What the sensors of all lanes say, one model a lane."""
     motion, pressures, clock = plant.end_effector(), plant.pressures, np.full(1, now)
     said = [
-        model.measure(np.full(1, tick), clock, *(np.ascontiguousarray(a[:, [k]]) for a in (motion, pressures)), np.zeros((2, 1)))
+        model.measure(
+            np.full(1, tick), clock, *(np.ascontiguousarray(a[:, [k]]) for a in (motion, pressures)), np.zeros((2, 1))
+        )
         for k, model in enumerate(models)
     ]
 

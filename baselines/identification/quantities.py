@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import Parameters, field_of, least_dead_volume
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,6 @@ class Quantity:
     def value(self, coordinate: float) -> float:
         """The value at a coordinate."""
         return coordinate * self.unit if self.unit else self.floor + math.exp(coordinate)
-
-    def limits(self) -> tuple[float, float]:
-        """The least and the largest coordinate that the rig's description allows."""
-        about = field_of(self.name).metadata
-        low, high = max(about["least"], about["above"]), about["most"]
-        if self.unit:
-            return low / self.unit, high / self.unit
-        return (math.log(max(low - self.floor, 1e-12)), math.log(high - self.floor))
 
 
 LATENCY = "electronics.position_latency"
@@ -61,6 +53,24 @@ QUANTITIES = (
     Quantity(LATENCY, 1.0, unit=0.005),
 )
 """What is identified."""
+
+
+FURTHEST = 3.5
+"""Spreads from the owner's value within which a parameter is looked for."""
+
+INSIDE = 1e-3
+"""Coordinates by which the search stays within what the rig's description allows, more than a step of differences."""
+
+
+def limits(rig: Parameters, quantities: tuple[Quantity, ...]) -> tuple[Array, Array]:
+    """The least and the largest coordinates (Q,) that are looked at, for the rig as its owner describes it."""
+    low, high = [], []
+    for one, centre in zip(quantities, coordinates(rig, quantities), strict=True):
+        about = field_of(one.name).metadata
+        least = max(about["least"], about["above"], least_dead_volume(rig) if one.name == "chambers.dead_volume" else -math.inf)
+        low.append(max(one.coordinate(least) + INSIDE, centre - FURTHEST * one.spread))
+        high.append(min(one.coordinate(about["most"]) - INSIDE, centre + FURTHEST * one.spread))
+    return np.array(low), np.array(high)
 
 
 def coordinates(rig: Parameters, quantities: tuple[Quantity, ...]) -> Array:

@@ -61,7 +61,7 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH) -> Windows:
     period, rows = trial.period, len(trial.times)
     k, margin = max(8, round(length / period)), round(0.1 / period)
     starts = np.arange(margin, rows - margin - k, k)
-    fresh = np.flatnonzero(np.any(np.diff(trial.positions, axis=1) != 0, axis=0)) + 1
+    fresh = fresh_rows(trial)
     lag = round(rig.electronics.position_latency / period)
     own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
     most = max(map(len, own))
@@ -71,6 +71,11 @@ def cut(trial: Trial, rig: Parameters, length: float = LENGTH) -> Windows:
     pressures = np.stack([trial.pressures[:, s : s + k].T for s in starts])
     positions = trial.positions.T[starts[:, None] + arrived]
     return Windows(trial, k, starts, arrived, valid, pressures, positions, _guess(trial, rig, starts, fresh))
+
+
+def fresh_rows(trial: Trial) -> NDArray[np.intp]:
+    """Rows at which a position sample has newly arrived: the position is another than in the row before."""
+    return np.flatnonzero(np.any(np.diff(trial.positions, axis=1) != 0, axis=0)) + 1
 
 
 def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArray[np.intp]) -> Array:
