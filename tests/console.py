@@ -14,7 +14,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 COMMANDS = {
-    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "stability", "bench", "verify", "identify")},
+    **{
+        name: f"baselines.commands.{name}"
+        for name in ("figure4", "animate", "tune", "stability", "bench", "verify", "identify")
+    },
     "haptics": "baselines.commands.haptics",
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},

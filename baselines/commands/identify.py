@@ -28,8 +28,8 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim-identify",
-        description="Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and write "
-        "the rig as TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.",
+        description="Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and "
+        "write the rig as TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.",
     )
     parser.add_argument(
         "log", nargs="?", type=Path, help=".csv, .parquet or .mcap: time, openings, pressures, positions, forces"

@@ -1,8 +1,8 @@
 """How well a fit knows its parameters, and what it cannot tell.
 
-Two standard deviations of every coordinate are worked out: that of the noise (the inverse of J'J), and that of the scores of the
-windows (J'J)^-1 (sum of s s') (J'J)^-1, s = J'r of a window, which also grows where the model misses something that lasts longer
-than a sample (White, Econometrica 1982; windows in the place of observations). The larger one counts.
+Two standard deviations of every coordinate are worked out. One is that of the noise, from (J'J)^-1. The other comes from the
+scores s = J'r of the windows, (J'J)^-1 (sum of s s') (J'J)^-1: it also grows where the model misses something that lasts longer
+than a sample (White, Econometrica 1982, with windows in the place of observations). The larger one counts.
 """
 
 from __future__ import annotations

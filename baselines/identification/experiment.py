@@ -64,7 +64,7 @@ def propose(rig: Parameters, duration: float, seed: int = 0) -> Plan:
     """An experiment of ``duration`` s for a rig, known as far as its strokes; ``seed`` draws phases and added openings."""
     checked_number("duration", duration, "s", least=SHORTEST, most=LONGEST)
     rng = np.random.default_rng(seed)
-    times = GRID * np.arange(round(duration / GRID) + 1)
+    times: Array = GRID * np.arange(round(duration / GRID) + 1, dtype=np.float64)
     ramp = np.clip(np.minimum(times, times[-1] - times) / RISE, 0.0, 1.0)
     ramp = ramp**3 * (10 - 15 * ramp + 6 * ramp**2)
     piston = np.array([_multisine(times, 0.5 * one.stroke, rng) * ramp for one in (rig.cylinder1, rig.cylinder2)])

@@ -54,7 +54,7 @@ class Identified:
 
     @property
     def misfit(self) -> tuple[float, float]:
-        """Residuals over the noise that third differences show, of pressures and positions: more than 1.2 is more than noise."""
+        """Residuals of pressures and positions over the noise that third differences show."""
         return self.noise.pressure / self.quick_noise.pressure, self.noise.position / self.quick_noise.position
 
     def words(self) -> list[str]:

@@ -76,15 +76,15 @@ def run_plan(
 def _measured(models: Sequence[Any], tick: int, now: float, plant: Plant) -> Measurement:
     """What the sensors of all lanes say, one model a lane."""
     motion, pressures, clock = plant.end_effector(), plant.pressures, np.full(1, now)
-    said = [
-        model.measure(
-            np.full(1, tick), clock, *(np.ascontiguousarray(a[:, [k]]) for a in (motion, pressures)), np.zeros((2, 1))
-        )
-        for k, model in enumerate(models)
-    ]
+    said: list[Measurement] = []
+    for k, model in enumerate(models):
+        lane = (np.ascontiguousarray(values[:, [k]]) for values in (motion, pressures))
+        said.append(model.measure(np.full(1, tick), clock, *lane, np.zeros((2, 1))))
 
     def joined(name: str) -> Array:
         return np.concatenate([getattr(one, name) for one in said], axis=-1)
 
-    names = ("time", "position", "position_time", "velocity", "pressures", "user_force")
-    return Measurement(*map(joined, names), said[0].sampled)
+    return Measurement(
+        joined("time"), joined("position"), joined("position_time"), joined("velocity"), joined("pressures"),
+        joined("user_force"), said[0].sampled,
+    )  # fmt: skip

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
-from baselines.bench.statistics import quantile
 from baselines.identification.experiment import propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
-from baselines.identification.quantities import QUANTITIES, value_of
+from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import draw_parameters
@@ -61,24 +56,3 @@ def recover(seed: int, duration: float) -> Result:
 def recovery_tasks(rigs: int, seed: int, duration: float) -> list[Task]:
     """A piece per rig, with seeds from ``seed`` on."""
     return [Task(f"rig_{k}", "rigs", recover, {"seed": k, "duration": duration}) for k in range(seed, seed + rigs)]
-
-
-def recovery_table(results: list[dict[str, Any]]) -> list[str]:
-    """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
-    lines = [
-        "| parameter | drawn from | told in | error: median | 95 % | largest | half interval: median | true value inside |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for one in QUANTITIES:
-        rows = [result["rows"][one.name] for result in results]
-        told = [row for row in rows if row["told"]]
-        low, high = RANGES[one.name]
-        scale, unit, digits = (1e3, "ms", 2) if one.unit else (100.0, "%", 2)
-        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.unit else row["true"]) for row in told]
-        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.unit else row["true"]) for row in told]
-        cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
-        inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
-        written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
-        ranges = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
-        lines.append(f"| `{one.name}` | {ranges} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
-    return lines

@@ -78,7 +78,8 @@ class Slopes:
     def step(self, residual: Array) -> tuple[Array, Array]:
         """Gauss-Newton steps (W, 14) for residuals (W, R + 14), and their lengths (W,) in standard deviations."""
         along = self.explained(residual[..., None])
-        return -np.linalg.solve(self.triangle, along)[..., 0], np.linalg.norm(along[..., 0], axis=1)
+        step = np.asarray(-np.linalg.solve(self.triangle, along)[..., 0], dtype=np.float64)
+        return step, np.asarray(np.linalg.norm(along[..., 0], axis=1))
 
     def explained(self, columns: Array) -> Array:
         """Coordinates (W, 14, C) in the basis of columns (W, R + 14, C)."""
@@ -98,7 +99,7 @@ def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> S
     slopes = np.ascontiguousarray((found[1:] - found[0]).transpose(1, 2, 0)) / DIFFERENCE
     # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
     triangle = np.linalg.cholesky(slopes.transpose(0, 2, 1) @ slopes).transpose(0, 2, 1)
-    return Slopes(slopes @ np.linalg.inv(triangle), triangle)
+    return Slopes(np.asarray(slopes @ np.linalg.inv(triangle), dtype=np.float64), triangle)
 
 
 def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:

@@ -98,7 +98,7 @@ def _read_mcap(path: Path) -> Table:
         raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
     rows: dict[str, list[dict[str, Any]]] = {}
     try:
-        for _, channel, message in make_reader(io.BytesIO(content)).iter_messages():  # type: ignore[no-untyped-call]
+        for _, channel, message in make_reader(io.BytesIO(content)).iter_messages():
             if channel.message_encoding != "json":
                 raise ValueError(f"channel {channel.topic} has messages in {channel.message_encoding}; allowed: json")
             said = json.loads(message.data)
