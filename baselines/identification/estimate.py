@@ -15,7 +15,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from baselines.identification.noise import guessed_noise, noise_from
 from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
-from baselines.identification.starts import Noise, Slopes, begun_anew, predicted, settle, slopes_at
+from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
 from baselines.identification.windows import FREE, Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
@@ -32,6 +32,9 @@ MOST = (40, 15)
 
 DIFFERENCE = 1e-5
 """Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
+
+MOVED, MOST_ROUNDS = 0.05, 3
+"""A search is repeated where noise moves by more than this fraction, or the latency by half a period; so many at most."""
 
 Tick = Callable[[], object]
 
@@ -109,7 +112,7 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
     inside = np.clip(theta, low + 1e-6, high - 1e-6)
     found: OptimizeResult = least_squares(
         problem.residuals, inside, problem.jacobian, bounds=(low, high), x_scale=problem.spread, max_nfev=most, ftol=1e-5,
-        xtol=1e-4,
+        xtol=1e-4, tr_solver="lsmr",
     )  # fmt: skip
     if problem.slopes is None or not np.isfinite(found.cost):
         raise ValueError("the rig's parameters predict nothing of the log; allowed: parameters nearer to the laboratory's rig")
@@ -131,16 +134,27 @@ def fit(
 
 
 def refine(trial: Trial, first: Fit, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick = lambda: None) -> Fit:
-    """The second search, with all of a trial, for ``quantities``: once to know noise and latency better, once with these.
+    """The second search, with all of a trial, for ``quantities``, repeated while it moves noise or latency (``MOVED``)
+    or leaves windows that fit worse than others.
 
     What is not among ``quantities`` has the owner's value.
     """
     found = first
-    for _ in range(2):
+    for _ in range(MOST_ROUNDS):
+        before = found
         problem = Problem(cut(trial, found.rig), found.noise, owner, quantities, tick)
         problem.begin_anew(found.rig)
         found = search(problem, coordinates(found.rig, quantities), MOST[1])
+        if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
+            break
     return found
+
+
+def _is_close(before: Fit, found: Fit, period: float) -> bool:
+    """Whether noise and latency are those with which a search was made."""
+    late = abs(found.rig.electronics.position_latency - before.rig.electronics.position_latency)
+    pairs = ((found.noise.pressure, before.noise.pressure), (found.noise.position, before.noise.position))
+    return late < 0.5 * period and all(abs(one / other - 1.0) < MOVED for one, other in pairs)
 
 
 def _spread_out(windows: Windows) -> Windows:

@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baselines.identification.prediction import predict
 from baselines.identification.windows import FREE, Windows
@@ -81,6 +82,10 @@ class Slopes:
         step = np.asarray(-np.linalg.solve(self.triangle, along)[..., 0], dtype=np.float64)
         return step, np.asarray(np.linalg.norm(along[..., 0], axis=1))
 
+    def some(self, chosen: NDArray[np.bool_]) -> Slopes:
+        """Those of some windows (W,)."""
+        return Slopes(self.basis[chosen], self.triangle[chosen])
+
     def explained(self, columns: Array) -> Array:
         """Coordinates (W, 14, C) in the basis of columns (W, R + 14, C)."""
         return np.asarray(self.basis.transpose(0, 2, 1) @ columns)
@@ -92,6 +97,10 @@ class Slopes:
 
 def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Slopes:
     """The slopes at start states ``free`` (W, 14)."""
+    return Slopes(*_slopes(windows, noise, rig, free))
+
+
+def _slopes(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> tuple[Array, Array]:
     count = len(FREE)
     several = np.repeat(free[None], 1 + count, axis=0)
     several[1:] += DIFFERENCE * np.eye(count)[:, None]
@@ -99,7 +108,8 @@ def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> S
     slopes = np.ascontiguousarray((found[1:] - found[0]).transpose(1, 2, 0)) / DIFFERENCE
     # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
     triangle = np.linalg.cholesky(slopes.transpose(0, 2, 1) @ slopes).transpose(0, 2, 1)
-    return Slopes(np.asarray(slopes @ np.linalg.inv(triangle), dtype=np.float64), triangle)
+    basis = slopes @ np.linalg.inv(triangle)
+    return np.asarray(basis, dtype=np.float64), np.asarray(triangle, dtype=np.float64)
 
 
 def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:
@@ -109,43 +119,50 @@ def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes:
     one, and one whose steps do not shrink gets new slopes.
     """
     free, residual = free.copy(), predicted(windows, noise, [rig], free[None])[0]
-    left, part, scale = np.arange(len(free)), windows, np.ones(len(free))
     slopes = slopes or slopes_at(windows, noise, rig, free)
+    left, part, scale = np.arange(len(free)), windows, np.ones(len(free))
     for _ in range(MOST_STEPS):
         step, length = slopes.step(residual[left])
         away = length > CLOSE
         if not away.any():
             break
+        left, part, slopes, step, length = left[away], part.some(away), slopes.some(away), step[away], length[away]
         trial = free[left] + scale[left, None] * step
         found = predicted(part, noise, [rig], trial[None])[0]
         better = np.sum(found**2, axis=1) <= np.sum(residual[left] ** 2, axis=1)
         free[left[better]], residual[left[better]] = trial[better], found[better]
         scale[left] = np.where(better, np.minimum(1.0, 2.0 * scale[left]), 0.25 * scale[left])
-        slow = away & ~(slopes.step(residual[left])[1] < SHRINKS * length)
+        slow = ~(slopes.step(residual[left])[1] < SHRINKS * length)
         if slow.any():
-            left = left[slow]
-            part = windows.some(left)
-            slopes = slopes_at(part, noise, rig, free[left])
+            slopes.basis[slow], slopes.triangle[slow] = _slopes(part.some(slow), noise, rig, free[left[slow]])
     return free, residual
+
+
+def outliers(residual: Array) -> NDArray[np.bool_]:
+    """Windows (W,) whose residuals (W, R + 14) are more than ``WORSE`` times those of the median window."""
+    costs = np.sum(residual**2, axis=1)
+    return ~(costs <= WORSE * np.median(costs))
 
 
 def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Array:
     """Start states (W, 14) that fit a rig at least as well as what ``free`` leads to.
 
-    A guess from measurements may have a bristle bent the wrong way, from which no small step leads out. Windows that fit worse
-    than ``WORSE`` times the median are tried from where the window before ends, and with all signs of both bristles.
+    A guess from measurements may have a bristle bent the wrong way, from which no small step leads out. The ``outliers``
+    are tried from where the window before ends, and with all signs of both bristles.
     """
     best, residual = settle(windows, noise, rig, free, None)
     costs = np.sum(residual**2, axis=1)
-    bad = np.flatnonzero(~(costs <= WORSE * np.median(costs)))
+    bad = np.flatnonzero(outliers(residual))
     if not len(bad):
         return best
     _, _, ends = predict(windows, [rig], states_of(windows, best[None]))
     before = (ends[:, 0] - np.roll(windows.state, -1, axis=1))[list(FREE)] / SPREAD[:, None]
     part, tries = windows.some(bad), [np.nan_to_num(np.roll(before, 1, axis=1).T[bad])]
     column = parameter_column(rig)
-    for signs in itertools.product((-1.0, 0.0, 1.0), repeat=2):
-        bent = best[bad].copy()
+    for signs, others in itertools.product(
+        itertools.product((-1.0, 0.0, 1.0), repeat=2), (best[bad], np.zeros_like(best[bad]))
+    ):
+        bent = others.copy()
         for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, (at.FC1, at.FC2), signs, strict=True):
             bent[:, free_row] = (sign * column[level] / column[at.BRISTLE_S0] - part.state[row]) / SPREAD[free_row]
         tries.append(bent)

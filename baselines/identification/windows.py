@@ -48,8 +48,8 @@ class Windows:
     positions: Array
     state: Array
 
-    def some(self, chosen: NDArray[np.intp]) -> Windows:
-        """The windows with the numbers ``chosen``."""
+    def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
+        """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
         return Windows(
             self.trial, self.length, self.starts[chosen], self.arrived[chosen], self.valid[chosen], self.pressures[chosen],
             self.positions[chosen], self.state[:, chosen],
