@@ -141,7 +141,7 @@ def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes:
 def outliers(residual: Array) -> NDArray[np.bool_]:
     """Windows (W,) whose residuals (W, R + 14) are more than ``WORSE`` times those of the median window."""
     costs = np.sum(residual**2, axis=1)
-    return ~(costs <= WORSE * np.median(costs))
+    return np.asarray(~(costs <= WORSE * np.median(costs)))
 
 
 def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Array:

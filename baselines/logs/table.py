@@ -56,13 +56,19 @@ def read_csv(path: Path) -> Table:
     if not lines:
         raise ValueError(f"{source} is empty; allowed: a line of names, then lines of numbers")
     names = [name.strip() for name in lines[0][1]]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{source} has two columns {twice!r}; allowed: one of each name")
     rows = np.empty((len(lines) - 1, len(names)))
     for row, (number, line) in zip(rows, lines[1:], strict=True):
         try:
-            row[:] = [float(value) if value.strip() else np.nan for value in line]
+            numbers = [float(value) if value.strip() else np.nan for value in line]
         except ValueError:
+            numbers = []
+        if len(numbers) != len(names):
             words = f"allowed: {len(names)} numbers, for {', '.join(names)}"
-            raise ValueError(f"{source}, line {number}: {shown(','.join(line))}; {in_line(words)}") from None
+            raise ValueError(f"{source}, line {number}: {shown(','.join(line))}; {in_line(words)}")
+        row[:] = numbers
     return Table(source, dict(zip(names, rows.T, strict=True)))
 
 
@@ -92,7 +98,6 @@ def _read_mcap(path: Path) -> Table:
     source = f"log = {str(path)!r}"
     content = read("log", path, LARGEST)
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
     except ImportError as error:
         raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
@@ -103,7 +108,8 @@ def _read_mcap(path: Path) -> Table:
                 raise ValueError(f"channel {channel.topic} has messages in {channel.message_encoding}; allowed: json")
             said = json.loads(message.data)
             rows.setdefault(channel.topic, []).append({"log_time": 1e-9 * message.log_time, **said})
-    except (McapError, ValueError, OSError, EOFError, AttributeError) as error:
+    except Exception as error:
+        # Damage trips mcap, struct, its compressors and json in a dozen ways.
         raise ValueError(f"{source} cannot be read as MCAP ({problem(error)})") from error
     longest = max(rows.values(), key=len, default=[])
     names = [name for name, value in longest[0].items() if isinstance(value, (int, float))] if longest else []
