@@ -81,14 +81,22 @@ MISFIT = 1.2
 """Residuals so many times larger than the noise are named."""
 
 
+REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance", "mechanics.mode_frequency")
+"""Options of a rig with states that no log holds at the start of a window."""
+
+
 def identify(
     trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
 ) -> Identified:
     """The rig of a trial, as far as the trial tells it; all else is the owner's.
 
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
-    of the fit of all, which knows how far the owner may be wrong.
+    of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
+    ``REMEMBER``.
     """
+    given = [name for name in REMEMBER if value_of(owner, name)]
+    if given:
+        raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
     whole = fit(trial, owner, seed, quantities, tick)
     certainty = certainty_of(whole)
     told = tuple(one for one, tells in zip(quantities, certainty.tells, strict=True) if tells)

@@ -159,16 +159,15 @@ def begun_anew(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> 
     before = (ends[:, 0] - np.roll(windows.state, -1, axis=1))[list(FREE)] / SPREAD[:, None]
     part, tries = windows.some(bad), [np.nan_to_num(np.roll(before, 1, axis=1).T[bad])]
     column = parameter_column(rig)
-    for signs, others in itertools.product(
-        itertools.product((-1.0, 0.0, 1.0), repeat=2), (best[bad], np.zeros_like(best[bad]))
-    ):
+    signs_of_both = itertools.product((-1.0, 0.0, 1.0), repeat=2)
+    for signs, others in itertools.product(signs_of_both, (best[bad], np.zeros_like(best[bad]))):
         bent = others.copy()
         for row, free_row, level, sign in zip(BRISTLES, BRISTLE_ROWS, (at.FC1, at.FC2), signs, strict=True):
             bent[:, free_row] = (sign * column[level] / column[at.BRISTLE_S0] - part.state[row]) / SPREAD[free_row]
         tries.append(bent)
-    for start in tries:
-        found, left = settle(part, noise, rig, start, None)
-        cost = np.sum(left**2, axis=1)
-        better = cost < costs[bad]
-        best[bad[better]], costs[bad[better]] = found[better], cost[better]
+    found, left = settle(windows.some(np.tile(bad, len(tries))), noise, rig, np.concatenate(tries), None)
+    cost = np.sum(left**2, axis=1).reshape(len(tries), -1)
+    chosen, each = np.argmin(cost, axis=0), np.arange(len(bad))
+    better = cost[chosen, each] < costs[bad]
+    best[bad[better]] = found.reshape(len(tries), len(bad), -1)[chosen, each][better]
     return best

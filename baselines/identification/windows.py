@@ -111,13 +111,13 @@ def _parabola(times: Array, values: Array) -> tuple[float, float]:
     return float(found[0]), float(found[1] / scale)
 
 
-def spools_at(trial: Trial, starts: NDArray[np.intp], column: Array) -> Array:
-    """Openings of the spools (4, W) at rows ``starts``: the integrator's answer to the openings before, from rest."""
-    opening = admitted_openings(trial, column)
-    steps = steps_in(trial.period)
-    h = trial.period / steps * column[at.SPOOL_RATE]
+def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: float) -> Array:
+    """Openings of the spools (4, W) at rows ``starts``: the integrator's answer to the openings (4, T) before, from rest, of
+    spools of a ``rate``, 1/s."""
+    steps = steps_in(period)
+    h = period / steps * rate
     kept = (1.0 - h * (1.0 - h * (0.5 - h * (1.0 / 6.0 - h / 24.0)))) ** steps
-    before = np.concatenate([np.zeros((4, 1)), opening[:, :-1]], axis=1)
+    before = np.concatenate([np.zeros((4, 1)), openings[:, :-1]], axis=1)
     return np.asarray(lfilter([1.0 - kept], [1.0, -kept], before, axis=1)[:, starts])
 
 

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from baselines.identification.prediction import predict
+from baselines.identification.trial import Trial
 from baselines.identification.windows import Windows, cut, fresh_rows, spools_at
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.identification.trials import OWNER, TRUE, trial
+
+
+def spools_before(whole: Trial, starts: NDArray[np.intp], rig: Parameters) -> Array:
+    return spools_at(whole.openings, whole.period, starts, 1.0 / rig.valves.time_constant)
 
 
 def few(length: float = 0.05) -> Windows:
@@ -35,7 +41,7 @@ def test_every_window_and_rig_is_the_plant_alone() -> None:
     states = np.repeat(windows.state[:, None], 2, axis=1)
     pressures, positions, ends = predict(windows, rigs, states)
     for v, rig in enumerate(rigs):
-        spools = spools_at(windows.trial, windows.starts, parameter_column(rig))
+        spools = spools_before(windows.trial, windows.starts, rig)
         for w in range(2):
             start = windows.state[:, w].copy()
             start[list(at.SPOOLS)] = spools[:, w]
@@ -62,8 +68,8 @@ def test_a_latency_between_two_periods_is_interpolated() -> None:
 
 
 def test_spools_follow_from_the_openings_before() -> None:
-    whole, column = trial(), parameter_column(TRUE)
-    found = spools_at(whole, np.array([0, 40, 200]), column)
+    whole = trial()
+    found = spools_before(whole, np.array([0, 40, 200]), TRUE)
     plant = Plant(TRUE, 1)
     state = plant.state.copy()
     state[list(at.SPOOLS)] = 0.0
@@ -107,7 +113,7 @@ def test_derivatives_are_those_of_another_integrator() -> None:
         rigs = [OWNER, OWNER.replace({name: value * (1 + 1e-5)})]
         pressures, _, _ = predict(windows, rigs, np.repeat(windows.state[:, None], 2, axis=1))
         ours = (pressures[1, 0] - pressures[0, 0]) / 1e-5
-        start[list(at.SPOOLS)] = spools_at(windows.trial, windows.starts, parameter_column(OWNER))[:, 0]
+        start[list(at.SPOOLS)] = spools_before(windows.trial, windows.starts, OWNER)[:, 0]
         sides = [integrated(windows, OWNER.replace({name: value + sign * step}), start, windows.length) for sign in (1.0, -1.0)]
         theirs = (sides[0] - sides[1]) / (2 * step) * value
         # Runge-Kutta steps of 0.25 ms follow spools and bristles to some 1e-4; the difference is of the first order, 1e-5.
