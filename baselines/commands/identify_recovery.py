@@ -14,7 +14,7 @@ import numpy as np
 from baselines.bench.statistics import quantile
 from baselines.commands.shared import JOBS, add_processes, finite_number, run, seed_number, whole_up_to
 from baselines.identification.quantities import QUANTITIES
-from baselines.identification.recovery import RANGES, recovery_tasks
+from baselines.identification.recovery import EXPERIMENTS, RANGES, recovery_tasks
 from baselines.work.files import make_folder, write_text
 from baselines.work.tasks import run_tasks
 from birthsim_env.physics.rig.parameters import field_of
@@ -26,24 +26,25 @@ def main() -> None:
     parser.add_argument("--rigs", type=whole_up_to(10_000), default=50, help="default: %(default)s")
     parser.add_argument("--seed", type=seed_number, default=81000, help="of the first rig (default: %(default)s)")
     parser.add_argument("--duration", type=finite_number, default=12.0, help="s of each experiment (default: %(default)s)")
+    parser.add_argument("--experiment", choices=tuple(EXPERIMENTS), default="proposed", help="default: %(default)s")
     add_processes(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for the pieces and recovery.md")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the pieces and EXPERIMENT.md")
     run(parser, _recover)
 
 
 def _recover(arguments: argparse.Namespace) -> None:
     folder = make_folder(arguments.out)
-    tasks = recovery_tasks(arguments.rigs, arguments.seed, arguments.duration)
+    tasks = recovery_tasks(arguments.rigs, arguments.seed, arguments.duration, arguments.experiment)
     done, failures = run_tasks(tasks, folder, arguments.jobs or JOBS, "rigs", arguments.cluster)
     for name, words in failures.items():
         print(f"{name}: {words}")
     if not done:
         raise ValueError(f"none of {len(tasks)} rigs was identified")
-    words = f"seeds from {arguments.seed}, experiments of {arguments.duration:g} s, `lab` sensors"
+    words = f"seeds from {arguments.seed}, experiment {arguments.experiment} of {arguments.duration:g} s, `lab` sensors"
     head = f"{len(done)} of {len(tasks)} rigs, {words}."
     worst = max(max(result["misfit"]) for result in done.values())
     lines = [head, "", *recovery_table(list(done.values())), "", f"Largest residual over the noise of its log: {worst:.3f}."]
-    write_text(folder / "recovery.md", "\n".join(lines) + "\n")
+    write_text(folder / f"{arguments.experiment}.md", "\n".join(lines) + "\n")
     print("\n".join(lines))
 
 

@@ -60,7 +60,8 @@ def intervals_figure(found: Identified, folder: Path) -> list[Path]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(8, 0.32 * len(found.rows) + 1.2), layout="constrained")
         for place, row in enumerate(reversed(found.rows)):
-            _interval(axes, place, row.low / row.owner, row.value / row.owner, row.high / row.owner, row.told)
+            known = row.owner or row.value or 1.0  # a latency of zero is not divided by
+            _interval(axes, place, row.low / known, row.value / known, row.high / known, row.told)
         axes.axvline(1.0, color="black", lw=0.8, ls=":")
         axes.set(xscale="log", xlabel="value over the owner's (-)", yticks=range(len(found.rows)))
         axes.set_yticklabels([row.name for row in reversed(found.rows)])

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from baselines.identification.experiment import propose
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from baselines.identification.experiment import Plan, propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.quantities import value_of
@@ -39,10 +44,21 @@ def drawn_rig(seed: int) -> Parameters:
     return draw_parameters(Parameters(), RANGES, stream(seed, 0, "parameters"))
 
 
-def recover(seed: int, duration: float) -> Result:
-    """One rig: the experiment under a law that believes in the default rig, and the identification from that rig on."""
+EXPERIMENTS: dict[str, Callable[[Plan], Plan]] = {
+    "proposed": lambda plan: plan,
+    "target": lambda plan: replace(plan, added=np.zeros_like(plan.added)),
+    "rest": lambda plan: replace(
+        plan, target=plan.target[:, :1].repeat(len(plan.times), axis=1), added=np.zeros_like(plan.added)
+    ),
+}
+"""What a log is of: the proposed experiment, its target alone without added openings, or a target at rest."""
+
+
+def recover(seed: int, duration: float, experiment: str) -> Result:
+    """One rig: an experiment of ``EXPERIMENTS`` under a law that believes in the default rig, and the identification from that
+    rig on."""
     owner, rig = Parameters(), drawn_rig(seed)
-    plan = propose(owner, duration, seed)
+    plan = EXPERIMENTS[experiment](propose(owner, duration, seed))
     trial = run_plan(plan, [rig], make_controller(CONTROLLER, owner), SENSORS, seed)[0]
     found = identify(trial, owner, seed)
     rows = {
@@ -53,6 +69,7 @@ def recover(seed: int, duration: float) -> Result:
     return {"rows": rows, "misfit": list(found.misfit)}
 
 
-def recovery_tasks(rigs: int, seed: int, duration: float) -> list[Task]:
+def recovery_tasks(rigs: int, seed: int, duration: float, experiment: str) -> list[Task]:
     """A piece per rig, with seeds from ``seed`` on."""
-    return [Task(f"rig_{k}", "rigs", recover, {"seed": k, "duration": duration}) for k in range(seed, seed + rigs)]
+    settings = {"duration": duration, "experiment": experiment}
+    return [Task(f"{experiment}_{k}", "rigs", recover, {"seed": k, **settings}) for k in range(seed, seed + rigs)]

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from baselines.commands import identify
-from baselines.identification.identified import Identified
-from birthsim_env.physics.rig.parameters import Parameters
+from baselines.identification.identified import REMEMBER, Identified
+from baselines.identification.identified import identify as identify_trial
+from birthsim_env.physics.rig.parameters import Parameters, field_of
 from tests.console import call
 from tests.identification.trials import OWNER, TRUE, part, trial
 
@@ -77,6 +78,13 @@ def test_what_is_wrong_is_named_in_one_line(
     assert complained.count("\n") == 1
     assert words in complained
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", REMEMBER)
+def test_a_rig_with_states_that_no_log_holds_is_refused(name: str) -> None:
+    rig = OWNER.replace({name: field_of(name).metadata["worth"][1]})
+    with pytest.raises(ValueError, match=f"{name} = .*; allowed for an identification: 0, "):
+        identify_trial(part(trial(), 0, 2100), rig)
 
 
 def test_ctrl_c_is_one_line_and_leaves_nothing(
