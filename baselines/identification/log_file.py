@@ -41,6 +41,9 @@ LONGEST_PERIOD, SHORTEST_PERIOD = 0.0101, 0.00024
 UNEVEN = 0.5
 """Fraction of a period by which a row may be early or late."""
 
+FEWEST = 50
+"""Samples of the tracker that tell anything of motion."""
+
 OUTSIDE = 0.005
 """m that a noisy position may lie outside of the workspace."""
 
@@ -149,6 +152,9 @@ def _check_positions(source: str, positions: Array, rig: Parameters) -> None:
         raise ValueError(f"{source} has positions about {largest:.4g} from the pivot; they look like mm, allowed: m")
     if (np.ptp(positions, axis=1) == 0).all():
         raise ValueError(f"{source}: the position never changes; allowed: a log of a rig that moves")
+    samples = int(np.any(np.diff(positions, axis=1) != 0, axis=0).sum())
+    if samples < FEWEST:
+        raise ValueError(f"{source}: the position changes {samples} times; allowed: at least {FEWEST} samples of the tracker")
     for row in range(0, positions.shape[1], max(1, positions.shape[1] // 2000)):
         try:
             inverse_geometry(_towards_the_middle(positions[:, row], rig), rig)

@@ -26,6 +26,9 @@ LENGTH = 0.25
 SMOOTHED = 0.03
 """s on either side of a window's start from which its speed is guessed."""
 
+NEAREST = 5
+"""Position samples that are taken at least."""
+
 FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2, at.TP1, at.TN1, at.TP2, at.TN2)
 """Rows of the state that a window's start leaves free; the spools follow from the openings before it."""
 
@@ -87,8 +90,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
     motion = np.empty((4, len(starts)))
     for w, now in enumerate(trial.times[starts]):
         near = np.abs(taken - now) <= max(SMOOTHED, 4 * period)
-        while near.sum() < 5:
-            near = np.argsort(np.abs(taken - now)) < 5
+        near[np.argsort(np.abs(taken - now))[:NEAREST]] = True
         for axis in range(2):
             motion[axis, w], motion[2 + axis, w] = _parabola(taken[near] - now, trial.positions[axis, fresh[near]])
     joints = np.empty((4, len(starts)))

@@ -93,6 +93,11 @@ def still(name: str) -> Callable[[Rows], None]:
     return change
 
 
+def rare(content: Rows) -> None:
+    for name in ("position_x", "position_y"):
+        content[name] = np.repeat(content[name][::700], 700)[: len(content[name])]
+
+
 def gap(content: Rows) -> None:
     content["time"][1000:] += 0.05
 
@@ -116,6 +121,7 @@ BAD: dict[str, tuple[Callable[[Rows], None], str]] = {
     "supply": (scaled(2.0, "pressures"), "the rig's air.supply_pressure is 700000 Pa; allowed: a rig (--parameters)"),
     "cell": (still("pressures_P1"), "pressures_P1 never changes; allowed: measured pressures"),
     "millimetres": (scaled(1e3, "position"), "they look like mm, allowed: m"),
+    "samples": (rare, "the position changes 2 times; allowed: at least 50 samples of the tracker"),
     "origin": (scaled(1.0, "position", shift=0.4), "is unreachable; allowed: distance"),
 }  # fmt: skip
 
