@@ -14,7 +14,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 COMMANDS = {
-    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "stability", "bench", "verify")},
+    **{
+        name: f"baselines.commands.{name}"
+        for name in ("figure4", "animate", "tune", "stability", "bench", "verify", "identify")
+    },
     "haptics": "baselines.commands.haptics",
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
     "build": "birthsim_build.commands.build",

@@ -28,7 +28,7 @@ _SHOWN_ONLY = (
     *("birthsim_env/drawing", "birthsim_env/drawing/rendering.py", "baselines/commands", "baselines/figures/runs.py"),
     *("baselines/bench/statistics.py", "baselines/bench/comparison_tables.py", "baselines/figures/comparison.py"),
     *("baselines/figures/studies.py", "birthsim_env/scores.json"),
-    *("baselines/figures/haptics.py", "baselines/bench/haptics/tables.py"),
+    *("baselines/figures/haptics.py", "baselines/figures/identification.py", "baselines/bench/haptics/tables.py"),
     *("agents/commands", "agents/reports", "agents/policies", "agents/training"),
     *("agents/sweep/maps.py", "agents/sweep/report.py", "agents/sweep/search.py", "agents/sweep/plan.py"),
 )

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
+from baselines.logs.writing import WRITERS, write_log
 from birthsim_live.logs.reading import read_log
-from birthsim_live.logs.writing import WRITERS, write_log
 
 
 def main() -> None:

@@ -1,1 +1,1 @@
-"""Recordings and evaluations as logs that other programs read: Parquet, and MCAP for PlotJuggler and Foxglove."""
+"""Logs from what the commands of this project write."""

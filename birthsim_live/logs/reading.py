@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import TRACE
+from baselines.logs.log import Column, Event, Log, Series
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.logs.log import Column, Event, Log, Series
 from birthsim_live.rig.frames import SLICES
 from birthsim_live.rig.recording import EVENTS, SUFFIX, load_recording
 

@@ -11,11 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from baselines.bench import pieces
+from baselines.logs import writing
+from baselines.logs.log import Log
 from baselines.work import tasks
 from baselines.work.files import write_json
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.logs import reading, writing
-from birthsim_live.logs.log import Log
+from birthsim_live.logs import reading
 from birthsim_live.rig import frames
 from birthsim_live.rig.recording import load_recording
 from tests.console import call

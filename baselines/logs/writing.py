@@ -19,8 +19,8 @@ from typing import BinaryIO
 import numpy as np
 
 import birthsim_env
+from baselines.logs.log import Log, Series
 from baselines.work.files import finite, whole_file
-from birthsim_live.logs.log import Log, Series
 
 _TYPES = {"f": "number", "i": "integer", "b": "boolean"}
 """Kind of a NumPy type -> its type in a JSON schema."""

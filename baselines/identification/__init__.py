@@ -1,0 +1,1 @@
+"""A rig of a laboratory from its logs: experiment, prediction, estimate."""

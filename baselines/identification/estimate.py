@@ -1,0 +1,176 @@
+"""A rig from a trial: the parameters under which the predictions of its windows differ least from what was measured.
+
+The residuals are those of measurements, over their noise, and of the owner's values, over their spreads (``quantities``). Start
+states are eliminated (``starts``), so that SciPy's ``least_squares`` sees the parameters alone. A first search takes short
+windows, and begins at the owner's rig and at the best of many drawn ones; a second one takes all of the trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from baselines.identification.noise import guessed_noise, noise_from
+from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
+from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
+from baselines.identification.trial import Trial
+from baselines.identification.windows import FREE, Windows, cut
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+
+SHORT, SOME = 0.1, 24
+"""s and number of the windows of the first search, assumed."""
+
+DRAWN = 48
+"""Rigs that are drawn to begin the first search at, assumed."""
+
+MOST = (40, 15)
+"""Evaluations of the first and of the second search at most; the first takes 10 to 15, the second 3."""
+
+DIFFERENCE = 1e-5
+"""Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
+
+MOVED, MOST_ROUNDS = 0.05, 3
+"""A search is repeated where noise moves by more than this fraction, or the latency by half a period; so many at most."""
+
+Tick = Callable[[], object]
+
+
+class Problem:
+    """Residuals over coordinates (Q,) of ``quantities`` and their derivatives, with start states that fit best.
+
+    ``owner`` is the rig as its owner describes it, which gives what is not identified, the centre of the spreads and the limits
+    (Q,) of the search; ``tick`` is called at every evaluation.
+    """
+
+    def __init__(
+        self, windows: Windows, noise: Noise, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick
+    ) -> None:  # fmt: skip
+        self.windows, self.noise, self.quantities, self._owner, self._tick = windows, noise, quantities, owner, tick
+        self.centre, self.limits = coordinates(owner, quantities), limits(owner, quantities)
+        self.spread: Array = np.array([one.spread for one in quantities])
+        self._start: Array = np.zeros((len(windows.starts), len(FREE)))
+        self._at: tuple[bytes, Array, Array] = (b"", self._start, self._start)
+        self.slopes: Slopes | None = None
+        self.derivatives: Array = np.empty(0)
+
+    def rig_at(self, theta: Array) -> Parameters:
+        """The rig at coordinates (Q,)."""
+        return rig_at(self._owner, self.quantities, theta)
+
+    def begin_anew(self, rig: Parameters) -> None:
+        """Begin at the start states that fit a rig best, also where the guess does not lead there."""
+        self._start = begun_anew(self.windows, self.noise, rig, self._start)
+
+    def settled(self, theta: Array) -> tuple[Array, Array]:
+        """Start states (W, 14) and residuals (W, R + 14) at coordinates (Q,)."""
+        if self._at[0] != theta.tobytes():
+            self._tick()
+            found = settle(self.windows, self.noise, self.rig_at(theta), self._start, self.slopes)
+            self._at = theta.tobytes(), *found
+        return self._at[1:]
+
+    def residuals(self, theta: Array) -> Array:
+        """All residuals, (W (R + 14) + Q,)."""
+        return np.concatenate([self.settled(theta)[1].ravel(), (theta - self.centre) / self.spread])
+
+    def jacobian(self, theta: Array) -> Array:
+        """Their derivatives, (W (R + 14) + Q, Q), less what the start states make up for: one lane a parameter and window."""
+        self._start, residual = self.settled(theta)
+        self.slopes = slopes_at(self.windows, self.noise, self.rig_at(theta), self._start)
+        moved = theta + DIFFERENCE * np.eye(len(theta))
+        rigs = [self.rig_at(one) for one in moved]
+        found = predicted(self.windows, self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
+        self.derivatives = self.slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
+        return np.concatenate([self.derivatives.reshape(-1, len(theta)), np.diag(1.0 / self.spread)])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Coordinates (Q,) that fit best, in a rig, with the problem that they solve and its last Jacobian (M, Q)."""
+
+    quantities: tuple[Quantity, ...]
+    theta: Array
+    rig: Parameters
+    problem: Problem
+    jacobian: Array
+    noise: Noise
+    cost: float
+
+    @property
+    def covariance(self) -> Array:
+        """Of the coordinates, (Q, Q), from the noise and the owner's spreads."""
+        return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
+
+
+def search(problem: Problem, theta: Array, most: int) -> Fit:
+    """``least_squares`` from coordinates ``theta`` (Q,) on, with at most ``most`` evaluations."""
+    low, high = problem.limits
+    inside = np.clip(theta, low + 1e-6, high - 1e-6)
+    found: OptimizeResult = least_squares(
+        problem.residuals, inside, problem.jacobian, bounds=(low, high), x_scale=problem.spread, max_nfev=most, ftol=1e-5,
+        xtol=1e-4, tr_solver="lsmr",
+    )  # fmt: skip
+    if problem.slopes is None or not np.isfinite(found.cost):
+        raise ValueError("the rig's parameters predict nothing of the log; allowed: parameters nearer to the laboratory's rig")
+    problem.settled(found.x)
+    noise = noise_from(problem.windows, problem.noise, problem.slopes, problem.settled(found.x)[1])
+    return Fit(problem.quantities, found.x, problem.rig_at(found.x), problem, found.jac, noise, float(found.cost))
+
+
+def fit(
+    trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
+) -> Fit:
+    """The parameters of a trial's rig; ``owner`` is the rig as its owner describes it, ``seed`` draws where to begin."""
+    some = _spread_out(cut(trial, owner, SHORT))
+    problem = Problem(some, guessed_noise(trial), owner, quantities, tick)
+    tried = []
+    for theta in (problem.centre, _best_drawn(problem, np.random.default_rng(seed))):
+        tried.append(search(Problem(some, problem.noise, owner, quantities, tick), theta, MOST[0]))
+    return refine(trial, min(tried, key=lambda one: one.cost), owner, quantities, tick)
+
+
+def refine(trial: Trial, first: Fit, owner: Parameters, quantities: tuple[Quantity, ...], tick: Tick = lambda: None) -> Fit:
+    """The second search, with all of a trial, for ``quantities``, repeated while it moves noise or latency (``MOVED``)
+    or leaves windows that fit worse than others.
+
+    What is not among ``quantities`` has the owner's value.
+    """
+    found = first
+    for _ in range(MOST_ROUNDS):
+        before = found
+        problem = Problem(cut(trial, found.rig), found.noise, owner, quantities, tick)
+        problem.begin_anew(found.rig)
+        found = search(problem, coordinates(found.rig, quantities), MOST[1])
+        if _is_close(before, found, trial.period) and not outliers(problem.settled(found.theta)[1]).any():
+            break
+    return found
+
+
+def _is_close(before: Fit, found: Fit, period: float) -> bool:
+    """Whether noise and latency are those with which a search was made."""
+    late = abs(found.rig.electronics.position_latency - before.rig.electronics.position_latency)
+    pairs = ((found.noise.pressure, before.noise.pressure), (found.noise.position, before.noise.position))
+    return late < 0.5 * period and all(abs(one / other - 1.0) < MOVED for one, other in pairs)
+
+
+def _spread_out(windows: Windows) -> Windows:
+    count = len(windows.starts)
+    return windows.some(np.unique(np.linspace(0, count - 1, min(SOME, count)).round().astype(np.intp)))
+
+
+def _best_drawn(problem: Problem, rng: np.random.Generator) -> Array:
+    """The best of ``DRAWN`` coordinates (Q,), all side by side as lanes, where start states give way as they do under the
+    owner's rig."""
+    windows, count = problem.windows, len(problem.centre)
+    thetas = np.clip(problem.centre + problem.spread * rng.normal(size=(DRAWN, count)), *problem.limits)
+    free = np.zeros((len(windows.starts), len(FREE)))
+    slopes = slopes_at(windows, problem.noise, problem.rig_at(problem.centre), free)
+    rigs = [problem.rig_at(theta) for theta in thetas]
+    found = predicted(windows, problem.noise, rigs, np.repeat(free[None], DRAWN, axis=0))
+    # The median over windows: one in which a wrong latency hides the rest does not decide.
+    costs = np.median(np.sum(slopes.unexplained(found.transpose(1, 2, 0)) ** 2, axis=1), axis=0)
+    return np.asarray(thetas[int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))])

@@ -1,0 +1,102 @@
+"""An experiment that excites what is to be identified: a target for any position law, and openings to add to the law's.
+
+The target is a multisine of both pistons through most of their strokes: long travel tells the dead volume from the flow, the
+weight and the accelerations tell the mass, reversals and speeds from zero to 0.3 m/s tell the friction. The openings that are
+added to those of the law, steps of random size and length, tell conductance and lag of the valves. The law keeps the pistons
+away from the end stops, so that the experiment is safe where the law is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from baselines.logs.table import read_csv
+from baselines.work.files import write_text
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.geometry import end_effector, inverse_geometry
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import checked_number
+
+GRID = 0.01
+"""s between the rows of a plan."""
+
+TRAVEL = 0.65
+"""Fraction of half a stroke that the target takes; the rest is for what the law does not follow. Assumed."""
+
+FREQUENCIES = (0.11, 0.23, 0.41, 0.73, 1.27, 1.91)
+"""Hz, assumed: no one is a multiple of another. The amplitude falls as 1/f, so that all add the same to the speed."""
+
+RISE = 1.0
+"""s that the target takes to leave its start and, at the end, to rest."""
+
+STEP = 0.3
+"""Largest opening that is added to the law's, assumed."""
+
+HELD = (2, 8)
+"""Shortest and longest time for which an added opening is held, in rows of the plan."""
+
+NAMES = ("time", "x", "y", "added_P1", "added_N1", "added_P2", "added_N2")
+"""Columns of a plan: s, m, m, and openings in [-1, 1] that are added to the law's."""
+
+SHORTEST, LONGEST = 4.0, 600.0
+"""s of a plan."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Rows of an experiment: ``times`` (T,), s, ``target`` (2, T), m, ``added`` (4, T), openings, each held until the next."""
+
+    times: Array
+    target: Array
+    added: Array
+
+    def write(self, path: Path) -> None:
+        """Write the plan as CSV with the columns ``NAMES``."""
+        rows = np.vstack([self.times, self.target, self.added]).T
+        lines = [",".join(NAMES), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+        write_text(path, "\n".join(lines) + "\n")
+
+
+def propose(rig: Parameters, duration: float, seed: int = 0) -> Plan:
+    """An experiment of ``duration`` s for a rig, known as far as its strokes; ``seed`` draws phases and added openings."""
+    checked_number("duration", duration, "s", least=SHORTEST, most=LONGEST)
+    rng = np.random.default_rng(seed)
+    times: Array = GRID * np.arange(round(duration / GRID) + 1, dtype=np.float64)
+    ramp = np.clip(np.minimum(times, times[-1] - times) / RISE, 0.0, 1.0)
+    ramp = ramp**3 * (10 - 15 * ramp + 6 * ramp**2)
+    piston = np.array([_multisine(times, 0.5 * one.stroke, rng) * ramp for one in (rig.cylinder1, rig.cylinder2)])
+    added = np.array([_steps(len(times), rng) for _ in range(4)]) * (ramp >= 1.0)
+    return Plan(times, end_effector(piston, rig), added)
+
+
+def _multisine(times: Array, half_stroke: float, rng: np.random.Generator) -> Array:
+    """A sum of sines (T,), m, whose extremes lie ``TRAVEL`` of the way to the end stops."""
+    waves = [np.sin(2 * np.pi * (f * times + rng.uniform())) / f for f in FREQUENCIES]
+    total = np.sum(waves, axis=0)
+    return np.asarray(TRAVEL * half_stroke * total / np.abs(total).max())
+
+
+def _steps(rows: int, rng: np.random.Generator) -> Array:
+    """Openings (rows,) of random size, each held for a random time."""
+    held = rng.integers(HELD[0], HELD[1] + 1, size=rows)
+    return np.repeat(rng.uniform(-STEP, STEP, size=rows), held)[:rows]
+
+
+def read_plan(path: Path, rig: Parameters) -> Plan:
+    """The plan that ``Plan.write`` wrote; ``ValueError`` names what is wrong with the file, also for this rig."""
+    table = read_csv(path)
+    columns = np.array([table.column(name) for name in NAMES])
+    times, target, added = columns[0], columns[1:3], columns[3:]
+    where = f"plan = {str(path)!r}"
+    if len(times) < 8 or not np.isfinite(columns).all() or not (np.diff(times) > 0).all():
+        raise ValueError(f"{where}; allowed: at least 8 rows of finite numbers with increasing times")
+    if np.abs(added).max() > 1:
+        raise ValueError(f"{where}: an added opening of {np.abs(added).max():g}; allowed: -1 to 1")
+    try:
+        inverse_geometry(target, rig)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+    return Plan(times, target, added)

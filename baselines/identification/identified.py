@@ -1,0 +1,127 @@
+"""The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tomli_w
+
+from baselines.identification.certainty import NORMAL, Certainty, certainty_of
+from baselines.identification.estimate import Fit, Tick, fit, refine
+from baselines.identification.noise import guessed_noise
+from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, value_of
+from baselines.identification.starts import Noise
+from baselines.identification.trial import Trial
+from baselines.work.files import write_text
+from birthsim_env.physics.rig.parameters import Parameters, field_of
+
+
+@dataclass(frozen=True)
+class Row:
+    """A parameter: the owner's value, the estimate with its 95 % interval, and whether the log tells it.
+
+    Where the log does not tell it, ``value`` is the owner's, and the interval is what log and owner know together.
+    """
+
+    name: str
+    owner: float
+    value: float
+    low: float
+    high: float
+    told: bool
+
+    def words(self) -> str:
+        """One line: name, value, interval, unit."""
+        unit = field_of(self.name).metadata["unit"]
+        interval = f"{self.low:.4g} to {self.high:.4g}"
+        if self.told:
+            return f"{self.name} = {self.value:.5g} {unit}, 95 % interval {interval}; was {self.owner:.5g}"
+        return f"{self.name} = {self.value:.5g} {unit}, KEPT: the log cannot tell it, it may be {interval}"
+
+
+@dataclass(frozen=True)
+class Identified:
+    """``rows``, one per parameter; ``rig`` with their values; ``fit``, ``certainty`` of the fit of all parameters; ``noise`` as
+    the residuals have it, ``quick_noise`` as the log alone has it."""
+
+    rows: tuple[Row, ...]
+    rig: Parameters
+    fit: Fit
+    certainty: Certainty
+    noise: Noise
+    quick_noise: Noise
+
+    @property
+    def misfit(self) -> tuple[float, float]:
+        """Residuals of pressures and positions over the noise that third differences show."""
+        return self.noise.pressure / self.quick_noise.pressure, self.noise.position / self.quick_noise.position
+
+    def words(self) -> list[str]:
+        """The result in lines."""
+        lines = [row.words() for row in self.rows]
+        pressure, position = self.misfit
+        lines.append(f"noise of pressures {self.noise.pressure:.4g} Pa, of positions {1e3 * self.noise.position:.4g} mm")
+        lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
+        if max(pressure, position) > MISFIT:
+            lines.append("the model leaves more than noise: hands, leaks or play that it does not know; see the residuals")
+        for direction in self.certainty.weakest:
+            named = ", ".join(f"{part:+.2f} {name}" for name, part in direction.parts)
+            lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
+        return lines
+
+    def write(self, path: Path, source: str) -> None:
+        """Write the rig as TOML; its head says what is from the log ``source`` and what is not."""
+        head = [f"Identified by birthsim-identify from {source}.", *self.words()]
+        text = "".join(f"# {line}\n" for line in head)
+        write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
+
+
+MISFIT = 1.2
+"""Residuals so many times larger than the noise are named."""
+
+
+REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance", "mechanics.mode_frequency")
+"""Options of a rig with states that no log holds at the start of a window."""
+
+
+def identify(
+    trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
+) -> Identified:
+    """The rig of a trial, as far as the trial tells it; all else is the owner's.
+
+    Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
+    of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
+    ``REMEMBER``.
+    """
+    given = [name for name in REMEMBER if value_of(owner, name)]
+    if given:
+        raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
+    whole = fit(trial, owner, seed, quantities, tick)
+    certainty = certainty_of(whole)
+    told = tuple(one for one, tells in zip(quantities, certainty.tells, strict=True) if tells)
+    last = whole if len(told) == len(quantities) or not told else refine(trial, whole, owner, told, tick)
+    rig = last.rig if told else owner
+    rows = []
+    for one, theta, deviation, tells in zip(quantities, whole.theta, certainty.deviation, certainty.tells, strict=True):
+        value = value_of(rig, one.name)
+        middle, reach = (one.coordinate(value) if tells else float(theta)), NORMAL * float(deviation)
+        if one.name == LATENCY and tells:
+            value, middle, reach = _latency(one, trial.period, middle, float(deviation))
+        low, high = one.value(middle - reach), one.value(middle + reach)
+        low = max(low, field_of(one.name).metadata["least"])
+        rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(tells)))
+    changes = {row.name: row.value for row in rows if row.told}
+    noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
+    return Identified(tuple(rows), owner.replace({**changes, **noise}), last, certainty, last.noise, guessed_noise(trial))
+
+
+def _latency(one: Quantity, period: float, middle: float, deviation: float) -> tuple[float, float, float]:
+    """Value, coordinate and reach of the latency for the one at which rows show positions.
+
+    A board that looks once a period shows a sample up to a period late, half a period in the mean; when in the period it
+    arrived, no row tells.
+    """
+    value = max(one.value(middle) - 0.5 * period, 0.0)
+    rounding = period / 12**0.5 / one.unit
+    return value, one.coordinate(value), NORMAL * (deviation**2 + rounding**2) ** 0.5

@@ -1,0 +1,39 @@
+"""The noise of pressures and positions: guessed from a log alone, and from the residuals of a fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.identification.starts import Noise, Slopes
+from baselines.identification.trial import Trial
+from baselines.identification.windows import Windows, fresh_rows
+from birthsim_env.physics.compiled.lanes import Array
+
+LEAST = Noise(1.0, 1e-7)
+"""Pa and m: less noise than this is taken for this."""
+
+GAUSS = 1.4826
+"""Standard deviation over median size of a normal number."""
+
+
+def guessed_noise(trial: Trial) -> Noise:
+    """From third differences, which leave little of the motion; white noise makes them (1 + 9 + 9 + 1)^(1/2) as large."""
+    shown = trial.positions[:, fresh_rows(trial)]
+    pressure, position = (
+        float(GAUSS * np.median(np.abs(np.diff(values, 3, axis=1))) / 20**0.5) for values in (trial.pressures, shown)
+    )
+    return Noise(max(pressure, LEAST.pressure), max(position, LEAST.position))
+
+
+def noise_from(windows: Windows, noise: Noise, slopes: Slopes, residual: Array) -> Noise:
+    """From residuals (W, R + 14) over ``noise``, less the degrees of freedom that the start states take from each kind."""
+    pressures = windows.length * 4
+    last = pressures + windows.positions.shape[1] * 2
+    found = []
+    for part, counted, before in (
+        (slice(0, pressures), windows.pressures.size, noise.pressure),
+        (slice(pressures, last), 2 * int(windows.valid.sum()), noise.position),
+    ):
+        freedom = counted - float(np.sum(slopes.basis[:, part] ** 2))
+        found.append(before * float(np.sum(residual[:, part] ** 2) / max(freedom, 1.0)) ** 0.5)
+    return Noise(max(found[0], LEAST.pressure), max(found[1], LEAST.position))

@@ -1,0 +1,132 @@
+"""A trial cut into windows: what was measured in each, and a first guess of the state in which each begins.
+
+One long simulation of a rig with friction drifts away from any log. Windows of a fraction of a second, each with a start state
+of its own, do not; they are lanes of the plant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter, savgol_filter
+
+from baselines.identification.trial import Trial
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.dynamics import steps_in
+from birthsim_env.physics.inverse_kinematics import pistons_at
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.spools import admit_lanes, are_perfect
+
+LENGTH = 0.25
+"""s of a window."""
+
+SMOOTHED = 0.03
+"""s on either side of a window's start from which its speed is guessed."""
+
+NEAREST = 5
+"""Position samples that are taken at least."""
+
+FREE = (at.Y1, at.V1, at.Y2, at.V2, at.Z1, at.Z2, at.PP1, at.PN1, at.PP2, at.PN2, at.TP1, at.TN1, at.TP2, at.TN2)
+"""Rows of the state that a window's start leaves free; the spools follow from the openings before it."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """W windows of K periods of a trial.
+
+    ``starts`` (W,) are rows of the trial. ``arrived`` (W, F) counts the periods from the start to each row at which a position
+    sample newly arrived, and ``valid`` (W, F) is False beyond the last. ``pressures`` (W, K, 4) and ``positions`` (W, F, 2) are
+    the measurements, ``state`` (18, W) the guess of the start.
+    """
+
+    trial: Trial
+    length: int
+    starts: NDArray[np.intp]
+    arrived: NDArray[np.intp]
+    valid: NDArray[np.bool_]
+    pressures: Array
+    positions: Array
+    state: Array
+
+    def some(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Windows:
+        """The windows with the numbers ``chosen``, or where ``chosen`` (W,) is True."""
+        return Windows(
+            self.trial, self.length, self.starts[chosen], self.arrived[chosen], self.valid[chosen], self.pressures[chosen],
+            self.positions[chosen], self.state[:, chosen],
+        )  # fmt: skip
+
+
+def cut(trial: Trial, rig: Parameters, length: float = LENGTH) -> Windows:
+    """Windows of a trial, without overlap, for a rig as far as it is known."""
+    period, rows = trial.period, len(trial.times)
+    k, margin = max(8, round(length / period)), round(0.1 / period)
+    starts = np.arange(margin, rows - margin - k, k)
+    fresh = fresh_rows(trial)
+    lag = round(rig.electronics.position_latency / period)
+    own = [fresh[(fresh >= start + lag) & (fresh < start + k + lag)] for start in starts]
+    most = max(map(len, own))
+    arrived, valid = np.zeros((len(starts), most), dtype=np.intp), np.zeros((len(starts), most), dtype=np.bool_)
+    for w, (start, found) in enumerate(zip(starts, own, strict=True)):
+        arrived[w, : len(found)], valid[w, : len(found)] = found - start, True
+    pressures = np.stack([trial.pressures[:, s : s + k].T for s in starts])
+    positions = trial.positions.T[starts[:, None] + arrived]
+    return Windows(trial, k, starts, arrived, valid, pressures, positions, _guess(trial, rig, starts, fresh))
+
+
+def fresh_rows(trial: Trial) -> NDArray[np.intp]:
+    """Rows at which a position sample has newly arrived: the position is another than in the row before."""
+    return np.flatnonzero(np.any(np.diff(trial.positions, axis=1) != 0, axis=0)) + 1
+
+
+def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArray[np.intp]) -> Array:
+    """Start states (18, W): local parabolas through positions and pressures, bristles of steady sliding, air as warm as the
+    walls."""
+    period, column = trial.period, parameter_column(rig)
+    state = np.zeros((at.STATES, len(starts)))
+    taken = trial.times[fresh] - rig.electronics.position_latency
+    motion = np.empty((4, len(starts)))
+    for w, now in enumerate(trial.times[starts]):
+        near = np.abs(taken - now) <= max(SMOOTHED, 4 * period)
+        near[np.argsort(np.abs(taken - now))[:NEAREST]] = True
+        for axis in range(2):
+            motion[axis, w], motion[2 + axis, w] = _parabola(taken[near] - now, trial.positions[axis, fresh[near]])
+    joints = np.empty((4, len(starts)))
+    pistons_at(motion, column, joints)
+    state[[at.Y1, at.Y2, at.V1, at.V2]] = joints
+    for z, v, level in ((at.Z1, at.V1, at.FC1), (at.Z2, at.V2, at.FC2)):
+        state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.BRISTLE_S0]
+    wide = 2 * round(0.005 / period) + 3
+    smooth = savgol_filter(trial.pressures, wide, 2, axis=1)
+    state[list(at.PRESSURES)] = smooth[:, starts]
+    state[list(at.TEMPERATURES)] = column[at.TEMPERATURE]
+    return state
+
+
+def _parabola(times: Array, values: Array) -> tuple[float, float]:
+    """Value and slope at time zero of the parabola nearest to values."""
+    scale = max(np.abs(times).max(), 1e-9)
+    basis = np.stack([np.ones_like(times), times / scale, (times / scale) ** 2], axis=1)
+    found = np.linalg.lstsq(basis, values, rcond=None)[0]
+    return float(found[0]), float(found[1] / scale)
+
+
+def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: float) -> Array:
+    """Openings of the spools (4, W) at rows ``starts``: the integrator's answer to the openings (4, T) before, from rest, of
+    spools of a ``rate``, 1/s."""
+    steps = steps_in(period)
+    h = period / steps * rate
+    kept = (1.0 - h * (1.0 - h * (0.5 - h * (1.0 / 6.0 - h / 24.0)))) ** steps
+    before = np.concatenate([np.zeros((4, 1)), openings[:, :-1]], axis=1)
+    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], before, axis=1)[:, starts])
+
+
+def admitted_openings(trial: Trial, column: Array) -> Array:
+    """What the openings of a log (4, T) become behind deadband and limit of the valves."""
+    if are_perfect(column[:, None]):
+        return trial.openings
+    lanes, opening = trial.openings.shape[1], np.empty_like(trial.openings)
+    admit_lanes(trial.openings, np.repeat(column[:, None], lanes, axis=1), np.zeros((4, lanes)), opening)
+    return opening

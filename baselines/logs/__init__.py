@@ -1,0 +1,1 @@
+"""Logs: series of named numbers with units, as CSV, Parquet and MCAP."""

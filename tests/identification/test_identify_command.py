@@ -1,0 +1,101 @@
+"""birthsim-identify as a user runs it: an experiment, its log, the rig; what is wrong in one line; Ctrl-C."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from baselines.commands import identify
+from baselines.identification.identified import REMEMBER, Identified
+from baselines.identification.identified import identify as identify_trial
+from birthsim_env.physics.rig.parameters import Parameters, field_of
+from tests.console import call
+from tests.identification.trials import OWNER, TRUE, part, trial
+
+
+def test_experiment_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    plan, log, rig = tmp_path / "plan.csv", tmp_path / "log.csv", tmp_path / "true.toml"
+    TRUE.to_toml(rig)
+    status, printed, _ = call("identify", monkeypatch, capsys, "--propose", plan, "--duration", 4, "--seed", 3)
+    assert (status, printed) == (0, f"written to {plan}: 401 rows of time, target and openings to add to a law's\n")
+    status, printed, _ = call("identify", monkeypatch, capsys, "--simulate", plan, "--parameters", rig, "--out", log)
+    assert (status, printed) == (0, f"written to {log}: 4000 rows, 3.999 s\n")
+    assert log.read_text().startswith("time,openings_P1,openings_N1,")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "plan.csv", "true.toml"]
+
+
+@pytest.mark.slow
+def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from baselines.identification.log_file import write_trial
+
+    log, out, report = tmp_path / "log.parquet", tmp_path / "rig.toml", tmp_path / "report"
+    write_trial(trial(), log, TRUE)
+    status, printed, _ = call("identify", monkeypatch, capsys, log, "--out", out, "--report", report)
+    assert status == 0
+    found = Parameters.from_toml(out)
+    assert found.mechanics.mass == pytest.approx(3.6, rel=5e-3)
+    assert found.electronics.pressure_noise == pytest.approx(500, rel=0.05)
+    assert f"# mechanics.mass = {found.mechanics.mass:.5g} kg, 95 % interval " in out.read_text()
+    assert out.read_text().startswith("# Identified by birthsim-identify from log.parquet.\n")
+    names = ["intervals.png", "intervals.svg", "report.md", "residuals.png", "residuals.svg"]
+    assert sorted(path.name for path in report.iterdir()) == names
+    text = (report / "report.md").read_text()
+    assert "- mechanics.mass = " in text
+    assert "![residuals.png](residuals.png)" in text
+    assert f"written to {out}: " in printed
+    # What is not identified is the owner's.
+    assert found.geometry == OWNER.geometry
+    assert found.air == OWNER.air
+
+
+BAD: list[tuple[list[str], str]] = [
+    ([], "nothing given; allowed: one of LOG, --propose PLAN, --simulate PLAN"),
+    (["log.csv", "--propose", "plan.csv"], "log and propose given; allowed: one of LOG, --propose PLAN, --simulate PLAN"),
+    (["log.csv"], "--out is missing; allowed: a file that ends in .toml, in a folder that exists"),
+    (["log.csv", "--out", "rig.json"], "rig.json'; allowed: a file that ends in .toml"),
+    (["log.csv", "--out", "none/rig.toml"], "none/rig.toml'; allowed: a file that ends in .toml, in a folder that exists"),
+    (["log.csv", "--out", "rig.toml", "--duration", "5"], "--duration is given; allowed with --propose only"),
+    (["--propose", "plan.csv", "--report", "r"], "--report is given; allowed with LOG only"),
+    (["--propose", "plan.csv", "--out", "a.toml"], "--out is given; allowed with LOG or --simulate"),
+    (["--propose", "plan.csv", "--duration", "1"], "duration = 1.0; allowed: a finite number >= 4 and <= 600 (s)"),
+    (["--simulate", "plan.csv", "--out", "a.toml"], "a.toml'; allowed: a file that ends in .csv, .parquet, .mcap"),
+    (["--simulate", "plan.csv", "--out", "a.csv"], "log = 'plan.csv' cannot be read: No such file or directory"),
+    (["log.csv", "--out", "rig.toml"], "log = 'log.csv' cannot be read: No such file or directory"),
+    (["log.csv", "--out", "rig.toml", "--parameters", "no.toml"], "parameters = 'no.toml' cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("given", "words"), BAD, ids=lambda part: " ".join(part) if isinstance(part, list) else "")
+def test_what_is_wrong_is_named_in_one_line(
+    given: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, printed, complained = call("identify", monkeypatch, capsys, *given)
+    assert (status, printed) == (2, "")
+    assert complained.startswith("birthsim-identify: error: ")
+    assert complained.count("\n") == 1
+    assert words in complained
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", REMEMBER)
+def test_a_rig_with_states_that_no_log_holds_is_refused(name: str) -> None:
+    rig = OWNER.replace({name: field_of(name).metadata["worth"][1]})
+    with pytest.raises(ValueError, match=f"{name} = .*; allowed for an identification: 0, "):
+        identify_trial(part(trial(), 0, 2100), rig)
+
+
+def test_ctrl_c_is_one_line_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> Identified:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(identify, "identify", interrupted)
+    monkeypatch.setattr(identify, "read_trial", lambda *_: part(trial(), 0, 2100))
+    status, printed, complained = call("identify", monkeypatch, capsys, "log.csv", "--out", tmp_path / "rig.toml")
+    assert (status, printed) == (130, "")
+    assert complained.endswith("birthsim-identify: interrupted\n")
+    assert list(tmp_path.iterdir()) == []

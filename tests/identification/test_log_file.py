@@ -1,0 +1,182 @@
+"""Logs come back to the last bit from every kind of file, and each thing that is wrong with one is named in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.identification.log_file import COLUMNS, FORCES, read_trial, write_trial
+from baselines.logs.table import read_table
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+from tests.identification.trials import OWNER, part, trial
+
+SHORT = part(trial(), 0, 2100)
+Rows = dict[str, Array]
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mcap", ".csv"])
+def test_a_trial_comes_back(suffix: str, tmp_path: Path) -> None:
+    pytest.importorskip({".parquet": "pyarrow", ".mcap": "mcap", ".csv": "csv"}[suffix])
+    forced = dataclasses.replace(SHORT, forces=np.random.default_rng(0).normal(size=SHORT.forces.shape))
+    write_trial(forced, tmp_path / f"log{suffix}", OWNER)
+    again = read_trial(tmp_path / f"log{suffix}", OWNER)
+    for name in ("openings", "pressures", "positions", "forces"):
+        # CSV has ten digits.
+        exact = getattr(forced, name)
+        assert np.allclose(
+            getattr(again, name), exact, rtol=1e-9 if suffix == ".csv" else 0, atol=1e-12 if suffix == ".csv" else 0
+        )
+    assert again.period == pytest.approx(SHORT.period, rel=1e-9)
+
+
+def rows() -> Rows:
+    values = np.vstack([SHORT.times, SHORT.openings, SHORT.pressures, SHORT.positions, SHORT.forces])
+    return {name: value.copy() for name, value in zip(COLUMNS, values, strict=True)}
+
+
+def write(content: Rows, path: Path) -> None:
+    lines = [",".join(content), *(",".join(f"{value:.10g}" for value in row) for row in zip(*content.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_without_forces_there_is_no_hand_and_a_recording_has_two(tmp_path: Path) -> None:
+    content = rows()
+    for name in FORCES:
+        del content[name]
+    write(content, tmp_path / "log.csv")
+    assert (read_trial(tmp_path / "log.csv", OWNER).forces == 0).all()
+    for k, name in enumerate(("scenario_force_x", "scenario_force_y", "drag_force_x", "drag_force_y")):
+        content[name] = np.full(len(SHORT.times), 1.0 + k)
+    content["log_time"] = content.pop("time")
+    write(content, tmp_path / "log.csv")
+    assert (read_trial(tmp_path / "log.csv", OWNER).forces == [[4.0], [6.0]]).all()
+
+
+def test_rows_that_are_a_little_early_or_late_are_taken_as_even(tmp_path: Path) -> None:
+    content = rows()
+    content["time"] += 0.2e-3 * np.random.default_rng(0).uniform(-1, 1, size=len(content["time"]))
+    write(content, tmp_path / "log.csv")
+    found = read_trial(tmp_path / "log.csv", OWNER)
+    assert np.ptp(np.diff(found.times)) < 1e-9
+
+
+def without(*names: str) -> Callable[[Rows], None]:
+    return lambda content: [content.pop(name) for name in names] and None
+
+
+def scaled(factor: float, *starts: str, shift: float = 0.0) -> Callable[[Rows], None]:
+    def change(content: Rows) -> None:
+        for name in content:
+            if name.startswith(starts):
+                content[name] = factor * content[name] + shift
+
+    return change
+
+
+def put(name: str, row: int, value: float) -> Callable[[Rows], None]:
+    def change(content: Rows) -> None:
+        content[name][row] = value
+
+    return change
+
+
+def still(name: str) -> Callable[[Rows], None]:
+    def change(content: Rows) -> None:
+        content[name][:] = content[name][0]
+
+    return change
+
+
+def rare(content: Rows) -> None:
+    for name in ("position_x", "position_y"):
+        content[name] = np.repeat(content[name][::700], 700)[: len(content[name])]
+
+
+def gap(content: Rows) -> None:
+    content["time"][1000:] += 0.05
+
+
+BAD: dict[str, tuple[Callable[[Rows], None], str]] = {
+    "columns": (without("pressures_N1", "position_y"), "lacks pressures_N1, position_y; there are: time, openings_P1"),
+    "one force": (without("force_y"), "has no column 'force_y'; there are: time"),
+    "time": (without("time"), "lacks time; there are: openings_P1"),
+    "nan": (put("pressures_P2", 77, np.nan), "row 77: pressures_P2 = nan; allowed: finite numbers in every row"),
+    "force nan": (put("force_x", 5, np.inf), "row 5: the force = inf; allowed: finite numbers in every row"),
+    "time back": (put("time", 40, 0.038), "row 40: time 0.038 after 0.039; allowed: increasing times"),
+    "milliseconds": (scaled(1e3, "time"), "has a row every 1 s; allowed: a row every 0.25 to 10 ms, as often as the valves are "
+                     "commanded; it looks like ms, allowed: s"),
+    "gap": (gap, "row 1000: 51 ms after the row before, others 1 ms; allowed: evenly spaced rows"),
+    "volts": (scaled(5.0, "openings", shift=5.0), "they look like V: an opening is (V - 5) / 5 where 5 V is shut"),
+    "percent": (scaled(100.0, "openings"), "they look like percent: an opening is percent / 100"),
+    "valve": (still("openings_N2"), "openings_N2 never changes; allowed: valves that move, as in birthsim-identify --propose"),
+    "bar": (scaled(1e-5, "pressures"), "they look like bar, allowed: absolute pressures in Pa"),
+    "kPa": (scaled(1e-3, "pressures"), "they look like kPa, allowed: absolute pressures in Pa"),
+    "gauge": (scaled(1.0, "pressures", shift=-101300.0), "they look like gauge pressures, allowed: absolute pressures in Pa"),
+    "supply": (scaled(2.0, "pressures"), "the rig's air.supply_pressure is 700000 Pa; allowed: a rig (--parameters)"),
+    "cell": (still("pressures_P1"), "pressures_P1 never changes; allowed: measured pressures"),
+    "millimetres": (scaled(1e3, "position"), "they look like mm, allowed: m"),
+    "samples": (rare, "the position changes 2 times; allowed: at least 50 samples of the tracker"),
+    "origin": (scaled(1.0, "position", shift=0.4), "is unreachable; allowed: distance"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_wrong_with_a_log_is_named(case: str, tmp_path: Path) -> None:
+    change, words = BAD[case]
+    content = rows()
+    change(content)
+    write(content, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match=re.escape(words)) as error:
+        read_trial(tmp_path / "log.csv", OWNER)
+    assert str(error.value).startswith("log = '")
+    assert "\n" not in str(error.value)
+
+
+def test_a_rig_at_rest_and_a_short_log_are_refused(tmp_path: Path) -> None:
+    content = rows()
+    still("position_x")(content)
+    still("position_y")(content)
+    write(content, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match="the position never changes; allowed: a log of a rig that moves"):
+        read_trial(tmp_path / "log.csv", OWNER)
+    write({name: values[:500] for name, values in rows().items()}, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match=r"holds 0.499 s; allowed: at least 2 s"):
+        read_trial(tmp_path / "log.csv", OWNER)
+    write({name: values[:1] for name, values in rows().items()}, tmp_path / "log.csv")
+    with pytest.raises(ValueError, match="has 1 rows; allowed: at least 2 s of them"):
+        read_trial(tmp_path / "log.csv", OWNER)
+
+
+FILES = [
+    ("none.csv", None, "cannot be read"),
+    ("none.parquet", None, "cannot be read"),
+    ("log.txt", b"", "allowed: a file that ends in .csv, .parquet, .mcap"),
+    ("log.csv", b"", "is empty; allowed: a line of names, then lines of numbers"),
+    ("log.csv", b"\xff\xfe\x00", "is no CSV (UnicodeDecodeError"),
+    ("log.csv", b"time,a\n0,1\n1,x\n", "line 3: '1,x'; allowed: 2 numbers, for time, a"),
+    ("log.csv", b"time,a\n0,1\n1\n", "line 3: '1'; allowed: 2 numbers, for time, a"),
+    ("log.csv", b"time,a,a\n0,1,2\n", "has two columns 'a'; allowed: one of each name"),
+    ("log.parquet", b"PAR1 but not", "is no Parquet ("),
+    ("log.mcap", b"neither", "cannot be read as MCAP ("),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "words"), FILES)
+def test_what_is_wrong_with_a_file_is_named(name: str, content: bytes | None, words: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=re.escape(words)) as error:
+        read_table(tmp_path / name)
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_of_another_kind_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=re.escape("allowed: a file that ends in .csv, .parquet, .mcap")):
+        write_trial(SHORT, tmp_path / "log.xlsx", Parameters())
+    assert list(tmp_path.iterdir()) == []
