@@ -47,10 +47,9 @@ def main() -> None:
 
 
 def _worst(arguments: argparse.Namespace) -> None:
-    print(
-        f"{arguments.episodes} worlds of {ENVIRONMENT} from seed {arguments.seed}, rigs and scenarios drawn, {arguments.rest:g} s"
-    )
-    print("of rest before the push; median, 95 % and worst.\n")
+    rest = f"{arguments.rest:g} s of rest before the push"
+    print(f"{arguments.episodes} worlds of {ENVIRONMENT} from seed {arguments.seed}, rigs and scenarios drawn, {rest}.")
+    print("Median, 95 % and worst.\n")
     print(
         f"| law | sensors | {arguments.metric}, {UNITS[arguments.metric]} | motion before the push, mm | lost | worst worlds |"
     )
@@ -74,13 +73,10 @@ def _worst(arguments: argparse.Namespace) -> None:
 def _explain(name: str, arguments: argparse.Namespace, rig: Parameters, sensors: str, seed: int) -> None:
     """Print the metric in world ``seed`` where one figure is as the law believes, and where one error of the sensors is 0."""
 
-    def found(fixed: dict[str, float], rest: float = arguments.rest) -> Evaluation:
+    def size(fixed: dict[str, float], rest: float = arguments.rest) -> float:
         own = {figure: [low, high] for figure, low, high in rig.ranges}
         changed = Parameters.from_dict({**rig.to_dict(), "randomize": {**own, **{k: [v, v] for k, v in fixed.items()}}})
-        return _evaluated(name, rest, changed, sensors, seed, 1)
-
-    def size(fixed: dict[str, float], rest: float = arguments.rest) -> float:
-        return float(sizes_of(found(fixed, rest), arguments.metric)[0])
+        return float(sizes_of(_evaluated(name, rest, changed, sensors, seed, 1), arguments.metric)[0])
 
     world, push, way = _world(rig, sensors, seed)
     ranges = documented_ranges(rig, sensors)
@@ -88,8 +84,9 @@ def _explain(name: str, arguments: argparse.Namespace, rig: Parameters, sensors:
     rows = [(size({figure: value}), figure, f"{world[figure]:.4g}", f"{value:.4g}") for figure, value in drawn.items()]
     errors = [figure for figure in ranges if figure in drawn_by(sensors) and field_of(figure).metadata["least"] == 0.0]
     rows += [(size({figure: 0.0}), figure, f"{world[figure]:.4g}", "0") for figure in errors]
-    told = f"{arguments.metric} {number(size({}))} {UNITS[arguments.metric]}, a push of {push:.3g} N over {way:.3g} mm"
-    told += f", {100 * found({}).required_strength_ratio[0]:.0f} % of the rig's strength"
+    here = _evaluated(name, arguments.rest, rig, sensors, seed, 1)
+    told = f"{arguments.metric} {number(sizes_of(here, arguments.metric)[0])} {UNITS[arguments.metric]}, a push of {push:.3g} N"
+    told += f" over {way:.3g} mm, {100 * here.required_strength_ratio[0]:.0f} % of the rig's strength"
     print(f"\n{name}, {sensors} sensors, world {seed}: {told}\n")
     print(f"| figure | of this world | put to | {arguments.metric}, {UNITS[arguments.metric]} |\n|---|---|---|---|")
     print(f"| s of rest | {arguments.rest:g} | {2 * arguments.rest:g} | {number(size({}, 2 * arguments.rest))} |")
