@@ -17,8 +17,8 @@ def told(monkeypatch, capsys, *arguments):
 
 def rows_of(text):
     """Of the two tables, the rows below their heads."""
-    tables = text.split("\n\n| |")[1:]
-    return [[[cell.strip() for cell in line.split("|")[1:-1]] for line in one.splitlines()[2:]] for one in tables]
+    tables = [[line for line in part.splitlines() if line.startswith("| ")] for part in text.split("\n\n| |")[1:]]
+    return [[[cell.strip() for cell in line.split("|")[1:-1]] for line in table] for table in tables]
 
 
 def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(monkeypatch, capsys):
