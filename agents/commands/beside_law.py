@@ -6,16 +6,37 @@ python -m agents.commands.beside_law --policy DIR --sensors honest --episodes 12
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.policy.controller import ResidualController
+from agents.residual.settings import ResidualSettings
 from agents.training.validation import Score, validate
-from baselines.bench.statistics import crossed_interval, number, quantile
+from baselines.bench.haptics.rendering import rendering
+from baselines.bench.haptics.worlds import Condition
+from baselines.bench.statistics import LOST_ERROR, crossed_interval, number, quantile
 from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
+from baselines.work.tasks import Result
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import load_parameters
+
+FELT = (
+    "bandwidth, Hz: mean",
+    "JND at 1 Hz: median",
+    "own error, mm: median",
+    "less JND than the law: mean",
+    "less own error than the law: mean, mm",
+    "lost",
+)
+SETPOINT, PUSH = 2000.0, 10.0
+"""N/m and N, of the multisine hand."""
 
 HEAD = (
     "settled error, mm: median",
@@ -35,6 +56,7 @@ def main() -> None:
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=128, help="default: %(default)s")
     parser.add_argument("--seed", type=seed_number, default=80000, help="of the first episode (default: %(default)s)")
+    parser.add_argument("--rigs", type=whole_up_to(1000), default=16, help="under multisine hands (default: %(default)s)")
     run(parser, _compare)
 
 
@@ -63,6 +85,47 @@ def _compare(arguments: argparse.Namespace) -> None:
     for folder, score in zip(folders, scores, strict=True):
         print(_row(folder.name, score, within, (law.error - score.error)[None, within]))
     print(_less("all seeds", np.stack([law.error - score.error for score in scores])[:, within]))
+    _feel(folders, settings, arguments)
+
+
+@dataclass(frozen=True)
+class _Learned(Condition):
+    """A condition whose ``controller`` is the folder of a policy."""
+
+    def law(self) -> ResidualController:
+        return ResidualController(self.rig, self.controller)
+
+
+def _feel(folders: Sequence[Path], settings: ResidualSettings, arguments: argparse.Namespace) -> None:
+    """What a hand feels of the law and of each policy on it."""
+    rig, rigs = load_parameters(arguments.parameters), arguments.rigs
+    where = (rig, arguments.sensors, arguments.seed, rigs, settings.force_sensor)
+    law, *policies = (
+        _felt(rendering(condition, SETPOINT), rigs)
+        for condition in (Condition(settings.law, *where), *(_Learned(str(folder), *where) for folder in folders))
+    )
+    print(f"\nMultisine hand of {PUSH:g} N at {SETPOINT:g} N/m, {rigs} rigs drawn from seed {arguments.seed}, at rest.\n")
+    print(f"| | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
+    for name, own in zip((settings.law, *(folder.name for folder in folders)), (law, *policies), strict=True):
+        figures = [np.mean(own["bandwidth"]), quantile(own["jnd"], 0.5), quantile(own["error"], 0.5)]
+        less = ["", ""] if own is law else [_interval(_mean, (law[k] - own[k])[None]) for k in ("jnd", "error")]
+        print(f"| {name} | {' | '.join([*map(number, figures), *less])} | {own['lost']:g} |")
+    less = [_interval(_mean, np.stack([law[k] - own[k] for own in policies])) for k in ("jnd", "error")]
+    print(f"| all seeds | | | | {' | '.join(less)} | |")
+
+
+def _felt(found: Result, rigs: int) -> dict[str, Any]:
+    """Means over poses and directions, per rig (rigs,), under hands of ``PUSH``, and the number of lost lanes.
+
+    A lane that is lost counts with ``LOST_ERROR`` mm, a just noticeable difference of infinity and no bandwidth.
+    """
+    kept, lost = np.array(found["peak"]) == PUSH, np.array(found["lost"])
+    line = int(np.argmin(np.abs(np.array(found["frequency"]) - 1.0)))
+    values = {
+        "bandwidth": np.where(lost, 0.0, found["bandwidth"]), "jnd": np.where(lost, np.inf, found["differences"][line]),
+        "error": np.where(lost, LOST_ERROR, found["error_own_mm"]),
+    }  # fmt: skip
+    return {**{name: own[kept].reshape(-1, rigs).mean(axis=0) for name, own in values.items()}, "lost": lost[kept].sum()}
 
 
 def _row(name: str, score: Score, within: NDArray[np.bool_], gained: Array | None = None) -> str:
@@ -80,11 +143,12 @@ def _less(name: str, gained: Array) -> str:
 
 def _gains(gained: Array) -> list[str]:
     """Median and mean of ``gained`` (seeds, N), with intervals over seeds and episodes."""
-    told = []
-    for statistic in (_median, _mean):
-        low, high = crossed_interval(statistic, gained)
-        told.append(f"{number(statistic(gained))} ({number(low)} to {number(high)})")
-    return told
+    return [_interval(statistic, gained) for statistic in (_median, _mean)]
+
+
+def _interval(statistic: Callable[[Array], float], gained: Array) -> str:
+    low, high = crossed_interval(statistic, gained)
+    return f"{number(statistic(gained))} ({number(low)} to {number(high)})"
 
 
 def _median(values: Array) -> float:

@@ -18,6 +18,11 @@ from baselines.staged import LawStage
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array
 
+SAMPLED_LEAST, MOST_FALLS = 0.5, 3.0
+"""With sampled positions and a force sensor: the least fraction of the gain, and how many times a large half wave lowers it at
+once. A late tracker makes light rigs swing at 10 Hz until the gain has fallen; with less gain than this a noisy one makes them
+swing at 1 Hz. Found by trial, in worlds with drawn sensors; without a force sensor friction then hunts more."""
+
 MOST_BIAS = 2.0
 """assumed: a force sensor's bias is at most so many times that believed."""
 
@@ -43,11 +48,13 @@ class AdaptiveAdmittance(AdmittanceBackstepping):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         g, rig = self._gains["lab" if sampled else "ideal"], self.parameters
         period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else MEASURED_ROWS
+        yields = sampled and self.FORCE_SENSOR
         cells = exact.number("exp", -(g["pressure_bandwidth"] if sampled else math.inf) * period)
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period, "mass": rig.mechanics.mass, "ratio": DAMPING_RATIO},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_FRACTION, **g},
+            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), **g},
+            **{"least_fraction": SAMPLED_LEAST if yields else LEAST_FRACTION, "most_falls": MOST_FALLS if yields else 1.0},
             **{"force_bias": MOST_BIAS * rig.electronics.force_bias, "force_sensor": self.FORCE_SENSOR},
         }
         fresh = np.zeros(at.PISTONS + rows)

@@ -113,7 +113,12 @@ class AdmittanceBackstepping(StagedController):
         constants = {
             **{"sampled": sampled, "rows": rows, "period": period},
             **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{"quickness": 1.0 - exact.number("exp", -period / g["lead_time"]), "least_fraction": LEAST_FRACTION, **g},
+            **{
+                "quickness": 1.0 - exact.number("exp", -period / g["lead_time"]),
+                "least_fraction": LEAST_FRACTION,
+                "most_falls": 1.0,
+                **g,
+            },
         }
         fresh = np.zeros(at.PISTONS + rows)
         fresh[[at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0

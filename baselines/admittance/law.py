@@ -38,11 +38,12 @@ GAIN_SHARES = [WATCH_T, WATCH_N]
 
 GAIN_NAMES = (
     *("pneumatic_gain", "gain", "rest_gain", "rest_push", "dead_zone"),
-    *("quickness", "oscillation", "yielding", "least_fraction"),
+    *("quickness", "oscillation", "yielding", "least_fraction", "most_falls"),
 )
 """What ``command`` takes: c4, 1/s; c, 1/s, while the reference moves and while it rests; weight of a resting piston's position
 error; its dead zone, m; fraction of the way that a spool is taken in a period; speed error, m/s, beyond which sustained half
-waves lower c to ``yielding`` times itself, and what is left of it at least."""
+waves lower c to ``yielding`` times itself, and what is left of it at least; a half wave n times that speed lowers it
+n times, up to ``most_falls``."""
 
 MOTION_TIME = 0.1
 """s; assumed: how long the loop stays as stiff as for motion after the reference has come to rest."""
@@ -78,11 +79,16 @@ def sustained(memory: Array, row: int, i: int, error: float, period: float, leve
 
 
 @helper
-def watch(memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float) -> float:
-    """Gain fraction, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``."""
+def watch(
+    memory: Array, row: int, i: int, error: float, period: float, level: float, fall: float, least: float, most: float
+) -> float:
+    """Gain fraction, lowered by ``fall`` down to ``least`` at each sustained half wave of a speed error beyond ``level``: once
+    for each whole ``level`` of its size, up to ``most`` times."""
     fraction: float = memory[row, i]
-    if sustained(memory, row + 1, i, error, period, level, 0.0) > 0.0:
-        memory[row, i] = fraction = max(least, fall * fraction)
+    peak = sustained(memory, row + 1, i, error, period, level, 0.0)
+    for _ in range(int(min(peak / level, most))):
+        fraction = max(least, fall * fraction)
+    memory[row, i] = fraction
     return fraction
 
 
@@ -119,7 +125,7 @@ def command(
     order of ``GAIN_NAMES``; ``told`` is what ``controller.feedforward_rows`` gives.
     """
     c4, gain, rest_gain, rest_push, dead_zone = gains[0], gains[1], gains[2], gains[3], gains[4]
-    quickness, level, fall, least = gains[5], gains[6], gains[7], gains[8]
+    quickness, level, fall, least, most = gains[5], gains[6], gains[7], gains[8], gains[9]
     u, kept = scratch(4), exact.exp(-period / p[at.TAU])
     for i in range(joints.shape[1]):
         y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
@@ -143,8 +149,8 @@ def command(
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(motion[4, i], motion[5, i], sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(motion[4, i], motion[5, i], sine, cosine)
 
-        fraction_t = watch(memory, WATCH_T, i, dt, period, level, fall, least)
-        fraction_n = watch(memory, WATCH_N, i, dn, period, level, fall, least)
+        fraction_t = watch(memory, WATCH_T, i, dt, period, level, fall, least, most)
+        fraction_n = watch(memory, WATCH_N, i, dn, period, level, fall, least, most)
         memory[MOTION_FRACTION, i] = max(moving[i], memory[MOTION_FRACTION, i] * exact.exp(-period / MOTION_TIME))
         c = rest_gain + (gain - rest_gain) * memory[MOTION_FRACTION, i]
         et = (1.0 + (rest_push - 1.0) * rest[0, i]) * beyond(et, rest[0, i] * dead_zone)

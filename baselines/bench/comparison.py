@@ -80,7 +80,7 @@ class Cell:
 
 Cells = dict[tuple[str, Conditions], Cell]
 
-CONDITIONAL = ("stiffness_error", "cross_motion", "hunting_x", "hunting_y", "hunting", "restarts")
+CONDITIONAL = ("stiffness_error", "cross_motion", "unrest", "hunting_x", "hunting_y", "hunting", "restarts")
 """Metrics of which some environments say nothing: they apply where any episode of any controller says something."""
 
 WITHOUT_RATIO = ("restarts", "saturation")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.bench.comparison import METRICS, REFERENCE, known
+from baselines.bench.comparison import METRICS, MOVING, REFERENCE, known
 from baselines.bench.statistics import number
 
 Figures = Sequence[dict[str, Any]]
@@ -18,7 +18,9 @@ IN_FULL = ("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the overview: a metric under some conditions; with ``worst`` beside its median, or the ratio instead."""
+    """A column of the overview: a metric under some conditions; with ``worst`` beside its median, or the ratio instead.
+
+    ``hand`` is one of ``MOVING``, or "" for the environment's own."""
 
     title: str
     environment: str
@@ -27,6 +29,12 @@ class Column:
     metric: str
     kind: str = "metrics"
     worst: bool = False
+    hand: str = ""
+
+    @property
+    def conditions(self) -> tuple[str, str, str, str]:
+        """Environment, sensors, plant and moving hand, as a cell has them."""
+        return self.environment, self.sensors, self.plant, self.hand
 
     def text(self, figures: dict[str, Any]) -> str:
         """The entry of one cell."""
@@ -46,6 +54,10 @@ COLUMNS = (
     Column("hunting, mm (median; worst)", PROBE, "ideal", "nominal", "hunting", worst=True),
     Column("the same, lab sensors", PROBE, "lab", "nominal", "hunting", worst=True),
     Column("air, l/min", CIRCLE, "ideal", "nominal", "air"),
+    *(
+        Column(f"circle, {hand} hand, lab sensors: settled error, mm", CIRCLE, "lab", "randomised", "settled_rms", hand=hand)
+        for hand in MOVING
+    ),
 )
 
 
@@ -61,16 +73,13 @@ def controllers_of(figures: Figures) -> list[str]:
 
 def overview(figures: Figures) -> str:
     """One row per controller; columns whose environment did not run are left out."""
-    found = {
-        (cell["controller"], cell["environment"], cell["sensors"], cell["plant"]): cell
-        for cell in figures if not cell.get("hand")
-    }  # fmt: skip
-    columns = [c for c in COLUMNS if any(key[1:] == (c.environment, c.sensors, c.plant) for key in found)]
+    found = {(cell["controller"], *_place(cell)): cell for cell in figures}
+    columns = [column for column in COLUMNS if any(key[1:] == column.conditions for key in found)]
     rows = [["controller", *(column.title for column in columns), "lost episodes"]]
     for name in controllers_of(figures):
         row = [name]
         for column in columns:
-            cell = found.get((name, column.environment, column.sensors, column.plant))
+            cell = found.get((name, *column.conditions))
             row.append("-" if cell is None else column.text(cell))
         own = [cell for cell in figures if cell["controller"] == name]
         rows.append([*row, f"{sum(c['lost'] for c in own)} of {sum(c['episodes'] for c in own)}"])
@@ -93,12 +102,8 @@ def losses(figures: Figures) -> str:
 def full(figures: Figures) -> str:
     """A section per environment, sensor model, plant and moving hand, with a row per metric and controller."""
     sections = []
-
-    def place(cell: dict[str, Any]) -> tuple[str, ...]:
-        return (cell["environment"], cell["sensors"], cell["plant"], cell.get("hand", ""))
-
-    for where in dict.fromkeys(map(place, figures)):
-        here = [cell for cell in figures if place(cell) == where]
+    for where in dict.fromkeys(map(_place, figures)):
+        here = [cell for cell in figures if _place(cell) == where]
         rows = [["metric", "controller", "median [95 % interval]", "95 %", "worst", f"over {REFERENCE} [95 % interval]"]]
         for metric in IN_FULL:
             for cell in here:
@@ -111,6 +116,10 @@ def full(figures: Figures) -> str:
         hand = f", moving hand: {where[3]}" if where[3] else ""
         sections.append(f"## {where[0]}, {known(*where[1:3])}{hand}\n\n{markdown(rows)}")
     return "\n\n".join(sections)
+
+
+def _place(cell: dict[str, Any]) -> tuple[str, ...]:
+    return cell["environment"], cell["sensors"], cell["plant"], cell.get("hand", "")
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> str:

@@ -39,6 +39,7 @@ UNITS = {
     "settled_max_y": "mm",
     "stiffness_error": "%",
     "cross_motion": "mm",
+    "unrest": "mm",
     "hunting_x": "mm",
     "hunting_y": "mm",
     "restarts": "1/s",
@@ -49,17 +50,18 @@ UNITS = {
 }
 """Metric -> unit. ``settled_rms`` is that of sqrt(ex^2 + ey^2). ``stiffness_error`` is rendered over asked-for stiffness
 along the push, less one; ``cross_motion`` the displacement across the push beyond the one asked for; both from the compliant
-target, and only where the reference stands still all along and the episode ends in a held push."""
+target. ``unrest`` is the motion, peak to peak, in the ``WINDOW`` before the push. All three say something only where the
+reference stands still all along and the episode ends in a held push."""
 
 (
     COUNT, SETTLED_COUNT, EX, EY, SX, SY, K1, K2, PEAK_EX, PEAK_EY, PEAK_SX, PEAK_SY, SUPPLIED, SATURATED,
     QUIET_NOW, QUIET_TIME, LOW_X, LOW_Y, HIGH_X, HIGH_Y, HUNTING_X, HUNTING_Y, RESTARTS, IS_STUCK,
-    IS_STILL, KEPT, SUM_X, SUM_Y, REST_X, REST_Y, IS_HELD, MOVED_X, MOVED_Y, ASKED_X, ASKED_Y, PUSH_X, PUSH_Y,
-) = range(37)  # fmt: skip
+    IS_STILL, KEPT, SUM_X, SUM_Y, REST_X, REST_Y, SPAN_X, SPAN_Y, IS_HELD, MOVED_X, MOVED_Y, ASKED_X, ASKED_Y, PUSH_X, PUSH_Y,
+) = range(39)  # fmt: skip
 """Rows of the tally: samples, and settled ones; sums of squares of errors (m2), settled errors and relative errors of the
 pneumatic stiffness; their peaks; kg of air; samples with a valve at its limit; s of constant setpoints now, and those that
-counted; extremes of this window and the worst span; restarts; flags; the window's samples and their sum; means at rest and
-held; displacement asked for; force held."""
+counted; extremes of this window and the worst span; restarts; flags; the window's samples and their sum; means at rest,
+spans of the same window, means held; displacement asked for; force held."""
 
 TARGET, COMPLIANT, FORCE, SETPOINT, PNEUMATIC = range(0, 10, 2)
 """First rows of what is asked for: target, compliant target, force, closed-loop and pneumatic stiffness; x and y each."""
@@ -126,6 +128,11 @@ def _add_rest(
             if before[FORCE, i] == 0.0 and before[FORCE + 1, i] == 0.0:
                 size = min(tally[KEPT, i], float(width))
                 tally[REST_X, i], tally[REST_Y, i] = tally[SUM_X, i] / size, tally[SUM_Y, i] / size
+                for k in range(2):
+                    low, high = math.inf, -math.inf
+                    for j in range(int(size)):
+                        low, high = min(low, kept[j, k, i]), max(high, kept[j, k, i])
+                    tally[SPAN_X + k, i] = high - low
             tally[QUIET_NOW, i] = 0.0
             tally[KEPT, i] = tally[SUM_X, i] = tally[SUM_Y, i] = 0.0
             if not still:
@@ -204,10 +211,10 @@ class EpisodeMetrics:
                 "air": 60e3 * t[SUPPLIED] / NORMAL_DENSITY / (t[COUNT] * self._period),
                 "saturation": 100 * t[SATURATED] / t[COUNT],
             }
-            values["stiffness_error"], values["cross_motion"] = self._rendered()
+            values["stiffness_error"], values["cross_motion"], values["unrest"] = self._rendered()
         return {name: values[name] for name in UNITS}
 
-    def _rendered(self) -> tuple[Array, Array]:
+    def _rendered(self) -> tuple[Array, Array, Array]:
         t = self._tally
         push, asked = t[PUSH_X : PUSH_Y + 1], t[ASKED_X : ASKED_Y + 1]
         moved = t[MOVED_X : MOVED_Y + 1] - t[REST_X : REST_Y + 1]
@@ -215,4 +222,6 @@ class EpisodeMetrics:
         along, wanted = (np.einsum("in,in->n", way, direction) for way in (moved, asked))
         across = direction[0] * (moved - asked)[1] - direction[1] * (moved - asked)[0]
         says = (t[IS_STILL] > 0) & (t[IS_HELD] > 0)
-        return np.where(says, 100 * (wanted / along - 1), np.nan), np.where(says, 1e3 * np.abs(across), np.nan)
+        found = 100 * (wanted / along - 1), 1e3 * np.abs(across), 1e3 * np.hypot(*t[SPAN_X : SPAN_Y + 1])
+        stiffness, cross, unrest = (np.where(says, values, np.nan) for values in found)
+        return stiffness, cross, unrest

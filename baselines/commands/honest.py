@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from baselines.bench.comparison import MOVING
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.sensor_floor import probe_floor
 from baselines.bench.statistics import number, penalize_lost, quantile
@@ -45,38 +46,42 @@ def _honest(arguments: argparse.Namespace) -> None:
     folder, believed = make_folder(arguments.out), Parameters()
     lines = [
         f"Rigs and scenarios drawn, {arguments.episodes} episodes from seed {arguments.seed}; median, 95 % and worst.", "",
-        "| law | sensors | Probe: stiffness error, % | hunting, mm | settled error, mm | Circle: settled error, mm | lost |",
-        "|---|---|---|---|---|---|---|",
+        "| law | sensors | Probe: stiffness error, % | hunting, mm | settled error, mm | Circle: settled error, mm | "
+        f"{' | '.join(f'Circle, {hand} hand' for hand in MOVING)} | lost |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     span = (arguments.episodes, arguments.seed)
     for name in arguments.controller:
         for condition in CONDITIONS:
             sensors, _, drawn = condition.partition(", ")
             rig = as_described(believed) if sensors == "honest" and not drawn else believed
-            probe, circle = (
+            probe, *circles = (
                 evaluate(f"BirthSIM/{env}-v1", make_controller(name, believed), name, *span, sensors=sensors, randomize=True,
-                         parameters=rig) for env in ("Probe", "Circle")
+                         parameters=rig, user_force=hand)
+                for env, hand in (("Probe", None), ("Circle", None), *(("Circle", hand) for hand in MOVING))
             )  # fmt: skip
-            hunting = np.maximum(_sizes(probe, "hunting_x"), _sizes(probe, "hunting_y"))
-            figures = (_sizes(probe, "stiffness_error"), hunting, _sizes(probe, "settled_rms"), _sizes(circle, "settled_rms"))
-            lost = sum(probe.lost) + sum(circle.lost)
-            lines.append(f"| {name} | {condition} | {' | '.join(map(_three, figures))} | {lost} |")
+            hunting = np.maximum(sizes_of(probe, "hunting_x"), sizes_of(probe, "hunting_y"))
+            settled = [sizes_of(one, "settled_rms") for one in (probe, *circles)]
+            figures = (sizes_of(probe, "stiffness_error"), hunting, *settled)
+            lost = sum(sum(one.lost) for one in (probe, *circles))
+            lines.append(f"| {name} | {condition} | {' | '.join(map(three, figures))} | {lost} |")
             print(lines[-1])
     for condition, rig in (("honest", as_described(believed)), ("honest, drawn", believed)):
         floor = {name: np.abs(values) for name, values in probe_floor(rig, *span).items()}
         lines.append(
-            f"| no law can have | {condition} | {_three(floor['stiffness_error'])} | | {_three(floor['held_error'])} | | |"
+            f"| no law can have | {condition} | {three(floor['stiffness_error'])} | | {three(floor['held_error'])}{' |' * 6}"
         )
     write_text(folder / "honest.md", "\n".join(lines) + "\n")
     print("\n".join(lines))
 
 
-def _sizes(evaluation: Evaluation, metric: str) -> Array:
+def sizes_of(evaluation: Evaluation, metric: str) -> Array:
     """The sizes of a metric per episode, infinite where the lane was lost."""
-    return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))
+    return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost, applies=True))
 
 
-def _three(values: Array) -> str:
+def three(values: Array) -> str:
+    """Median, 95 % and worst."""
     return ", ".join(number(quantile(values, fraction)) for fraction in (0.5, 0.95, 1.0))
 
 

@@ -13,6 +13,7 @@ from baselines.bench import comparison, evaluation
 from baselines.bench.comparison import (
     ENVIRONMENTS,
     METRICS,
+    MOVING,
     PLANTS,
     REFERENCE,
     Conditions,
@@ -240,6 +241,19 @@ def test_the_overview_has_a_row_per_controller_and_says_lost(figures):
     stiffness = column["rendered stiffness off by, % (median; worst)"]
     assert (law[stiffness], other[stiffness], worst[stiffness]) == ("15; 20", "1; 1", "-")
     assert [row[column["lost episodes"]] for row in (law, other, worst)] == ["0 of 6", "1 of 6", "3 of 3"]
+
+
+def test_the_overview_has_a_column_per_moving_hand_that_is_not_the_circles_own():
+    def cell_of(hand, error):
+        where = {"environment": CIRCLE.environment, "sensors": "lab", "plant": "randomised", "hand": hand}
+        settled = {"settled_rms": {"median": error, "low": error, "high": error}}
+        return {"controller": "law", **where, "lost": 0, "episodes": 3, "metrics": settled, "ratios": {}}
+
+    head, law = rows(overview([cell_of("", 1.0), *(cell_of(hand, 2.0 + k) for k, hand in enumerate(MOVING))]))
+    found = dict(zip(head, law, strict=True))
+    assert found["the same, lab sensors, mm"] == "1 [1, 1]"
+    for k, hand in enumerate(MOVING):
+        assert found[f"circle, {hand} hand, lab sensors: settled error, mm"] == f"{2 + k} [{2 + k}, {2 + k}]"
 
 
 def test_times_stand_apart_from_figures_since_they_differ_from_run_to_run(cells):

@@ -259,6 +259,14 @@ def test_displacement_is_from_the_last_half_second_before_the_push_to_the_last_o
     assert inside["stiffness_error"] == pytest.approx(100 * (10 / 9.5 - 1), rel=0.02)
 
 
+def test_unrest_is_the_motion_of_the_half_second_before_the_push():
+    # x and y both move: the diagonal of two spans. A jump before the window and the way under the push do not count.
+    moved = spring(0, rest=2.0, seconds=6.0, wobble=lambda t: 3e-3 * (t < 1.2) + 4e-4 * (t < 1.8))
+    assert moved["unrest"] == pytest.approx(0.4 * math.sqrt(2), rel=1e-6)
+    assert spring(0, rest=2.0, seconds=6.0)["unrest"] == pytest.approx(0, abs=1e-9)
+    assert np.isnan(spring(0, push=0)["unrest"]).all()
+
+
 @pytest.mark.parametrize("again", [3.2, 5.0])
 def test_every_push_is_measured_from_the_rest_before_it_be_it_ever_so_short(again):
     time = PERIOD * np.arange(round(9 / PERIOD))

@@ -94,3 +94,22 @@ def test_on_circles_a_scale_and_a_gain_leave_their_share():
     assert scaled.max() < 0.012 * 400.0, "places are within 400 mm of the registration"
     gained = circle_floor(none.replace({"electronics.force_gain_error": 0.01}), 16, 0)
     assert 0.0 < gained.max() < 0.03 * 1e3 * 40.0 / 500.0, "40 N at 500 N/m, 1 % drawn up to threefold"
+
+
+@pytest.mark.parametrize(("seed", "most"), [(396, 20.0), (642, 10.0)])
+def test_a_noisy_late_tracker_makes_no_lasting_swing(seed, most):
+    """Worlds in which a gain that fell to 0.35 of itself made the head swing by 118 and 22 mm; now it is 8 and 3 mm or so."""
+    law = make_controller("admittance-adaptive", Parameters())
+    found = evaluate("BirthSIM/Probe-v1", law, "adaptive", 1, seed, progress=False, sensors="honest", randomize=True).metrics
+    assert max(found["hunting_x"][0], found["hunting_y"][0]) < most
+
+
+def test_large_swings_lower_the_gain_at_once_only_with_sampled_positions_and_a_force_sensor():
+    told = {}
+    for name in NAMES:
+        law = make_controller(name, Parameters())
+        for sampled in (False, True):
+            given = law.law_stages(sampled)[0].constants
+            told[name, sampled] = [given[at.CONSTANTS.index(own)] for own in ("least_fraction", "most_falls")]
+    assert told.pop(("admittance-adaptive", True)) == [0.5, 3.0]
+    assert set(map(tuple, told.values())) == {(0.35, 1.0)}

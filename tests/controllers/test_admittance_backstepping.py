@@ -61,7 +61,9 @@ class Law:
             np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
             np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
             np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
-            np.array([30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_FRACTION]),
+            np.array([
+                30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_FRACTION, 1.0
+            ]),
             np.zeros((4, lanes)) if told is None else told,
             remembered(lanes) if memory is None else memory, openings,
         )  # fmt: skip
@@ -207,10 +209,10 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
         assert admittance_law.lead(sign, -sign, np.exp(-PERIOD / 0.004), 0.5) == sign
 
 
-def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35) -> Array:
+def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
     memory, row = remembered(1), admittance_law.WATCH_N
-    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least) for error in errors])
+    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least, most) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)
@@ -226,6 +228,15 @@ def test_sustained_oscillation_lowers_the_gain_down_to_the_least(frequency: floa
     assert np.mean(np.abs(fraction - expected) < 1e-12) > 0.97, "but for the instants of the sign's change"
     assert fraction.min() == pytest.approx(max(0.35, 0.9 ** np.floor(2 * frequency * 2 - 2)), rel=0.11)
     assert falls.min() == 0
+
+
+@pytest.mark.parametrize(("most", "falls"), [(1.0, 1), (2.0, 2), (3.0, 3), (9.0, 3)])
+def test_a_half_wave_of_several_levels_lowers_the_gain_as_many_times_up_to_the_most(most: float, falls: int) -> None:
+    """An amplitude of 3.5 levels: at each half wave after the second one three falls, or ``most``."""
+    fraction = watched(3.5 * 0.06 * np.sin(2 * np.pi * 10.0 * TIMES), most=most)
+    steps = np.unique(fraction)[::-1]
+    expected = np.maximum(0.9 ** (falls * np.arange(len(steps))), 0.35)
+    np.testing.assert_allclose(steps, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.74])

@@ -27,7 +27,7 @@ from baselines.bench.haptics.multisine import (
 )
 from baselines.bench.haptics.own_error import declared_offset, error_size, pure_spring_offset
 from baselines.bench.haptics.recording import record
-from baselines.bench.haptics.worlds import DIRECTIONS, POSES, condition_of, lost_lanes, resting
+from baselines.bench.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, lost_lanes, resting
 from baselines.bench.metrics import NORMAL_DENSITY
 from baselines.impedance import declared_by
 from baselines.work.tasks import Result
@@ -43,8 +43,12 @@ SHOWN_EVERY = 50
 
 
 def measure_rendering(stiffness: float, **settings: Any) -> Result:
+    """``rendering`` from the settings of a piece."""
+    return rendering(condition_of(**settings), stiffness)
+
+
+def rendering(condition: Condition, stiffness: float) -> Result:
     """Per lane, which are poses, directions, peaks and rigs: the figures of docs/haptics.md; SI units but mm and l/min."""
-    condition = condition_of(**settings)
     law, each = condition.law(), condition.drawn()
     cases = list(itertools.product(POSES, DIRECTIONS, PEAKS, each))
     poses, directions, peaks, rigs = (list(side) for side in zip(*cases, strict=True))

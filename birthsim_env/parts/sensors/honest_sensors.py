@@ -222,6 +222,11 @@ class HonestSensors:
         at.work_out(figures, unit, self._constants, errors)
         self._errors[:, lanes] = errors
 
+    @property
+    def figures(self) -> dict[str, Array]:
+        """Figure -> what the episode of each lane has, (N,)."""
+        return dict(zip(at.FIGURES, self._errors, strict=False))
+
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         _honest(
