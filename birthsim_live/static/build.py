@@ -33,6 +33,7 @@ def build_page(folder: Path, rig: Parameters) -> int:
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
+    link("wasm-ld", "--version")  # before anything that takes time
     packer = Packer()
     rig_pack, policies = pack(rig, packer), packed_policies(rig, packer)
     with tempfile.TemporaryDirectory() as place:
