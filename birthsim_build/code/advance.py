@@ -25,7 +25,7 @@ def advance_code(stages: Sequence[str]) -> str:
 {wrappers}
 @birthsim_stages = internal constant [{len(stages)} x ptr] [{pointers}]
 
-define i32 @birthsim_advance(ptr noundef %image, i32 noundef %periods) {{
+define i32 @birthsim_advance(ptr noundef %image, i32 noundef %periods) nounwind {{
 start:
   %rows = getelementptr i64, ptr %image, i64 {HEAD}
   %world = ptrtoint ptr %rows to i64
@@ -141,7 +141,7 @@ def _wrapper(number: int, symbol: str) -> str:
     types = ", ".join(["i64"] * ARGUMENTS)
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, {types})
-define hidden i64 @birthsim_stage_{number}({given}) {{
+define hidden i64 @birthsim_stage_{number}({given}) nounwind {{
   %missed = alloca i64
   %error = alloca ptr
   store i64 0, ptr %missed

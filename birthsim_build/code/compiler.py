@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from llvmlite.binding import llvm_version_info
 
 from birthsim_build.image import Words
 
@@ -21,6 +22,10 @@ ONE_LANE = {
 }
 """Environment of the process that compiles for one lane, and not for the processor that it runs on."""
 
+
+LEAST_LLVM = 22
+"""LLVM 20 gives ``baselines.estimation.observers.observe`` other bits once the function is local to the code; LLVM 21 is
+untried."""
 
 EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
 """Targets with shared libraries -> what the linker calls them."""
@@ -46,6 +51,13 @@ def compile_object(
 def has_linker() -> bool:
     """Whether PyPI's ``ziglang`` is there."""
     return find_spec("ziglang") is not None
+
+
+def require_llvm() -> None:
+    """Raises ``ValueError`` for an LLVM before ``LEAST_LLVM``."""
+    if llvm_version_info[0] < LEAST_LLVM:
+        found = ".".join(map(str, llvm_version_info))
+        raise ValueError(f"llvmlite has LLVM {found}; allowed: {LEAST_LLVM} or later, llvmlite 0.50")
 
 
 def require_linker() -> None:

@@ -55,9 +55,6 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
         if not one.is_declaration and not one.name.startswith(EXPORTED):
             one.linkage = llvm.Linkage.internal
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
-    for function in module.functions:
-        if not function.is_declaration:
-            function.add_function_attribute("nounwind")
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(module, builder)
     module.verify()
@@ -78,6 +75,8 @@ def _kernel_code(function: str) -> tuple[str, str]:
     code = str(compiled.library._get_module_for_linking())
     code = re.sub(r"^target .*$|^source_filename.*$", "", code, flags=re.MULTILINE)
     code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code).replace("= common ", "= internal ")
+    # Nothing is raised, so that no target needs tables to unwind.
+    code = re.sub(r"^(define [^{]*)\{$", r"\1nounwind {", code, flags=re.MULTILINE)
     # IEEE's own operations: processors that have an instruction for them need no library.
     for operation, numbers in (("sqrt", 1), ("floor", 1), ("fabs", 1), ("copysign", 2)):
         intrinsic = f"@llvm.{operation}.f64("

@@ -11,7 +11,7 @@ from baselines.registry import CONTROLLERS, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
-from birthsim_build.code.compiler import require_linker
+from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.targets import BUILT
 from birthsim_build.loops import RESIDUAL
 from birthsim_env.parts.scenarios import SCENARIOS
@@ -47,6 +47,7 @@ def _build(arguments: argparse.Namespace) -> None:
     if target not in BUILT:
         raise ValueError(f"target = {target!r}; allowed: {', '.join(BUILT)}")
     bundle = _bundle(arguments)
+    require_llvm()
     if target != "cortex-m7":
         require_linker()
     folder = make_folder(arguments.out)

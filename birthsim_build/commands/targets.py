@@ -21,7 +21,7 @@ from birthsim_build.check import reference
 from birthsim_build.check.page import CLOCK, Line, page
 from birthsim_build.check.reference import CHAMBERS, PERIODS, SHARED, as_inputs, first_difference
 from birthsim_build.check.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
-from birthsim_build.code.compiler import require_linker
+from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.estimate import HOST
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -48,6 +48,7 @@ def main() -> None:
 
 
 def _targets(arguments: argparse.Namespace) -> None:
+    require_llvm()
     require_linker()
     folder, rig = make_folder(arguments.out), Parameters()
     bundle = make_bundle(rig, ["circle"], ["ideal", "lab"], LAWS, [POLICY])

@@ -23,6 +23,7 @@ from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.options import SCRATCH
 from birthsim_env.physics.plant import Plant
 
 
@@ -67,7 +68,7 @@ def _worn_plant(world: int, seen: int, memory: int, constants: int, tables: int,
 def _optional_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """As ``_worn_plant``, with the options of ``physics.options``; memory: inner commands and further states."""
     w, s, m, about = block(world, WORLD), block(seen, SEEN), block(memory, 4 + options.FURTHER), numbers(constants, 2)
-    u, own, p, x = scratch(4), scratch(options.SCRATCH), w[:PARAMETERS], w[STATE : STATE + STATES]
+    u, own, p, x = scratch(4), scratch(SCRATCH), w[:PARAMETERS], w[STATE : STATE + STATES]
     spools.admit(s[OPENING : OPENING + 4], p, m[:4], u, n)
     steps = int(about[1])
     options.integrate(

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from birthsim_build.code.compiler import compile_object, link
+from birthsim_build.code.compiler import compile_object, link, require_linker, require_llvm
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.static.pack import Packer, pack, packed_policies
 
@@ -29,10 +29,12 @@ POLICY = (
 def build_page(folder: Path, rig: Parameters) -> int:
     """Write the page of ``rig`` into ``folder``, which must be new or empty; its bytes.
 
-    Raises ``ValueError`` for a folder with something in it, a rig that the page cannot show, and where the linker is missing.
+    Raises ``ValueError`` for a folder with something in it, a rig that the page cannot show, an old LLVM, and where the linker is missing.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
+    require_llvm()
+    require_linker()
     packer = Packer()
     rig_pack, policies = pack(rig, packer), packed_policies(rig, packer)
     with tempfile.TemporaryDirectory() as place:

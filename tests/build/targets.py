@@ -10,6 +10,9 @@ import sys
 
 import numpy as np
 import pytest
+from llvmlite.binding import llvm_version_info
+
+from birthsim_build.code.compiler import LEAST_LLVM
 
 BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "--sensors", "ideal", "lab")
 
@@ -25,6 +28,8 @@ def need_program(name, package):
 
 
 def need_linker():
+    if llvm_version_info[0] < LEAST_LLVM:
+        pytest.skip(f"LLVM {llvm_version_info[0]}; building needs {LEAST_LLVM}")
     need(importlib.util.find_spec("ziglang"), "ziglang is missing: pip install 'birthsim[build]'")
 
 

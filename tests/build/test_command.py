@@ -30,7 +30,17 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, options, said):
     assert not out.exists()
 
 
+def test_an_old_llvm_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (20, 1, 8))
+    status, _, complained = call("build", monkeypatch, capsys, "wasm", "--out", tmp_path / "out")
+    assert (status, complained) == (
+        2, "birthsim-build: error: llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50\n"
+    )  # fmt: skip
+    assert not (tmp_path / "out").exists()
+
+
 def test_without_a_linker_it_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (22, 1, 0))
     monkeypatch.setattr("birthsim_build.code.compiler.find_spec", lambda _: None)
     status, _, complained = call("build", monkeypatch, capsys, "wasm", "--out", tmp_path / "out")
     assert status == 2

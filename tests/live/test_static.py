@@ -56,6 +56,25 @@ ROWS = """async (cases) => {
 """Rows of every period of sessions with settings, beside the one that is shown."""
 
 
+SILENT = """async () => {
+  const { Machine } = await import(new URL("static/worker/machine.js", location));
+  const { Hub } = await import(new URL("static/worker/hub.js", location));
+  const pack = await (await fetch(new URL("rig/pack.json", location))).json();
+  const machine = await Machine.of(await (await fetch(new URL("rig/loop.wasm", location))).arrayBuffer());
+  pack.numbers.patience = 0.2;
+  const held = [];
+  return new Promise((resolve) => {
+    const hub = new Hub(pack, machine, null, ({ type, pointer }) => {
+      if (type === "frame") held.push(pointer !== null);
+      if (held.includes(true) && held.at(-1) === false) resolve(true);
+    });
+    hub.start();
+    hub.receive({ type: "drag", position: [0.53, 0], id: 1 });
+  });
+}"""
+"""True once a rig has let go of a hand that said a single word."""
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """The folder, made by the command."""
@@ -179,6 +198,10 @@ def test_every_choice_runs_in_the_window(window):
             assert window.frame()["lost"] is None, (name, choice)
 
 
+def test_a_hand_that_falls_silent_lets_go(window):
+    assert window.page.evaluate(SILENT)
+
+
 def test_what_is_not_allowed_is_named_and_changes_nothing(chromium, address):
     with Window(chromium, address, NARROW) as window:
         before = window.value("birthsim.settings")
@@ -196,6 +219,14 @@ def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
         page.goto(served)
         page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
         page.close()
+
+
+def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path):
+    (tmp_path / "rig.toml").write_text("[valves]\ndeadband = 0.02\n")
+    done = run("live", "--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
+    assert done.returncode == 2
+    assert "imperfect valves" in done.stderr.splitlines()[-1]
+    assert not (tmp_path / "page").exists()
 
 
 def test_a_folder_with_something_in_it_is_refused(tmp_path):
