@@ -77,7 +77,7 @@ class Identified:
         write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
 
 
-MISFIT = 1.2
+MISFIT = 1.1
 """Residuals so many times larger than the noise are named."""
 
 
