@@ -31,8 +31,8 @@ MOST = (25, 30)
 """Evaluations of the first and of the second search at most."""
 
 TOLERANCE = 1e-7
-"""A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, and 1
-of it is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way along it."""
+"""A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, of
+which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
 
 DIFFERENCE = 1e-5
 """Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
