@@ -24,7 +24,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="baselines.commands.identify_recovery", description=__doc__.splitlines()[0])
     parser.add_argument("--rigs", type=whole_up_to(10_000), default=50, help="default: %(default)s")
-    parser.add_argument("--seed", type=seed_number, default=81000, help="of the first rig (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=82000, help="of the first rig (default: %(default)s)")
     parser.add_argument("--duration", type=finite_number, default=12.0, help="s of each experiment (default: %(default)s)")
     parser.add_argument("--experiment", choices=tuple(EXPERIMENTS), default="proposed", help="default: %(default)s")
     add_processes(parser)

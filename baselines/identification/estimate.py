@@ -27,8 +27,12 @@ SHORT, SOME = 0.1, 24
 DRAWN = 48
 """Rigs that are drawn to begin the first search at, assumed."""
 
-MOST = (40, 15)
-"""Evaluations of the first and of the second search at most; the first takes 10 to 15, the second 3."""
+MOST = (25, 30)
+"""Evaluations of the first and of the second search at most."""
+
+TOLERANCE = 1e-7
+"""A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, of
+which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
 
 DIFFERENCE = 1e-5
 """Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
@@ -111,8 +115,8 @@ def search(problem: Problem, theta: Array, most: int) -> Fit:
     low, high = problem.limits
     inside = np.clip(theta, low + 1e-6, high - 1e-6)
     found: OptimizeResult = least_squares(
-        problem.residuals, inside, problem.jacobian, bounds=(low, high), x_scale=problem.spread, max_nfev=most, ftol=1e-5,
-        xtol=1e-4, tr_solver="lsmr",
+        problem.residuals, inside, problem.jacobian, bounds=(low, high), x_scale=problem.spread, max_nfev=most, ftol=TOLERANCE,
+        xtol=TOLERANCE,
     )  # fmt: skip
     if problem.slopes is None or not np.isfinite(found.cost):
         raise ValueError("the rig's parameters predict nothing of the log; allowed: parameters nearer to the laboratory's rig")

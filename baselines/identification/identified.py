@@ -34,10 +34,11 @@ class Row:
     def words(self) -> str:
         """One line: name, value, interval, unit."""
         unit = field_of(self.name).metadata["unit"]
-        interval = f"{self.low:.4g} to {self.high:.4g}"
+        value = f"{self.name} = {self.value:.5g}{'' if unit == '-' else f' {unit}'}"
+        interval = f"{self.low:.5g} to {self.high:.5g}"
         if self.told:
-            return f"{self.name} = {self.value:.5g} {unit}, 95 % interval {interval}; was {self.owner:.5g}"
-        return f"{self.name} = {self.value:.5g} {unit}, KEPT: the log cannot tell it, it may be {interval}"
+            return f"{value}, 95 % interval {interval}; was {self.owner:.5g}"
+        return f"{value}, KEPT: the log cannot tell it, it may be {interval}"
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Identified:
         write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
 
 
-MISFIT = 1.2
+MISFIT = 1.1
 """Residuals so many times larger than the noise are named."""
 
 

@@ -24,7 +24,7 @@ SPREAD = np.array([5e-3, 0.1, 5e-3, 0.1, 2e-4, 2e-4, *[2e4] * 4, *[12.0] * 4])
 DIFFERENCE = 1e-4
 """Step of differences, in ``SPREAD``."""
 
-CLOSE = 3e-2
+CLOSE = 3e-3
 """Where a step moves every window's start by less than this many standard deviations the search ends."""
 
 SHRINKS = 0.5
