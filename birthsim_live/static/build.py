@@ -29,8 +29,8 @@ POLICY = (
 def build_page(folder: Path, rig: Parameters) -> int:
     """Write the page of ``rig`` into ``folder``, which must be new or empty; its bytes.
 
-    Raises ``ValueError`` for a folder with something in it, a rig that the page cannot show, an old LLVM, and where the linker is
-    missing.
+    Raises ``ValueError`` for a folder with something in it, a rig that the page cannot show, an old LLVM, and where the linker
+    is missing.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
