@@ -17,6 +17,10 @@ LAGS = 40
 """Rows up to which residuals are compared with themselves."""
 
 
+SHOWN = 5
+"""Of so many rows of pressures one is drawn."""
+
+
 def residuals_figure(found: Identified, folder: Path) -> list[Path]:
     """Measured less predicted, pressures and positions, over time, and the pressures' correlation with themselves."""
     windows, problem = found.fit.problem.windows, found.fit.problem
@@ -30,13 +34,17 @@ def residuals_figure(found: Identified, folder: Path) -> list[Path]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 1, figsize=(9, 8), layout="constrained")
         for k, (name, colour) in enumerate(zip(CHAMBERS, (DARK, MIDDLE, ACCENT, LIGHT), strict=True)):
-            axes[0].plot(times.ravel(), pressures[..., k].ravel(), ".", ms=1.5, color=colour, label=f"chamber {name}")
+            shown = times[:, ::SHOWN].ravel(), pressures[:, ::SHOWN, k].ravel()
+            axes[0].plot(*shown, ".", ms=1.5, color=colour, label=f"chamber {name}", rasterized=True)
             lags, values = _correlation(pressures[..., k])
             axes[2].plot(1e3 * period * lags, values, color=colour, ls=LINES[k], label=f"chamber {name}")
         arrived = (windows.trial.times[windows.starts][:, None] + period * windows.arrived)[windows.valid]
         for k, (name, colour) in enumerate((("x", DARK), ("y", MIDDLE))):
-            axes[1].plot(arrived, 1e3 * positions[..., k][windows.valid], ".", ms=2, color=colour, label=f"position {name}")
-        axes[0].set(xlabel="time (s)", ylabel="pressure residual (Pa)", title="measured less predicted")
+            shown = arrived, 1e3 * positions[..., k][windows.valid]
+            axes[1].plot(*shown, ".", ms=2, color=colour, label=f"position {name}", rasterized=True)
+        axes[0].set(
+            xlabel="time (s)", ylabel="pressure residual (Pa)", title=f"measured less predicted (pressures: one row in {SHOWN})"
+        )
         axes[1].set(xlabel="time (s)", ylabel="position residual (mm)")
         axes[2].set(xlabel="lag (ms)", ylabel="correlation of residuals (-)", ylim=(-0.3, 1.05))
         limit = 1.96 / np.sqrt(pressures[..., 0].size)
