@@ -44,5 +44,5 @@ def test_linked_files_exist():
     for page, text in TEXTS.items():
         links = [link for link in re.findall(r"\]\(([^)#]+)[^)]*\)", text) if "://" not in link]
         assert [link for link in links if not (page.parent / link).exists()] == [], page
-        named = re.findall(r"`((?:tests|examples|docs|agents|baselines|birthsim_build|birthsim_env|birthsim_live)/[\w/.]+)`", text)
+        named = re.findall(r"`((?:tests|examples|docs|agents|baselines|birthsim_(?:build|env|live))/[\w/.]+)`", text)
         assert [name for name in named if not (ROOT / name).exists()] == [], page
