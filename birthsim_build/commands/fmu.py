@@ -7,6 +7,7 @@ from pathlib import Path
 
 from baselines.commands.shared import run, seed_number
 from birthsim_build.bundle import identifier, scenario_of
+from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu
 from birthsim_build.fmu.model import fmu_model
 from birthsim_build.loops import RESIDUAL, law_part, scenario_world
@@ -42,6 +43,8 @@ def _write(arguments: argparse.Namespace) -> None:
     if arguments.controller and arguments.policy:
         raise ValueError("--controller with --policy; allowed: one of them")
     scenario_of(arguments.env)
+    require_llvm()
+    require_linker()
     rig = load_parameters(arguments.parameters)
     world = scenario_world(arguments.env, arguments.sensors, rig, arguments.seed)
     name = RESIDUAL if arguments.policy else arguments.controller

@@ -23,11 +23,11 @@ from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
 from birthsim_env.physics.plant import Plant
+from tests.build.targets import need_linker
 from tests.console import call
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
-pytest.importorskip("ziglang")
 
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
@@ -88,6 +88,7 @@ def unit():
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Makes FMU files with the command, each once."""
+    need_linker()
     folder, made = tmp_path_factory.mktemp("fmu"), {}
 
     def write(*options):
@@ -266,6 +267,7 @@ def test_impossible_parameters_are_refused(written, unit):
     ],
 )
 def test_bad_input_is_refused_in_a_line(options, complaint, monkeypatch, capsys, tmp_path):
+    need_linker()
     monkeypatch.chdir(tmp_path)
     status, _, complained = call("fmu", monkeypatch, capsys, *options)
     assert status == 2
