@@ -4,7 +4,7 @@
 # make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
 # make test-weekly runs real clients, each in an environment of its own (half an hour or so)
 # make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
-# make lint   ruff, mypy and the order of the packages; make bench prints speeds
+# make lint   ruff, mypy and the order of the packages; make bench prints speeds, of built code too
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make compare compares all controllers (an hour or so) and redraws the pictures of its section
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
@@ -138,6 +138,7 @@ lint-workflows: $(TOOLS)/.ready
 
 bench: $(READY)
 	$(BIN)/birthsim-bench --out $(OUT)/bench
+	$(BIN)/python -m birthsim_build.commands.targets --out $(OUT)/targets
 
 pictures: $(READY)
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
