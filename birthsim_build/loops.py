@@ -9,19 +9,14 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy
-from agents.policy.stage import policy_stage
-from agents.residual.law import ResidualLaw
 from baselines.registry import controller_names, make_controller
 from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
 from birthsim_build.stages import ask, enter_scenario, outside, pair_valves
-from birthsim_env.assembly import policy_periods
-from birthsim_env.loop.rows import ACTION, DAMPING, FEEDFORWARD, MOTION, SEEN, SHOWN, STATE, WORLD
+from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
-from birthsim_env.loop.world import no_force_stage, plant_stage
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array, parameter_column
+from birthsim_env.loop.world import plant_stage
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -59,21 +54,14 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
 def law_part(controller: str, rig: Parameters, sampled: bool, policy: str | None = None) -> Part:
     """A controller as a part, from what is measured to openings; with ``policy``, that of the residual.
 
-    Raises ``ValueError`` for a controller that is not compiled.
+    Raises ``ValueError`` for a controller that is not compiled, and for a policy where what policies need is missing.
     """
     if controller == RESIDUAL:
-        stored = load_policy(best_policy(policy or "circle"))
-        settings = stored.settings
-        residual = ResidualLaw(rig, settings)
-        residual.prepare(1, sampled)
-        shown, periods = residual.shown.shape[0], policy_periods(settings.policy_period, rig)
-        told = policy_stage(stored.network, periods, settings.size, shown, parameter_column(rig), 1)
-        hidden = () if settings.force_sensor else (no_force_stage(),)
-        first = {
-            **{WORLD + ACTION + k: 0.0 for k in range(settings.size)},
-            **{WORLD + SHOWN + k: float(settings.size <= k < settings.size + 2) for k in range(shown)},
-        }
-        return Part((*hidden, told, *residual.stages()), first)
+        try:
+            from birthsim_build.residual import residual_part
+        except ImportError as error:
+            raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+        return residual_part(rig, sampled, policy or "circle")
     law = make_controller(controller, rig)
     if not isinstance(law, StagedController):
         compiled = [name for name in controller_names() if name == RESIDUAL or isinstance(_made(name, rig), StagedController)]

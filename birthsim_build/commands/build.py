@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from agents.policy.seeds import shipped_names
 from baselines.commands.shared import run, seed_number
 from baselines.registry import CONTROLLERS, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
@@ -73,13 +72,21 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
     rig = load_parameters(arguments.parameters)
     scenarios = list(SCENARIOS) if arguments.all else [scenario_of(one) for one in arguments.env or ["BirthSIM/Circle-v1"]]
     sensors = list(SENSORS) if arguments.all else arguments.sensors or ["ideal"]
-    policies = shipped_names() if arguments.all else arguments.policy
+    policies = _shipped() if arguments.all else arguments.policy
     controllers = arguments.controller or ([] if policies else ["backstepping"])
     if RESIDUAL in controllers:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if arguments.all:
         controllers = [name for name in CONTROLLERS if name not in SLOW]
     return make_bundle(rig, scenarios, sensors, controllers, policies, arguments.seed, alone)
+
+
+def _shipped() -> list[str]:
+    try:
+        from agents.policy.seeds import shipped_names
+    except ImportError as error:
+        raise ValueError(f"{error}; --all needs the extra: pip install 'birthsim[agents]'") from error
+    return shipped_names()
 
 
 def _show(report: Report) -> None:

@@ -1,5 +1,8 @@
 """Bad input of birthsim-build: one line that names it, and nothing written."""
 
+import subprocess
+import sys
+
 import pytest
 
 from tests.console import call
@@ -46,3 +49,20 @@ def test_without_a_linker_it_says_what_to_install(tmp_path, monkeypatch, capsys)
     assert status == 2
     assert "pip install 'birthsim[build]'" in complained
     assert not (tmp_path / "out").exists()
+
+
+WITHOUT_POLICIES = """
+import sys
+sys.modules["safetensors"] = sys.modules["torch"] = None
+import birthsim_build.commands.build, birthsim_build.commands.fmu
+from birthsim_build.loops import law_part
+from birthsim_env import Parameters
+print(len(law_part("pid", Parameters(), False).stages))
+law_part("residual", Parameters(), False)
+"""
+
+
+def test_laws_need_nothing_that_trains_policies():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_POLICIES], capture_output=True, text=True, check=False)
+    assert int(done.stdout) > 1
+    assert done.stderr.rstrip().endswith("a policy needs the extra: pip install 'birthsim[agents]'")
