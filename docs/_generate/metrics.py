@@ -13,6 +13,7 @@ MEANINGS = {
     "settled_max": "largest settled error {}",
     "stiffness_error": "stiffness that a push finds over the stiffness asked for, less one, along the push",
     "cross_motion": "displacement across the push beyond the one asked for",
+    "unrest": f"motion, peak to peak, in the {WINDOW:g} s before the push",
     "hunting": "largest span of motion {} while nothing that is asked for changes",
     "restarts": "how often the end effector sticks and starts anew while nothing changes",
     "pneumatic_rms": "root mean square error of the pneumatic stiffness of cylinder {}, relative to its setpoint",
@@ -28,7 +29,7 @@ def metrics() -> str:
     return "\n".join([
         "| metric | unit | meaning |", "|---|---|---|", *rows, "",
         f"- Nothing changes: target, force and setpoints have been constant for {QUIET:g} s.",
-        f"- `stiffness_error` and `cross_motion` exist where the target stands still and the episode ends in a push held for "
+        f"- `stiffness_error`, `cross_motion` and `unrest` exist where the target stands still and the episode ends in a push held for "
         f"{HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
         f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
         "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
