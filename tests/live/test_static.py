@@ -18,6 +18,7 @@ from birthsim_live.rig.hand import Hold
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
+from tests.build.targets import need_linker
 from tests.console import run
 from tests.live import browser
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
@@ -78,6 +79,7 @@ SILENT = """async () => {
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """The folder, made by the command."""
+    need_linker()
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
     done = run("live", "--static", folder)
     assert done.returncode == 0, done.stderr
@@ -222,6 +224,7 @@ def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
 
 
 def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path):
+    need_linker()
     (tmp_path / "rig.toml").write_text("[valves]\ndeadband = 0.02\n")
     done = run("live", "--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
     assert done.returncode == 2
