@@ -4,6 +4,8 @@ import { formula } from "./symbols.js";
 
 const RATE = 8; // updates per second: faster, digits cannot be read
 const WRITTEN_GAP = 2000; // ms between changes of the status line
+const SPOKEN_GAP = 10000; // ms between words on how the machine keeps up: a busy one falls behind again and again
+const PACES = ["well", "slow"];
 const KEEPS_UP = 0.98;
 const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
 const LEAST_GIVEN = 1e-4;
@@ -47,6 +49,7 @@ export class Readouts {
     this.spoken = spoken;
     this.last = 0;
     this.written = -Infinity;
+    this.told = { kind: null, at: -Infinity };
     this.values = FIGURES.map(([title, symbol, unit], i) => {
       const box = document.createElement("div");
       const term = document.createElement("dt");
@@ -77,9 +80,13 @@ export class Readouts {
 
   /** Change the status line, at once where its kind changes, else seldom. Screen readers speak what kind it has become. */
   say(kind, words, now = performance.now()) {
+    const flaps = PACES.includes(kind) && PACES.includes(this.told.kind) && now - this.told.at < SPOKEN_GAP;
+    if (kind !== this.told.kind && !flaps) {
+      this.spoken.textContent = words;
+      this.told = { kind, at: now };
+    }
     if (words === this.status.textContent) return;
     if (kind === this.status.dataset.kind && now - this.written < WRITTEN_GAP) return;
-    if (kind !== this.status.dataset.kind) this.spoken.textContent = words;
     this.written = now;
     this.status.dataset.kind = kind;
     this.status.textContent = words;

@@ -32,6 +32,7 @@ CUT_CHOICES = """[...document.querySelectorAll('select')].filter((e) => e.offset
 """Lists whose longest choice does not fit beside their arrow."""
 SPOKEN = """() => {
     window.spoken = [];
+    window.listening = performance.now();
     const live = 'output, [role=status], [role=alert], [role=log], [aria-live=polite], [aria-live=assertive]';
     const seen = (changes) => {
         for (const { target } of changes) {
@@ -78,7 +79,9 @@ def test_a_screen_reader_is_told_what_matters_and_no_digits(window):
     window.hold(across=30)
     window.live(2.0)
     window.page.mouse.up()
-    assert window.value("window.spoken.length") <= 3, window.value("window.spoken")
+    # How the machine keeps up is told every 10 s at most, on a busy one; the lesson besides, and what the drag changes.
+    told = 3 + window.value("(performance.now() - window.listening) / 1e4")
+    assert window.value("window.spoken.length") <= told, window.value("window.spoken")
     window.page.locator("body").press(" ")
     window.wait("window.spoken.at(-1) === 'paused'")
     window.page.locator("body").press(" ")
@@ -146,6 +149,8 @@ def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
     said = {"events": [{"row": 0, "settings": session.shown_settings()}, {"row": 0, "path": session.path()}]}
     (tmp_path / "lost.rec").write_bytes(packed(header) + packed(said, lost))
     with Server("replay", tmp_path / "lost.rec") as server, Window(chromium, server.url) as viewer:
+        # At its end a replay halts, and plays on from wherever it is put; paused, it stays there.
+        viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
         viewer.wait("birthsim.state.paused")
         for time, shown in ((0.5, "–"), (0.2, "+0.0")):
             viewer.page.locator("#scrub").fill(str(time))
