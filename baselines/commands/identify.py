@@ -78,8 +78,8 @@ def _simulate(arguments: argparse.Namespace, rig: Parameters) -> None:
 
 def _from_log(arguments: argparse.Namespace, owner: Parameters) -> None:
     out = _out(arguments, (".toml",))
-    folder = None if arguments.report is None else make_folder(arguments.report)
     trial = read_trial(arguments.log, owner)
+    folder = None if arguments.report is None else make_folder(arguments.report)
     with _bar(None, "fit", "evaluation") as tick:
         found = identify(trial, owner, arguments.seed, tick=tick)
     found.write(out, arguments.log.name)

@@ -15,17 +15,21 @@ from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost
 from baselines.commands.honest import as_described, sizes_of, three
-from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
+from baselines.commands.shared import EPISODES, finite_number, run, seed_number, whole_up_to
+from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.values import checked_number
 
 ENVIRONMENT = "BirthSIM/Probe-v1"
 REST, PUSHED = 1.0, 4.0
 """s of ``ENVIRONMENT`` before its push, and from there to its end."""
+LONGEST_REST = 60.0
+"""s; assumed: no rig needs longer to come to rest."""
 NAMED, CAUSES = 5, 8
 """Worst worlds that a row names; changes of one figure that are shown, of those that help most."""
 
@@ -37,7 +41,8 @@ def main() -> None:
     parser.add_argument("--sensors", action="append", choices=tuple(SENSORS), help="may be repeated (default: honest)")
     parser.add_argument("--drawn", action="store_true", help="draw the figures of honest sensors too")
     parser.add_argument("--metric", choices=tuple(UNITS), default="stiffness_error", help="default: %(default)s")
-    parser.add_argument("--rest", type=float, default=REST, help="s before the push (default: %(default)s)")
+    parser.add_argument("--limit", type=finite_number, default=15.0, help="worlds above it are counted (default: %(default)s)")
+    parser.add_argument("--rest", type=finite_number, default=REST, help="s before the push (default: %(default)s)")
     parser.add_argument(
         "--worlds", type=whole_up_to(EPISODES), default=1, help="worst worlds that are explained (default: %(default)s)"
     )
@@ -47,13 +52,13 @@ def main() -> None:
 
 
 def _worst(arguments: argparse.Namespace) -> None:
+    checked_number("--rest", arguments.rest, "s", least=0.0, most=LONGEST_REST)
     rest = f"{arguments.rest:g} s of rest before the push"
     print(f"{arguments.episodes} worlds of {ENVIRONMENT} from seed {arguments.seed}, rigs and scenarios drawn, {rest}.")
     print("Median, 95 % and worst.\n")
-    print(
-        f"| law | sensors | {arguments.metric}, {UNITS[arguments.metric]} | motion before the push, mm | lost | worst worlds |"
-    )
-    print("|---|---|---|---|---|---|")
+    above = f"{arguments.metric}, {UNITS[arguments.metric]} | above {arguments.limit:g}"
+    print(f"| law | sensors | {above} | unrest, mm | lost | worst worlds |")
+    print("|---|---|---|---|---|---|---|")
     found = []
     for name in arguments.controller:
         for sensors in arguments.sensors or ["honest"]:
@@ -63,7 +68,13 @@ def _worst(arguments: argparse.Namespace) -> None:
             order = np.argsort(-sizes, kind="stable")
             signed = penalize_lost(done.metrics[arguments.metric], done.lost, applies=True)
             listed = ", ".join(f"{done.seeds[k]} ({number(signed[k])})" for k in order[:NAMED])
-            cells = (three(sizes), three(sizes_of(done, "unrest")), str(sum(done.lost)), listed)
+            cells = (
+                three(sizes),
+                str((sizes > arguments.limit).sum()),
+                three(sizes_of(done, "unrest")),
+                str(sum(done.lost)),
+                listed,
+            )
             print(f"| {name} | {sensors} | {' | '.join(cells)} |", flush=True)
             found += [(name, sensors, rig, done.seeds[k]) for k in order[: arguments.worlds]]
     for name, sensors, rig, seed in found:
@@ -111,15 +122,7 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
     return figures, float(np.hypot(*info["user_force"][0])), float(1e3 * np.hypot(*way[0]))
 
 
-def value_of(rig: Parameters, figure: str) -> float:
-    """Of a dotted name such as ``"mechanics.mass"``."""
-    section, _, own = figure.partition(".")
-    return float(getattr(getattr(rig, section), own))
-
-
-def _evaluated(
-    name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int
-) -> Evaluation:  # fmt: skip
+def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:
     hand = {} if rest == REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
     return evaluate(ENVIRONMENT, make_controller(name, Parameters()), name, episodes, seed, False, randomize=True, **setting)

@@ -93,6 +93,8 @@ def read_plan(path: Path, rig: Parameters) -> Plan:
     where = f"plan = {str(path)!r}"
     if len(times) < 8 or not np.isfinite(columns).all() or not (np.diff(times) > 0).all():
         raise ValueError(f"{where}; allowed: at least 8 rows of finite numbers with increasing times")
+    if not SHORTEST <= times[-1] - times[0] <= LONGEST:
+        raise ValueError(f"{where} lasts {times[-1] - times[0]:.4g} s; allowed: {SHORTEST:g} to {LONGEST:g} s")
     if np.abs(added).max() > 1:
         raise ValueError(f"{where}: an added opening of {np.abs(added).max():g}; allowed: -1 to 1")
     try:

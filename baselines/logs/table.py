@@ -113,8 +113,16 @@ def _read_mcap(path: Path) -> Table:
         raise ValueError(f"{source} cannot be read as MCAP ({problem(error)})") from error
     longest = max(rows.values(), key=len, default=[])
     names = [name for name, value in longest[0].items() if isinstance(value, (int, float))] if longest else []
-    columns = {name: np.array([float(row.get(name, np.nan)) for row in longest]) for name in names}
+    columns = {name: np.array([_number(row.get(name)) for row in longest]) for name in names}
     return Table(source, columns)
+
+
+def _number(value: object) -> float:
+    """A value of JSON as a number; NaN where it is none."""
+    try:
+        return float(value) if isinstance(value, (int, float)) else np.nan
+    except OverflowError:
+        return np.nan
 
 
 READERS: dict[str, Callable[[Path], Table]] = {".csv": read_csv, ".parquet": _read_parquet, ".mcap": _read_mcap}

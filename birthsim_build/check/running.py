@@ -37,7 +37,7 @@ def node_rows(
     """
     names, values = list(inputs or {}), np.array(list((inputs or {}).values()), dtype=np.float64)
     np.ascontiguousarray(values.T).tofile(scratch / "inputs.bin")
-    request = {"folder": str(folder), "make": make, "periods": periods, "names": names, "out": str(scratch)}
+    request = {"folder": str(folder.resolve()), "make": make, "periods": periods, "names": names, "out": str(scratch)}
     line = ["node", str(HERE / "run.mjs"), json.dumps({**request, "exchange": exchange})]
     said = subprocess.run(line, check=True, capture_output=True, text=True).stdout
     return np.fromfile(scratch / "rows.bin").reshape(periods, ROWS), float(said)

@@ -239,7 +239,10 @@ def test_a_state_comes_back_and_goes_through_bytes(written, unit, version):
     assert one.get(STATE_NAMES).tolist() == after.tolist()
 
 
-@pytest.mark.parametrize(("name", "value"), [("opening_P1", 1.5), ("rig.mechanics.mass", 4.0), ("x", 0.0), ("time", 1.0)])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("opening_P1", 1.5), ("force_x", np.inf), ("force_y", np.nan), ("rig.mechanics.mass", 4.0), ("x", 0.0), ("time", 1.0)],
+)
 def test_what_must_not_be_set_in_a_simulation_is_refused_and_changes_nothing(written, unit, name, value):
     one = unit(written("--fmi", 2))
     one.step()
@@ -247,6 +250,37 @@ def test_what_must_not_be_set_in_a_simulation_is_refused_and_changes_nothing(wri
     with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
         one.set([name], [value])
     assert one.get([name]) == before
+
+
+def test_setpoints_that_the_law_cannot_serve_are_refused_and_a_saved_state_goes_on(written, unit):
+    one = unit(written("--controller", "backstepping", "--sensors", "lab", "--fmi", 2))
+    one.step(5)
+    before, states = one.unit.getFMUstate(), one.get(STATE_NAMES)
+    one.set(["reference_Kclx"], [-500.0])
+    for _ in range(2):
+        with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2DoStep"):
+            one.step()
+    one.unit.setFMUstate(before)
+    assert one.get(STATE_NAMES).tolist() == states.tolist()
+    one.step()
+    assert one.get(["reference_Kclx"])[0] > 0
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_calls_out_of_turn_are_refused(written, unit, version):
+    one = unit(written("--fmi", version))
+    for call_of in (one.unit.enterInitializationMode, one.unit.exitInitializationMode):
+        with pytest.raises(fmpy.fmi1.FMICallException, match="InitializationMode"):
+            call_of()
+    with pytest.raises(fmpy.fmi1.FMICallException, match="DoStep"):
+        one.unit.doStep(currentCommunicationPoint=5.0, communicationStepSize=PERIOD)
+
+
+def test_several_values_are_set_all_or_none(written, unit):
+    one = unit(written("--fmi", 2))
+    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
+        one.set(OPENINGS, [0.1, 0.1, 0.1, 1.5])
+    assert one.get(OPENINGS).tolist() == [0.0] * 4
 
 
 def test_impossible_parameters_are_refused(written, unit):

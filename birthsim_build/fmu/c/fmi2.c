@@ -35,16 +35,19 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
                                fmi2Boolean has_stop, fmi2Real stop) {
   (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
   Model *m = &((Instance *)c)->model;
+  if (m->state != SETTING_UP) return refuse(c, BEFORE);
   m->began = m->time = start;
   return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+  if (((Instance *)c)->model.state != SETTING_UP) return refuse(c, BEFORE);
   ((Instance *)c)->model.state = INITIALIZING;
   return fmi2OK;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+  if (((Instance *)c)->model.state != INITIALIZING) return refuse(c, BEGIN);
   model_begin(&((Instance *)c)->model);
   return fmi2OK;
 }
@@ -73,15 +76,14 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference which[], size_t
   for (size_t k = 0; k < n; k++) {
     const char *why = model_refusal(m, which[k], values[k]);
     if (why) return refuse(c, why);
-    *model_variable(m, which[k]) = values[k];
   }
+  for (size_t k = 0; k < n; k++) *model_variable(m, which[k]) = values[k];
   return fmi2OK;
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi2Boolean no_return) {
   (void)no_return;
   Model *m = &((Instance *)c)->model;
-  if (m->state != RUNNING) return refuse(c, "a step is possible after initialization and before the end");
   const char *why = model_advance(m, now, step);
   return why ? refuse(c, why) : fmi2OK;
 }

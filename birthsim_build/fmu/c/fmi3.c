@@ -37,12 +37,14 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
                                        fmi3Boolean has_stop, fmi3Float64 stop) {
   (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
   Model *m = &((Instance *)c)->model;
+  if (m->state != SETTING_UP) return refuse(c, BEFORE);
   m->began = m->time = start;
   m->state = INITIALIZING;
   return fmi3OK;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
+  if (((Instance *)c)->model.state != INITIALIZING) return refuse(c, BEGIN);
   model_begin(&((Instance *)c)->model);
   return fmi3OK;
 }
@@ -73,8 +75,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference which[], size
   for (size_t k = 0; k < n; k++) {
     const char *why = model_refusal(m, which[k], values[k]);
     if (why) return refuse(c, why);
-    *model_variable(m, which[k]) = values[k];
   }
+  for (size_t k = 0; k < n; k++) *model_variable(m, which[k]) = values[k];
   return fmi3OK;
 }
 
@@ -84,7 +86,6 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 now, fmi3Float64 step, fmi3Boo
   Model *m = &((Instance *)c)->model;
   *event = *terminate = *early = false;
   *last = m->time;
-  if (m->state != RUNNING) return refuse(c, "a step is possible after initialization and before the end");
   const char *why = model_advance(m, now, step);
   *last = m->time;
   return why ? refuse(c, why) : fmi3OK;

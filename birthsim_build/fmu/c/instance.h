@@ -10,6 +10,9 @@
 
 enum { SETTING_UP, INITIALIZING, RUNNING, OVER };
 
+#define BEFORE "this is possible before the initialization only; reset first"
+#define BEGIN "no initialization has begun"
+
 typedef struct {
   double parameters[MODEL_PARAMETERS];
   double memory[MODEL_MEMORY];
@@ -50,14 +53,18 @@ static double *model_variable(Model *m, unsigned k) {
 /* NULL, or why variable k must not become value now. */
 static const char *model_refusal(const Model *m, unsigned k, double value) {
   if (k == 0 || k >= MODEL_VARIABLES || k > MODEL_PARAMETERS + MODEL_INPUTS) return "only parameters and inputs can be set";
+  if (m->state == OVER) return "the simulation is over; reset it first";
   if (k <= MODEL_PARAMETERS && m->state >= RUNNING) return "parameters can be set before the simulation begins";
-  if (!(value >= model_least[k - 1] && value <= model_most[k - 1])) return "the value is outside of its limits";
+  if (!isfinite(value) || value < model_least[k - 1] || value > model_most[k - 1]) return "the value is outside of its limits";
   return NULL;
 }
 
-/* Whole control periods up to now + step, s; NULL, or why not. */
+/* Whole control periods up to now + step, s; NULL, or why not. After a refusal the simulation is over. */
 static const char *model_advance(Model *m, double now, double step) {
   double due = (now + step - m->began) / MODEL_PERIOD;
+  if (m->state != RUNNING) return "a step is possible after initialization and before the end";
+  m->state = OVER;
+  if (!(fabs(now - m->time) <= 0.01 * MODEL_PERIOD)) return "a step must begin where the last one ended";
   if (!(step >= 0.0) || !(due - (double)m->periods < 1e9)) return "the communication step must be a finite number from 0 on, s";
   /* Times come in as sums of steps: a period that lacks a thousandth is complete. */
   long long count = (long long)floor(due + 1e-3) - m->periods;
@@ -69,6 +76,7 @@ static const char *model_advance(Model *m, double now, double step) {
   m->time = now + step;
   for (int k = 0; k < MODEL_OUTPUTS; k++)
     if (!isfinite(m->memory[model_place[MODEL_INPUTS + k]])) return "a state is not finite any more";
+  m->state = RUNNING;
   return NULL;
 }
 
