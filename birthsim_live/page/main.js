@@ -61,6 +61,8 @@ const connection = new Connection({
     readouts.say("offline", "connection lost");
   },
   failed: ({ message }) => {
+    rig.connected = false;
+    drag.release();
     banner("offline", `The rig cannot be shown: ${message}`);
     readouts.say("offline", "no rig");
   },

@@ -65,6 +65,6 @@ def _write_code(functions: list[str], place: Path, out: Path) -> None:
     compile_object(functions, "wasm", compiled)
     exports = [f"--export=birthsim_stage_{number}" for number in range(len(functions))]
     link(
-        "wasm-ld", "--no-entry", "--import-memory", "--strip-all", "-z", f"stack-size={STACK}", "--export=__heap_base",
-        *exports, str(compiled), "-o", str(out),
+        "wasm-ld", "--no-entry", "--stack-first", "--import-memory", "--strip-all", "-z", f"stack-size={STACK}",
+        "--export=__heap_base", *exports, str(compiled), "-o", str(out),
     )  # fmt: skip

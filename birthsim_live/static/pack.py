@@ -1,7 +1,7 @@
 """What a rig in the browser is made of, as JSON: rows, the rig, scenarios, sensors, controllers, and the page's greeting.
 
 A stage is the name of its function, its constants, the memory of a lane that starts, and its tables. Arrays are base64 of
-their bytes, little-endian, so that every bit arrives. The files of ``static/worker`` read it.
+their bytes, little-endian, so that every bit arrives. The files of ``static/page/worker`` read it.
 """
 
 from __future__ import annotations

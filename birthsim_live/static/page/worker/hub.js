@@ -94,7 +94,7 @@ export class Hub {
   news() {
     const { session, clock } = this;
     const { recorder } = session;
-    if (recorder?.full) this.endRecording();
+    if (recorder?.full) this.endRecording().catch(({ message }) => this.post({ type: "error", message }));
     if (performance.now() - this.heard > 1e3 * this.pack.numbers.patience) this.on_release();
     return {
       settings: { type: "settings", settings: session.shownSettings() },

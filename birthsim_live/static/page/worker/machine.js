@@ -31,8 +31,8 @@ export class Machine {
   /** Address of so many bytes that nothing else uses. */
   take(bytes) {
     const address = (this.free + 63) & ~63;
+    if (address + bytes > this.buffer.byteLength) throw new Error("the rig's memory is full; reload the page");
     this.free = address + bytes;
-    if (this.free > this.buffer.byteLength) throw new Error("the rig's memory is full; reload the page");
     return address;
   }
 

@@ -8,12 +8,14 @@ export function checked(changes, { hello: { choices, ranges }, settings }) {
     const allowed = allowedFor(name, value, choices, ranges, settings);
     if (allowed) throw new Error(`${name} = ${JSON.stringify(value)}; allowed: ${allowed}`);
   }
+  const moved = STIFFNESSES.filter((name) => Object.hasOwn(changes, name)).join(", ");
+  if (moved && changes.stiffness_source === "scenario") throw new Error(`stiffness_source = "scenario" beside ${moved}; allowed: one or the other`);
   return changes;
 }
 
 /** What is allowed, where `value` is not. */
 function allowedFor(name, value, choices, ranges, settings) {
-  if (!(name in settings)) return Object.keys(settings).join(", ");
+  if (!Object.hasOwn(settings, name)) return Object.keys(settings).join(", ");
   if (name in ranges) {
     const { min, max, unit } = ranges[name];
     return typeof value === "number" && value >= min && value <= max ? "" : `${min} to ${max} ${unit}`;
