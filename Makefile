@@ -154,7 +154,7 @@ pictures: $(READY)
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v1 --episodes 8 --no-studies --out $(OUT)/bound-probe
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	{ echo "# Tables of the planner"; echo; sed 's/^#/##/' $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md; } >docs/bound.md
 	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/

@@ -36,7 +36,7 @@ def test_returns_order_controllers_as_their_errors_do(environment, sensors):
 
 
 def test_returns_are_the_sums_of_rewards():
-    env = gymnasium.make("BirthSIM/Probe-v1", policy_period=0.001, duration=0.5)
+    env = gymnasium.make("BirthSIM/Probe-v2", policy_period=0.001, duration=0.5)
     controller = make_controller("pid", birthsim_env.Parameters())
     env.reset(seed=3)
     sums, done, step = dict.fromkeys(DISCOUNTS, 0.0), False, 0
@@ -45,7 +45,7 @@ def test_returns_are_the_sums_of_rewards():
         for discount in DISCOUNTS:
             sums[discount] += discount ** (step / 10) * reward
         step += 1
-    found = evaluate("BirthSIM/Probe-v1", controller, "", 1, 3, progress=False, duration=0.5)
+    found = evaluate("BirthSIM/Probe-v2", controller, "", 1, 3, progress=False, duration=0.5)
     for discount, expected in sums.items():
         assert found.returns[discount] == [pytest.approx(expected, rel=1e-9)]
     assert found.success == [info["is_success"]]

@@ -53,7 +53,7 @@ def world(name="BirthSIM/Descent-v1", seed=11, lanes=4, **arguments):
 
 def rigs(lanes=1500, seed=0, **arguments):
     """Parameter name -> (lanes,) as drawn."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=lanes, **arguments).unwrapped
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, **arguments).unwrapped
     env.reset(seed=seed)
     return dict(zip(PARAMETER_NAMES, env.simulation.plant.lane_parameters, strict=True))
 
@@ -141,7 +141,7 @@ def test_a_mapping_draws_just_its_parameters_and_a_new_value_each_episode():
         for name, values in drawn.items()
         if name not in ("mass", "inverse_mass", "supply", "inverse_supply", "source")
     )
-    env = gymnasium.make("BirthSIM/Probe-v1", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
+    env = gymnasium.make("BirthSIM/Probe-v2", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
     masses = []
     for seed in (0, None, None, 0):
         env.reset(seed=seed)
@@ -227,7 +227,7 @@ def test_lane_seeds_count_up_or_are_as_given():
 
 @pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc", -1])
 def test_bad_seeds_are_refused_by_name(seed):
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3)
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3)
     with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed") as refusal:
         env.reset(seed=seed)
     assert "allowed" in str(refusal.value) or "greater or equal to zero" in str(refusal.value)

@@ -16,7 +16,7 @@ from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import SCENARIOS
 
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 
 
 def course(force, seconds, seed=0, step=0.001):

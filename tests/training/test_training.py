@@ -26,7 +26,7 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
 
-PROBE = "BirthSIM/ProbeResidual-v1"
+PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
     PROBE, steps=30_000, lanes=32, rollout=32, batch=256, epochs=4, hidden=(32, 32), learning_rate=2e-3,
@@ -388,8 +388,8 @@ def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree
     arguments = {"randomize": True, "duration": 2.5}
     inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
     score = validate(inside, load_policy(folder).network.actions, 40)
-    result = evaluate("BirthSIM/Probe-v1", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
-    law = evaluate("BirthSIM/Probe-v1", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
+    result = evaluate("BirthSIM/Probe-v2", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
+    law = evaluate("BirthSIM/Probe-v2", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
     np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
     np.testing.assert_array_equal(result.required_strength_ratio, score.required_strength_ratio)
