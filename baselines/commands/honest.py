@@ -57,8 +57,8 @@ def _honest(arguments: argparse.Namespace) -> None:
             sensors, _, drawn = condition.partition(", ")
             rig = as_described(believed) if sensors == "honest" and not drawn else believed
             probe, *circles = (
-                evaluate(environment_id(scenario), make_controller(name, believed), name, *span, sensors=sensors, randomize=True,
-                         parameters=rig, user_force=hand)
+                evaluate(environment_id(scenario), make_controller(name, believed), name, *span, sensors=sensors,
+                         randomize=True, parameters=rig, user_force=hand)
                 for scenario, hand in (("probe", None), ("circle", None), *(("circle", hand) for hand in MOVING))
             )  # fmt: skip
             hunting = np.maximum(sizes_of(probe, "hunting_x"), sizes_of(probe, "hunting_y"))

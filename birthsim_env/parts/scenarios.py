@@ -47,7 +47,7 @@ def _circle_varied() -> Parts:
 
 
 PROBE_REST = 3.0
-"""s before the push: where rig and sensors are drawn, the best law takes that long to bring the head to rest (docs/honest.md)."""
+"""s before the push: with honest sensors the best law takes that long to bring the head to rest (docs/honest.md)."""
 
 
 def _probe() -> Parts:
