@@ -113,14 +113,15 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
         ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True, policy_period=PROBE_REST + PUSHED / 2
     )
     env.reset(seed=[seed])
-    shown = getattr(env.simulation.sensors, "figures", {})
+    # Before the step: a lane whose episode ends in it is drawn anew.
+    shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
     _, _, _, _, info = env.step(np.zeros((1, env.single_action_space.shape[0]), dtype=np.float32))
     env.close()
     info = info.get("final_info", info)
     ranges = {name: pair for name, pair in documented_ranges(rig, sensors).items() if name not in drawn_by(sensors)}
     drawn = draw_parameters(rig, ranges, stream(seed, 0, "parameters"))
     figures = {name: value_of(drawn, name) for name in ranges}
-    figures |= {f"electronics.{name}": float(values[0]) for name, values in shown.items()}
+    figures |= {f"electronics.{name}": value for name, value in shown.items()}
     way = info["compliant_target"] - info["target"]
     return figures, float(np.hypot(*info["user_force"][0])), float(1e3 * np.hypot(*way[0]))
 

@@ -11,8 +11,9 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from moviepy import VideoFileClip
 
 import birthsim_env
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
-IDS = [*(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia")), "BirthSIM/Vacuum-v0"]
+IDS = [environment_id(scenario) for scenario in SCENARIOS]
 STEPS = 40
 
 
