@@ -18,8 +18,8 @@ from birthsim_env.scores import ROLES, normalized_score, reference_scores
 
 IDS = [environment_id(name) for name in SCENARIOS]
 PROBE = environment_id("probe")
-"""For three of its seven seconds nothing pushes. Shut valves stand on the target then, the paper's law hunts: on drawn rigs they
-pay more than it, though their settled error is larger."""
+"""For three of its seven seconds nothing pushes. Shut valves stand on the target then, the paper's law hunts: on drawn rigs
+they pay more than it, though their settled error is larger."""
 
 
 @pytest.mark.parametrize("environment", IDS)
