@@ -11,6 +11,7 @@
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
+# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -19,6 +20,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
+PROSE := $(OUT)/prose
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
@@ -38,7 +40,7 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -110,6 +112,16 @@ lint: $(READY)
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/ruff check docs/conf.py docs/_generate
 	$(BIN)/ruff format --check docs/conf.py docs/_generate
+
+# README.md is not read yet; CHANGELOG.md tells of the past.
+prose: $(PROSE)/.ready
+	$(PROSE)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js CONTRIBUTING.md SECURITY.md docs
+
+$(PROSE)/.ready: docs/_prose/package.json docs/_prose/package-lock.json
+	mkdir -p $(PROSE)
+	cp docs/_prose/package.json docs/_prose/package-lock.json $(PROSE)
+	npm ci --prefix $(PROSE) --ignore-scripts --no-audit --no-fund --silent
+	touch $@
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready
