@@ -40,6 +40,10 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
+# A page of docs/ keeps what stands above its mark; the tables that commands wrote follow, and their figures go to docs/data.
+renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
+tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
+
 .PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
@@ -168,8 +172,10 @@ compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v1 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
-	{ echo "# Tables of the planner"; echo; sed 's/^#/##/' $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md; } >docs/bound.md
-	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
+	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
+	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
+	  echo; echo "## Probe"; $(call tables,bound-probe/comparison,bound_probe))
+	cp $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
@@ -201,7 +207,7 @@ scratch: $(READY)
 
 moving: $(READY)
 	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
-	cp $(OUT)/moving/comparison.md docs/moving.md
+	$(call renew,moving,$(call tables,moving/comparison,moving))
 
 haptics: $(READY)
 	$(BIN)/birthsim-haptics --out $(OUT)/haptics --page docs/haptics.md

@@ -135,7 +135,7 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     assert len(content["studies"]["polar"]["backstepping"]["stiffness"]) == 4
     assert content["arguments"]["controller"] == ["backstepping", slam]
     text = (tmp_path / "out" / "comparison.md").read_text()
-    table = text[text.index("| controller |") : text.index("## ")].strip()
+    table = text[text.index("| controller |") : text.index("Every figure")].strip()
     assert table in printed
     assert f"| {slam} | lost; lost |" in table
     for name in (
@@ -185,7 +185,7 @@ def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, ca
     line = (*NARROW, "--episodes", 1, "--jobs", 2, "--randomize", "all", "--no-studies", *names, "--out", out)
     status, printed = interrupted("evaluate", line, lambda: list(out.rglob("*.json")))
     assert status == 130
-    assert printed.startswith("randomised plant: rigs drawn: ")
+    assert printed.startswith("rigs drawn: ")
     assert len(list(out.rglob("*.json"))) == 1
     (tmp_path / "go").touch()
     status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
@@ -237,7 +237,7 @@ def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, cap
     own = ("--env", "BirthSIM/Probe-v1", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
     status, _, complained = call("evaluate", monkeypatch, capsys, *case, *own)
     assert status == 0, complained
-    assert "## BirthSIM/Probe-v1, honest sensors, figures drawn, nominal plant" in (tmp_path / "out/comparison.md").read_text()
+    assert 'BirthSIM/Probe-v1,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]
     assert (cell["sensors"], cell["plant"]) == ("honest", "drawn-sensors")
     status, _, complained = call("evaluate", monkeypatch, capsys, "--randomize", "sensors", "--out", tmp_path / "one")
