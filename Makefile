@@ -199,7 +199,7 @@ learned: $(READY)
 scores: $(READY)
 	$(BIN)/birthsim-scores --out $(OUT)/scores
 	cp $(OUT)/scores/scores.json birthsim_env/
-	cp $(OUT)/scores/scores.md docs/
+	$(call renew,scores,$(call tables,scores/scores,scores))
 
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
