@@ -32,8 +32,8 @@ class Scored:
 
     def score(self, controller: str) -> int:
         """0 for shut valves, 100 for the best law."""
-        low, high = self.roles[SHUT]["return"], self.roles[BEST]["return"]
-        return round(100 * (self.rows[controller]["returns"]["1.0"] - low) / (high - low))
+        low, high = (float(self.roles[role]["return"]) for role in (SHUT, BEST))
+        return round(100 * (float(self.rows[controller]["returns"]["1.0"]) - low) / (high - low))
 
 
 def overview(found: Sequence[Scored]) -> str:
