@@ -170,7 +170,7 @@ pictures: $(READY)
 compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v1 --episodes 8 --no-studies --out $(OUT)/bound-probe
+	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
 	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
@@ -185,8 +185,8 @@ policies: $(READY)
 
 learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
-	for name in probe forceps dystocia descent; do scenario=$$(echo $$name | sed 's/./\u&/'); \
-	  $(BIN)/birthsim-evaluate --env BirthSIM/$$scenario-v1 --controller residual --policy $$name \
+	for id in Probe-v2 Forceps-v1 Dystocia-v1 Descent-v1; do name=$$(echo $${id%-*} | tr A-Z a-z); \
+	  $(BIN)/birthsim-evaluate --env BirthSIM/$$id --controller residual --policy $$name \
 	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
 	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab

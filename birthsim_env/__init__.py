@@ -1,6 +1,6 @@
 """BirthSIM: a pneumatic haptic interface as Gymnasium environments.
 
-Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v1``, ``Descent-v1``, ``Forceps-v1``, ``Dystocia-v1`` and
+Importing this package registers ``BirthSIM/Circle-v1``, ``Probe-v2``, ``Descent-v1``, ``Forceps-v1``, ``Dystocia-v1`` and
 ``Vacuum-v0``, and their siblings with a law inside, ``BirthSIM/CircleResidual-v1`` and so on.
 """
 

@@ -32,7 +32,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     | id | experiment | s |
     |---|---|---|
     | `BirthSIM/Circle-v1` | Fig. 4: a circle of 50 mm under pushes of 30 N, stiffness 2000 then 4000 N/m | 16 |
-    | `BirthSIM/Probe-v1` | hold still and be pushed: the stiffness test | 5 |
+    | `BirthSIM/Probe-v2` | hold still and, after 3 s, be pushed: the stiffness test | 7 |
     | `BirthSIM/Descent-v1` | station -5 to +5 cm, then an arc of 70 mm through 80 degrees, contractions of 80 N | 24 |
     | `BirthSIM/Forceps-v1` | tractions ramped at 70 N/s to 175 N, held, released | 15 |
     | `BirthSIM/Dystocia-v1` | the head draws back 12 mm, stiffness 2000 to 4000 N/m, pulls of 84, 122 and 163 N | 16 |
@@ -117,6 +117,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     shape.
 
     ## Version history
+    - Probe v2: the push begins after 3 s instead of 1 s, when the head is at rest, and the episode lasts 7 s instead of 5 s.
     - v1: the reward is never negative; a circle starts without preloaded friction.
     - v0: first version.
     """

@@ -23,7 +23,7 @@ settings.load_profile("birthsim")
 collect_ignore = ["weekly"]
 
 SMALL = """[training]
-environment = "BirthSIM/ProbeResidual-v1"
+environment = "BirthSIM/ProbeResidual-v2"
 lanes = 32
 rollout = 32
 batch = 256

@@ -25,7 +25,7 @@ COMMANDS = {
     "fmu": "birthsim_build.commands.fmu",
 }
 PATIENCE = 600.0  # s; only a state that never comes takes so long
-RESIDUAL = "BirthSIM/ProbeResidual-v1"
+RESIDUAL = "BirthSIM/ProbeResidual-v2"
 
 OWN = """
 import numpy as np

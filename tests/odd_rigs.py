@@ -59,10 +59,10 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
     """ "works", "refused" or "BAD", and what was said."""
     out = folder / command
     lines = {
-        "evaluate": ("--env", "BirthSIM/Probe-v1", "--controller", "admittance-backstepping", "--episodes", "2"),
+        "evaluate": ("--env", "BirthSIM/Probe-v2", "--controller", "admittance-backstepping", "--episodes", "2"),
         "train": ("--config", "probe", "--steps", "4096"),
         "tune": ("--controller", "pid", "--trials", "1", "--lanes", "2"),
-        "animate": ("--env", "BirthSIM/Probe-v1", "--end", "1.6", "--rate", "10"),
+        "animate": ("--env", "BirthSIM/Probe-v2", "--end", "1.6", "--rate", "10"),
     }
     said, complained = io.StringIO(), io.StringIO()
     try:

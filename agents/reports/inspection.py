@@ -60,7 +60,7 @@ def _follow(
     ``correction`` is the believed force, N; the others are of ``info``.
     """
     env: Any = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v1", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
+        "BirthSIM/ProbeResidual-v2", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
         stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
         **policy.settings.to_dict(),
     )  # fmt: skip

@@ -58,7 +58,7 @@ class Column:
         return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
 
 
-CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
+CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
 COLUMNS = (
     Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
     Column(f"over {REFERENCE}", CIRCLE, "ideal", "randomised", "settled_rms", "ratios"),

@@ -26,8 +26,8 @@ from birthsim_env.success import SETTLED
 STATIC = ("force_gain_error", "force_crosstalk", "position_distortion", "distortion_length", "position_scale_error")
 """Errors that do not change in an episode and that no law can find."""
 
-HELD = 3.0
-"""s into ``BirthSIM/Probe`` when the push is held."""
+HELD = 5.0
+"""s into ``BirthSIM/Probe-v2`` when the push is held."""
 
 STEP = 0.02
 """s between the instants of a circle that are looked at."""
@@ -37,10 +37,10 @@ STEPS = 12
 
 
 def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
-    """Of the worlds of ``BirthSIM/Probe-v1`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
+    """Of the worlds of ``BirthSIM/Probe-v2`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
     the compliant target while the push is held; (episodes,) each."""
     env: Any = gymnasium.make_vec(
-        "BirthSIM/Probe-v1", num_envs=episodes, policy_period=HELD, parameters=rig, sensors="honest", randomize=True
+        "BirthSIM/Probe-v2", num_envs=episodes, policy_period=HELD, parameters=rig, sensors="honest", randomize=True
     )
     _, info = env.reset(seed=[seed + k for k in range(episodes)])
     target, stiffness = info["target"].T, info["stiffness_setpoint"].T

@@ -17,6 +17,7 @@ from baselines.bench.statistics import number, penalize_lost, quantile
 from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
 from baselines.registry import make_controller
 from baselines.work.files import make_folder, write_text
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -56,9 +57,9 @@ def _honest(arguments: argparse.Namespace) -> None:
             sensors, _, drawn = condition.partition(", ")
             rig = as_described(believed) if sensors == "honest" and not drawn else believed
             probe, *circles = (
-                evaluate(f"BirthSIM/{env}-v1", make_controller(name, believed), name, *span, sensors=sensors, randomize=True,
-                         parameters=rig, user_force=hand)
-                for env, hand in (("Probe", None), ("Circle", None), *(("Circle", hand) for hand in MOVING))
+                evaluate(environment_id(scenario), make_controller(name, believed), name, *span, sensors=sensors,
+                         randomize=True, parameters=rig, user_force=hand)
+                for scenario, hand in (("probe", None), ("circle", None), *(("circle", hand) for hand in MOVING))
             )  # fmt: skip
             hunting = np.maximum(sizes_of(probe, "hunting_x"), sizes_of(probe, "hunting_y"))
             settled = [sizes_of(one, "settled_rms") for one in (probe, *circles)]

@@ -21,13 +21,14 @@ from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
+from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 from birthsim_env.physics.rig.values import checked_number
 
-ENVIRONMENT = "BirthSIM/Probe-v1"
-REST, PUSHED = 1.0, 4.0
-"""s of ``ENVIRONMENT`` before its push, and from there to its end."""
+ENVIRONMENT = environment_id("probe")
+PUSHED = SCENARIOS["probe"].duration - PROBE_REST
+"""s of ``ENVIRONMENT`` from the beginning of its push to its end."""
 LONGEST_REST = 60.0
 """s; assumed: no rig needs longer to come to rest."""
 NAMED, CAUSES = 5, 8
@@ -42,7 +43,7 @@ def main() -> None:
     parser.add_argument("--drawn", action="store_true", help="draw the figures of honest sensors too")
     parser.add_argument("--metric", choices=tuple(UNITS), default="stiffness_error", help="default: %(default)s")
     parser.add_argument("--limit", type=finite_number, default=15.0, help="worlds above it are counted (default: %(default)s)")
-    parser.add_argument("--rest", type=finite_number, default=REST, help="s before the push (default: %(default)s)")
+    parser.add_argument("--rest", type=finite_number, default=PROBE_REST, help="s before the push (default: %(default)s)")
     parser.add_argument(
         "--worlds", type=whole_up_to(EPISODES), default=1, help="worst worlds that are explained (default: %(default)s)"
     )
@@ -108,22 +109,25 @@ def _explain(name: str, arguments: argparse.Namespace, rig: Parameters, sensors:
 
 def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:
     """Figures of the rig and its sensors in world ``seed``; its push, N, and the way that it asks for, mm."""
-    env: Any = gymnasium.make_vec(ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True, policy_period=REST + PUSHED / 2)
+    env: Any = gymnasium.make_vec(
+        ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True, policy_period=PROBE_REST + PUSHED / 2
+    )
     env.reset(seed=[seed])
-    shown = getattr(env.simulation.sensors, "figures", {})
+    # Before the step: a lane whose episode ends in it is drawn anew.
+    shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
     _, _, _, _, info = env.step(np.zeros((1, env.single_action_space.shape[0]), dtype=np.float32))
     env.close()
     info = info.get("final_info", info)
     ranges = {name: pair for name, pair in documented_ranges(rig, sensors).items() if name not in drawn_by(sensors)}
     drawn = draw_parameters(rig, ranges, stream(seed, 0, "parameters"))
     figures = {name: value_of(drawn, name) for name in ranges}
-    figures |= {f"electronics.{name}": float(values[0]) for name, values in shown.items()}
+    figures |= {f"electronics.{name}": value for name, value in shown.items()}
     way = info["compliant_target"] - info["target"]
     return figures, float(np.hypot(*info["user_force"][0])), float(1e3 * np.hypot(*way[0]))
 
 
 def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:
-    hand = {} if rest == REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
+    hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
     return evaluate(ENVIRONMENT, make_controller(name, Parameters()), name, episodes, seed, False, randomize=True, **setting)
 

@@ -40,8 +40,8 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
         "[Without Python](build.md) says how to compile the closed loop for other machines. This page shows what comes out. "
         "`python -m birthsim_build.commands.targets --out out/targets --page docs/targets.md` wrote it, for the Circle, "
         "ideal and lab sensors and three laws.",
-        f"- **Bits.** {periods} control periods (200 policy steps) are compared with Python. They are equal if all bits are: of "
-        "the plant's state, of what the sensors say, of what is asked for and of the openings.\n"
+        f"- **Bits.** {periods} control periods (200 policy steps) are compared with Python. They are equal if all bits are: "
+        "of the plant's state, of what the sensors say, of what is asked for and of the openings.\n"
         "- **Speeds** are control periods per second of CPU time, of one core "
         f"({platform.machine()}) that others used too. A policy step has 10 periods.",
         _table(("target", "code and data", "needs from elsewhere"), sizes),
@@ -53,8 +53,8 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
         BREAKS,
         "## All loops",
         "`birthsim-build wasm` with all scenarios, sensors and compiled controllers and one policy takes "
-        f"{sum(every['bytes'].values()) / 1e3:,.0f} kB. {len(wide)} loops ran in Node: every controller on the Circle, and every "
-        f"scenario with every sensor model. {equal} of them have the bits of Python.",
+        f"{sum(every['bytes'].values()) / 1e3:,.0f} kB. {len(wide)} loops ran in Node: every controller on the Circle, and "
+        f"every scenario with every sensor model. {equal} of them have the bits of Python.",
         _table(("loop", "bits", "speed"), wide),
     ]
     return "\n\n".join(parts) + "\n"
@@ -65,7 +65,8 @@ def _firmware(report: Report) -> str:
     cycles = ", ".join(f"{kind} {cycles}" for kind, cycles in CYCLES.items())
     return (
         f"The deepest stack is {report['stack']} bytes. This is the sum of the frames along the longest chain of calls in the "
-        f"assembly, without those of the library functions that are needed. A running law takes these bytes of RAM:\n\n{alone}\n\n"
+        "assembly, without those of the library functions that are needed. A running law takes these bytes of RAM:\n\n"
+        f"{alone}\n\n"
         "The cycles are an estimate. The operations that the optimised code executes were counted on this machine, and each "
         f"was multiplied with an assumed number of cycles ({cycles}). Microseconds are at {CLOCK / 1e6:.0f} MHz. The bits are "
         "those under qemu. No board has run it."

@@ -34,7 +34,7 @@ from tests.controllers.test_named_controllers import OWN
 
 RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
-PROBE = Conditions("BirthSIM/Probe-v1", "ideal", "nominal")
+PROBE = Conditions("BirthSIM/Probe-v2", "ideal", "nominal")
 NAN, INF = math.nan, math.inf
 
 

@@ -16,7 +16,7 @@ from baselines.bench.metrics import UNITS, EpisodeMetrics
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 
-PROBE, CIRCLE = "BirthSIM/Probe-v1", "BirthSIM/Circle-v1"
+PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 

@@ -15,7 +15,7 @@ from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
 
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 RIG = Parameters()
 STIFF = StiffnessSchedule(closed_loop=(1e5,))
 """The hand moves the place that it acts at by less than 3 mm."""
@@ -147,7 +147,7 @@ class PerLane(UserForce):
 
 
 def test_a_force_per_lane_is_a_force():
-    env, own = (gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, user_force=hand) for hand in (PerLane(), held))
+    env, own = (gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, user_force=hand) for hand in (PerLane(), held))
     env.reset(seed=0), own.reset(seed=0)
     np.testing.assert_allclose(required_strength_ratio(env), required_strength_ratio(own), rtol=1e-12)
 

@@ -18,7 +18,7 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     out = tmp_path / "new" / "folder"
     arguments = (
         "--env",
-        "BirthSIM/Probe-v1",
+        "BirthSIM/Probe-v2",
         "--episodes",
         "3",
         "--seed",
@@ -35,14 +35,14 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     ]
     table = (out / "evaluation.md").read_text()
     assert table.splitlines()[0] in printed
-    assert table.startswith("BirthSIM/Probe-v1, 3 episodes from seed 7, ideal sensors, randomised: all")
+    assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, randomised: all")
     assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
     assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
     content = strict(out / "evaluation.json")
     law, weight = content["results"]
     assert (law["controller"], weight["controller"]) == ("backstepping", "backstepping-weight")
     assert law["seeds"] == weight["seeds"] == [7, 8, 9]
-    assert content["arguments"]["env"] == "BirthSIM/Probe-v1"
+    assert content["arguments"]["env"] == "BirthSIM/Probe-v2"
     assert content["rig"]["mechanics"]["mass"] == 3.0
     for name in UNITS:
         assert len(law["episodes"][name]) == 3
@@ -77,7 +77,7 @@ def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp
 def test_evaluate_takes_a_controller_from_a_file_and_survives_that_it_loses_every_episode(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
     name = f"{tmp_path}/slam.py:Slam"
-    arguments = ("--env", "BirthSIM/Probe-v1", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
+    arguments = ("--env", "BirthSIM/Probe-v2", "--episodes", 2, "--controller", name, "--out", tmp_path / "out")
     status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments)
     assert status == 0, complained
     assert "Warning" not in complained
@@ -95,7 +95,7 @@ class Fails(Slam):
     def command(self, measurement, reference):
         raise RuntimeError("no law at all")
 """
-NARROW = ("--all", "--env", "BirthSIM/Probe-v1", "--sensors", "ideal", "--episodes", 2)
+NARROW = ("--all", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2)
 
 
 @pytest.fixture
@@ -211,7 +211,7 @@ def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     own, out = tmp_path / "own.py", tmp_path / "out"
     own.write_text(OWN)
-    arguments = ("--env", "BirthSIM/Probe-v1", "--controller", f"{own}:Slam", "--episodes", 10**5, "--jobs", 1, "--out", out)
+    arguments = ("--env", "BirthSIM/Probe-v2", "--controller", f"{own}:Slam", "--episodes", 10**5, "--jobs", 1, "--out", out)
     status, printed = interrupted("evaluate", arguments, lambda: list(out.rglob("*.json")))
     kept = list(out.rglob("*.json"))
     assert status == 130
@@ -234,10 +234,10 @@ def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, cap
     status, _, complained = call("evaluate", monkeypatch, capsys, *case, "--sensors", "lab")
     assert status == 2
     assert "--randomize 'sensors' with --all; allowed: with --sensors honest" in complained
-    own = ("--env", "BirthSIM/Probe-v1", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
+    own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
     status, _, complained = call("evaluate", monkeypatch, capsys, *case, *own)
     assert status == 0, complained
-    assert 'BirthSIM/Probe-v1,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
+    assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]
     assert (cell["sensors"], cell["plant"]) == ("honest", "drawn-sensors")
     status, _, complained = call("evaluate", monkeypatch, capsys, "--randomize", "sensors", "--out", tmp_path / "one")

@@ -25,7 +25,7 @@ def test_moving_hands_have_columns_of_their_own(monkeypatch, tmp_path):
     monkeypatch.setattr(honest, "probe_floor", lambda *_: floor)
     monkeypatch.setattr(sys, "argv", ["honest", "--controller", "backstepping", "--episodes", "1", "--out", str(tmp_path)])
     honest.main()
-    assert asked[:5] == [("BirthSIM/Probe-v1", None), *(("BirthSIM/Circle-v1", hand) for hand in (None, *MOVING))]
+    assert asked[:5] == [("BirthSIM/Probe-v2", None), *(("BirthSIM/Circle-v1", hand) for hand in (None, *MOVING))]
     table = [line.split("|")[1:-1] for line in (tmp_path / "honest.md").read_text().splitlines() if line.startswith("|")]
     assert {len(row) for row in table} == {7 + len(MOVING)}
     found = dict(zip((cell.strip() for cell in table[0]), table[2], strict=True))

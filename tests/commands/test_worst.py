@@ -27,7 +27,7 @@ def test_the_worst_world_is_that_of_the_evaluation_and_no_figure_changes_it_wher
     out = capsys.readouterr().out
     rows = rows_of(out)
     law = make_controller("admittance-adaptive", Parameters())
-    done = evaluate("BirthSIM/Probe-v1", law, "law", 3, SEED, False, randomize=True)
+    done = evaluate("BirthSIM/Probe-v2", law, "law", 3, SEED, False, randomize=True)
     sizes = np.abs(done.metrics["stiffness_error"])
     first = SEED + int(np.argmax(sizes))
     assert rows[2][-1].startswith(f"{first} (")
@@ -38,7 +38,7 @@ def test_the_worst_world_is_that_of_the_evaluation_and_no_figure_changes_it_wher
 
 
 def test_a_world_is_told_as_the_environment_draws_it():
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=1, randomize=True, sensors="honest", policy_period=3.0)
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=1, randomize=True, sensors="honest", policy_period=4.5)
     env.reset(seed=[SEED])
     mass = env.simulation.plant.lane_parameters[8, 0]
     noise = env.simulation.sensors.figures["position_noise"][0]
@@ -52,8 +52,8 @@ def test_a_world_is_told_as_the_environment_draws_it():
     assert way == pytest.approx(1e3 * push / stiffness), "axes' pushes"
 
 
-def test_a_longer_rest_meets_the_same_worlds():
-    short, long = (worst._evaluated("admittance-adaptive", rest, Parameters(), "ideal", SEED, 2) for rest in (1.0, 1.5))
-    assert short.required_strength_ratio == pytest.approx(long.required_strength_ratio, rel=0.05)
-    assert short.seeds == long.seeds
-    assert np.isfinite(long.metrics["stiffness_error"]).all()
+def test_another_rest_meets_the_same_worlds():
+    declared, short = (worst._evaluated("admittance-adaptive", rest, Parameters(), "ideal", SEED, 2) for rest in (3.0, 1.0))
+    assert short.required_strength_ratio == pytest.approx(declared.required_strength_ratio, rel=0.05)
+    assert short.seeds == declared.seeds
+    assert np.isfinite(short.metrics["stiffness_error"]).all()

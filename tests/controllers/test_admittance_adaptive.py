@@ -100,7 +100,7 @@ def test_on_circles_a_scale_and_a_gain_leave_their_share():
 def test_a_noisy_late_tracker_makes_no_lasting_swing(seed, most):
     """Worlds in which a gain that fell to 0.35 of itself made the head swing by 118 and 22 mm; now it is 8 and 3 mm or so."""
     law = make_controller("admittance-adaptive", Parameters())
-    found = evaluate("BirthSIM/Probe-v1", law, "adaptive", 1, seed, progress=False, sensors="honest", randomize=True).metrics
+    found = evaluate("BirthSIM/Probe-v2", law, "adaptive", 1, seed, progress=False, sensors="honest", randomize=True).metrics
     assert max(found["hunting_x"][0], found["hunting_y"][0]) < most
 
 

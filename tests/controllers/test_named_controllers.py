@@ -12,7 +12,7 @@ from baselines.registry import controller_names, make_controller
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
 
-PROBE, CIRCLE = "BirthSIM/Probe-v1", "BirthSIM/Circle-v1"
+PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 

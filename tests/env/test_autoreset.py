@@ -14,7 +14,7 @@ from gymnasium.wrappers import vector as wrappers
 import birthsim_env
 
 assert birthsim_env  # importing it registers the ids
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0]], np.float32)
 
 

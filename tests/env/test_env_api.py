@@ -14,11 +14,12 @@ from stable_baselines3.common.env_checker import check_env as stable_baselines_c
 import birthsim_env
 from birthsim_env import Parameters
 from birthsim_env.env import BirthSIMEnv
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.control_model import active_flow
 from birthsim_env.vector_env import BirthSIMVectorEnv
 
-SECONDS = {"Circle": 16, "Probe": 5, "Descent": 24, "Forceps": 15, "Dystocia": 16}
-IDS = tuple(f"BirthSIM/{name}-v1" for name in SECONDS)
+SECONDS = {"circle": 16, "probe": 7, "descent": 24, "forceps": 15, "dystocia": 16}
+IDS = tuple(environment_id(name) for name in SECONDS)
 CIRCLE, PROBE = IDS[0], IDS[1]
 FACES = tuple(itertools.product(("valve", "flow"), ("two_valves", "one_valve"), ("ideal", "lab")))
 EXAMPLES = [(i, face) for k, i in enumerate(IDS) for face in (FACES if k == 0 else (FACES[0], FACES[k], FACES[7]))]

@@ -12,10 +12,11 @@ import pytest
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 
-IDS = tuple(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia"))
+IDS = tuple(environment_id(name) for name in ("circle", "probe", "descent", "forceps", "dystocia"))
 TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 

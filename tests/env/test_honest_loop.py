@@ -270,7 +270,7 @@ def test_what_a_law_believes_of_the_sensors_may_differ_from_what_they_are():
 
     def run(believed):
         env = gymnasium.make_vec(
-            "BirthSIM/Probe-v1", num_envs=2, sensors="honest", parameters=true, policy_period=0.001, duration=2.0
+            "BirthSIM/Probe-v2", num_envs=2, sensors="honest", parameters=true, policy_period=0.001, duration=2.0
         )
         env.reset(seed=0)
         law = make_controller("admittance-backstepping", believed)

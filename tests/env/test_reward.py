@@ -8,9 +8,10 @@ import pytest
 
 from birthsim_env import StiffnessSchedule, reward
 from birthsim_env.loop.signals import REFERENCES
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
 
-CIRCLE, PROBE, FORCEPS, DESCENT = (f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Forceps", "Descent"))
+CIRCLE, PROBE, FORCEPS, DESCENT = (environment_id(name) for name in ("circle", "probe", "forceps", "descent"))
 TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 LARGEST = 8.75
 COUPLED = StiffnessSchedule((0.0, 1.2), (2000.0, 3000.0), (4600.0, 4000.0), (2300.0, 2000.0), closed_loop_xy=(900.0, -1200.0))

@@ -17,13 +17,16 @@ from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.scores import ROLES, normalized_score, reference_scores
 
 IDS = [environment_id(name) for name in SCENARIOS]
+PROBE = environment_id("probe")
+"""For three of its seven seconds nothing pushes. Shut valves stand on the target then, the paper's law hunts: on drawn rigs
+they pay more than it, though their settled error is larger."""
 
 
 @pytest.mark.parametrize("environment", IDS)
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
 def test_returns_order_controllers_as_their_errors_do(environment, sensors):
     """Slammed valves, then shut ones, the paper's law, and better ones; ending early never pays, with any discount."""
-    names = ("slammed-valves", "shut-valves", "backstepping", "admittance-backstepping")
+    names = ("slammed-valves", "shut-valves", *(() if environment == PROBE else ("backstepping",)), "admittance-backstepping")
     rig = birthsim_env.Parameters()
     setting = {"progress": False, "sensors": sensors, "randomize": True}
     found = {name: evaluate(environment, make_controller(name, rig), name, 24, 910_000, **setting) for name in names}
@@ -36,7 +39,7 @@ def test_returns_order_controllers_as_their_errors_do(environment, sensors):
 
 
 def test_returns_are_the_sums_of_rewards():
-    env = gymnasium.make("BirthSIM/Probe-v1", policy_period=0.001, duration=0.5)
+    env = gymnasium.make("BirthSIM/Probe-v2", policy_period=0.001, duration=0.5)
     controller = make_controller("pid", birthsim_env.Parameters())
     env.reset(seed=3)
     sums, done, step = dict.fromkeys(DISCOUNTS, 0.0), False, 0
@@ -45,7 +48,7 @@ def test_returns_are_the_sums_of_rewards():
         for discount in DISCOUNTS:
             sums[discount] += discount ** (step / 10) * reward
         step += 1
-    found = evaluate("BirthSIM/Probe-v1", controller, "", 1, 3, progress=False, duration=0.5)
+    found = evaluate("BirthSIM/Probe-v2", controller, "", 1, 3, progress=False, duration=0.5)
     for discount, expected in sums.items():
         assert found.returns[discount] == [pytest.approx(expected, rel=1e-9)]
     assert found.success == [info["is_success"]]
@@ -58,7 +61,9 @@ def test_every_id_and_condition_has_scores_in_order(environment, sensors, random
     known = reference_scores(environment, sensors, randomize)
     assert tuple(known) == (ROLES if policy_of(environment) in shipped_names() else ROLES[:-1])
     paid = {role: entry["return"] for role, entry in known.items()}
-    assert paid["random valves"] < paid["shut valves"] < paid["paper's law"] < paid["best classical law"]
+    assert paid["random valves"] < min(paid["shut valves"], paid["paper's law"])
+    assert max(paid["shut valves"], paid["paper's law"]) < paid["best classical law"]
+    assert (paid["shut valves"] < paid["paper's law"]) == ((environment, randomize) != (PROBE, True))
     assert known["shut valves"]["error"] > known["paper's law"]["error"] > known["best classical law"]["error"]
     for role, score in (("shut valves", 0.0), ("best classical law", 100.0)):
         assert normalized_score(environment, paid[role], sensors, randomize) == pytest.approx(score)

@@ -12,14 +12,15 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 import birthsim_env
+from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.state import give_state, take_state
 
 LANES, STEPS = 3, 40
-SCENARIOS = ("Circle", "Probe", "Descent", "Forceps", "Dystocia")
+IDS = tuple(environment_id(name) for name in ("circle", "probe", "descent", "forceps", "dystocia"))
 LAWS = ("backstepping-force-first", "admittance-backstepping", "none")
 WORLDS = {
-    **{f"BirthSIM/{name}-v1 {sensors}": (f"BirthSIM/{name}-v1", {"sensors": sensors, "randomize": True})
-       for name, sensors in itertools.product(SCENARIOS, ("ideal", "lab"))},
+    **{f"{name} {sensors}": (name, {"sensors": sensors, "randomize": True})
+       for name, sensors in itertools.product(IDS, ("ideal", "lab"))},
     **{f"hand {hand}": ("BirthSIM/Circle-v1", {"user_force": hand, "randomize": True}) for hand in ("sine", "noise", "guided")},
     **{f"law {law} {sensors}": ("BirthSIM/CircleResidual-v1", {"law": law, "sensors": sensors, "randomize": True})
        for law, sensors in itertools.product(LAWS, ("ideal", "lab"))},

@@ -10,7 +10,7 @@ from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.success import add
 
-CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v1"
+CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
 
 
 @pytest.mark.parametrize(("name", "kept"), [("admittance-backstepping", True), ("backstepping", False)])

@@ -82,10 +82,10 @@ def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypa
 
 
 def test_frames_come_in_the_size_asked_for():
-    env = gymnasium.make("BirthSIM/Probe-v1", render_mode="rgb_array", picture_size=(1280, 960))
+    env = gymnasium.make("BirthSIM/Probe-v2", render_mode="rgb_array", picture_size=(1280, 960))
     env.reset(seed=0)
     assert env.render().shape == (960, 1280, 3)
-    envs = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
+    envs = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
     envs.reset(seed=0)
     assert [frame.shape for frame in envs.render()] == 2 * [(300, 400, 3)]
 
@@ -93,7 +93,7 @@ def test_frames_come_in_the_size_asked_for():
 @pytest.mark.parametrize("size", [(319, 480), (640, 239), (7681, 480), (640.0, 480.0), (640,), "640x480", None, (True, 480)])
 def test_an_impossible_size_is_refused_by_name(size):
     with pytest.raises(ValueError, match=r"picture_size = .*allowed: two whole numbers from 320 x 240 to 7680 x 4320 px"):
-        gymnasium.make("BirthSIM/Probe-v1", picture_size=size)
+        gymnasium.make("BirthSIM/Probe-v2", picture_size=size)
 
 
 def test_without_moviepy_gymnasium_says_so_before_anything_runs(tmp_path, monkeypatch):

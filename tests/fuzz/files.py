@@ -27,7 +27,7 @@ def written(case: Case, path: Path, content: bytes) -> Path:
 
 def run_a_little(rig: Any, rng: Rng, **arguments: Any) -> None:
     """A few steps of a rig that was accepted: no state is anything but finite behind an observation that is."""
-    env: Any = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, parameters=rig, **arguments)
+    env: Any = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, parameters=rig, **arguments)
     env.reset(seed=int(rng.integers(2**31)))
     for _ in range(STEPS):
         observation, reward, terminated, *_ = env.step(rng.uniform(-1, 1, (2, 4)))

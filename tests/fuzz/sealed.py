@@ -87,7 +87,7 @@ def _checkpoints(folder: Path) -> tuple[Any, Any, bytes]:
     from agents.training.sb3_adapter import SB3VecEnv
 
     torch.set_num_threads(1)
-    tiny = TrainingSettings("BirthSIM/ProbeResidual-v1", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
+    tiny = TrainingSettings("BirthSIM/ProbeResidual-v2", steps=64, lanes=2, rollout=16, batch=32, hidden=(8, 8))
     env = VecNormalize(SB3VecEnv(gymnasium.make_vec(tiny.environment, num_envs=2, autoreset_mode="SameStep")))
     env.seed(0)
     env.reset()

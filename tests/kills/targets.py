@@ -44,13 +44,13 @@ TARGETS = {
     for target in (
         Target(
             "evaluate", "birthsim-evaluate",
-            ("--env", "BirthSIM/Probe-v1", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
+            ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
         ),
         Target(
             "compare", "birthsim-evaluate",
             (
-                *("--all", "--no-studies", "--env", "BirthSIM/Probe-v1", "--sensors", "ideal"),
+                *("--all", "--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
                 *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             ),
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),

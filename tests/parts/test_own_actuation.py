@@ -9,7 +9,7 @@ import pytest
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import SIZE
 
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 
 
 class Leaky:

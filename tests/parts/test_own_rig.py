@@ -25,7 +25,7 @@ coulomb_friction = 60.0
 
 def drawn(tmp_path, text, lanes=64):
     (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=lanes, parameters=tmp_path / "rig.toml", randomize="plant")
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, parameters=tmp_path / "rig.toml", randomize="plant")
     env.reset(seed=0)
     return env.simulation.plant.lane_parameters
 
@@ -75,7 +75,7 @@ def test_ranges_that_cannot_be(tmp_path, table, message):
 def test_draws_that_are_impossible_together_are_refused_before_any_episode():
     with pytest.raises(ValueError, match=r"randomize: some of the rigs drawn are impossible: Mechanics\.mass"):
         gymnasium.make(
-            "BirthSIM/Probe-v1", parameters=Parameters().replace({"friction.law": "coulomb"}),
+            "BirthSIM/Probe-v2", parameters=Parameters().replace({"friction.law": "coulomb"}),
             randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
         )  # fmt: skip
 

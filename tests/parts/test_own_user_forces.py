@@ -9,7 +9,7 @@ import pytest
 from birthsim_env import UserForce
 from birthsim_env.parts.drawn.seeding import stream
 
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 
 
 class Spy(UserForce):

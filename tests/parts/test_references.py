@@ -150,7 +150,7 @@ def test_every_varied_draw_is_reachable_all_the_way(name):
 
 @pytest.mark.parametrize("where", [(0.8, 0.0), (0.25, 0.0), (0.5, 0.4), (0.3, -0.5), (-0.5, 0.0)])
 def test_an_unreachable_reference_is_refused_with_point_and_workspace(where):
-    env = gymnasium.make("BirthSIM/Probe-v1", reference=Hold(where))
+    env = gymnasium.make("BirthSIM/Probe-v2", reference=Hold(where))
     with pytest.raises(ValueError, match="reference at 0 s") as refusal:
         env.reset(seed=0)
     message = str(refusal.value)
@@ -179,14 +179,14 @@ class Lissajous(Trajectory):
 
 def test_a_users_own_trajectory_serves_one_lane_and_many():
     assert_consistent(prepared(Lissajous()), np.linspace(0.1, 6, 50))
-    many = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, reference=Lissajous(), user_force=None)
+    many = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, reference=Lissajous(), user_force=None)
     rows, infos = many.reset(seed=20)
     np.testing.assert_allclose(infos["tracking_error"], 0.0, atol=1e-12)
     assert len(np.unique(infos["target"][:, 0])) == 3
     for _ in range(20):
         rows = many.step(np.zeros((3, 4)))[0]
     for lane in range(3):
-        one = gymnasium.make("BirthSIM/Probe-v1", reference=Lissajous())
+        one = gymnasium.make("BirthSIM/Probe-v2", reference=Lissajous())
         one.reset(seed=20 + lane)
         for _ in range(20):
             row, _, _, _, info = one.step(np.zeros(4))
@@ -211,18 +211,18 @@ def test_answers_of_a_wrong_shape_are_refused_by_name(answer, words):
             return answer(time)
 
     with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Probe-v1", reference=Wrong()).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v2", reference=Wrong()).reset(seed=0)
     assert all(word in str(refusal.value) for word in words), refusal.value
 
 
 def test_a_trajectory_without_sample_says_what_is_missing():
     with pytest.raises(NotImplementedError, match=r"Trajectory.sample\(time\) is missing; .*\(8, N\)"):
-        gymnasium.make("BirthSIM/Probe-v1", reference=Trajectory()).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v2", reference=Trajectory()).reset(seed=0)
     for wrong in ((0.5, 0.0), lambda time: np.zeros((8, 1))):
         with pytest.raises(
             ValueError, match=r"(?s)reference.* = .*; allowed: (None, a birthsim_env\.Trajectory|a function of time)"
         ):
-            gymnasium.make("BirthSIM/Probe-v1", reference=wrong)
+            gymnasium.make("BirthSIM/Probe-v2", reference=wrong)
 
 
 @pytest.mark.parametrize(
@@ -238,5 +238,5 @@ def test_a_trajectory_without_sample_says_what_is_missing():
 )
 def test_impossible_paths_are_refused_by_name(arguments, words):
     with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Probe-v1", reference=Path(**arguments)).reset(seed=0)
+        gymnasium.make("BirthSIM/Probe-v2", reference=Path(**arguments)).reset(seed=0)
     assert all(word in str(refusal.value) for word in words), refusal.value

@@ -53,7 +53,7 @@ def world(name="BirthSIM/Descent-v1", seed=11, lanes=4, **arguments):
 
 def rigs(lanes=1500, seed=0, **arguments):
     """Parameter name -> (lanes,) as drawn."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=lanes, **arguments).unwrapped
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, **arguments).unwrapped
     env.reset(seed=seed)
     return dict(zip(PARAMETER_NAMES, env.simulation.plant.lane_parameters, strict=True))
 
@@ -96,7 +96,7 @@ def test_randomizing_the_plant_alone_leaves_the_nominal_experiment():
     np.testing.assert_array_equal(world(randomize=True)[3], varied[3])
 
 
-@pytest.mark.parametrize("name", ["Circle-v1", "Probe-v1", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0"])
+@pytest.mark.parametrize("name", ["Circle-v1", "Probe-v2", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0"])
 def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
     one, other = (world(f"BirthSIM/{name}", seed=seed, lanes=6) for seed in (0, 100))
     for a, b in zip(one, other, strict=True):
@@ -141,7 +141,7 @@ def test_a_mapping_draws_just_its_parameters_and_a_new_value_each_episode():
         for name, values in drawn.items()
         if name not in ("mass", "inverse_mass", "supply", "inverse_supply", "source")
     )
-    env = gymnasium.make("BirthSIM/Probe-v1", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
+    env = gymnasium.make("BirthSIM/Probe-v2", randomize={"mechanics.mass": (3.5, 4.0)}).unwrapped
     masses = []
     for seed in (0, None, None, 0):
         env.reset(seed=seed)
@@ -227,7 +227,7 @@ def test_lane_seeds_count_up_or_are_as_given():
 
 @pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc", -1])
 def test_bad_seeds_are_refused_by_name(seed):
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3)
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3)
     with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed") as refusal:
         env.reset(seed=seed)
     assert "allowed" in str(refusal.value) or "greater or equal to zero" in str(refusal.value)

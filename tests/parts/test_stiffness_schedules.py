@@ -190,7 +190,7 @@ def test_a_coupling_of_x_and_y_is_drawn_and_reaches_info_and_reference():
     schedule = StiffnessSchedule(
         (0.0, 1.0), (3e3, 2e3), *TWO[2:], closed_loop_y=(1500.0, 1e3), closed_loop_xy=((700, 900), 0.0)
     )
-    env = gymnasium.make("BirthSIM/Probe-v1", stiffness=schedule)
+    env = gymnasium.make("BirthSIM/Probe-v2", stiffness=schedule)
     _, info = env.reset(seed=0)
     coupling = float(env.unwrapped.reference.stiffness_coupling)
     assert 700 <= coupling <= 900

@@ -243,7 +243,7 @@ def test_a_users_own_sensors_are_begun_lane_by_lane(monkeypatch):
             self._keys[lane] = int(1000 * draw((0.0, 1.0), rng))
 
     monkeypatch.setitem(SENSORS, "lab", Own)
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, sensors="lab").unwrapped
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, sensors="lab").unwrapped
     env.reset(seed=4)
     assert env.simulation.sensors._keys.tolist() == [int(1000 * stream(4 + lane, 0, "sensors").random()) for lane in range(3)]
 
@@ -288,7 +288,7 @@ def test_a_users_own_sample_is_the_one_that_is_checked(part):
             return super().sample(time) * np.where(time > 2.0, -1.0, 1.0)
 
     own = {"reference": Away(), "stiffness": Soft()}[part]
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=3, **{part: own})
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, **{part: own})
     words = {"reference": r"reference at 2\.\d+ s: .* unreachable", "stiffness": r"stiffness\.sample\(time = 2\.\d+ s\) = -"}
     with pytest.raises(ValueError, match=words[part]):
         env.reset(seed=0)
@@ -296,7 +296,7 @@ def test_a_users_own_sample_is_the_one_that_is_checked(part):
 
 def test_a_reference_on_the_very_border_of_the_workspace_is_allowed():
     """The quick look is undecided there; the exact one decides."""
-    env = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, reference=Hold((0.7, 0.0)), user_force="sine")
+    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=Hold((0.7, 0.0)), user_force="sine")
     env.reset(seed=0)
     with pytest.raises(ValueError, match="unreachable"):
-        gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, reference=Hold((0.7 + 1e-9, 0.0))).reset(seed=0)
+        gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, reference=Hold((0.7 + 1e-9, 0.0))).reset(seed=0)

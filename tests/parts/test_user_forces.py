@@ -16,7 +16,7 @@ from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls, Ramp
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import SCENARIOS
 
-PROBE = "BirthSIM/Probe-v1"
+PROBE = "BirthSIM/Probe-v2"
 
 
 def course(force, seconds, seed=0, step=0.001):
@@ -61,11 +61,11 @@ def test_varied_pushes_of_the_circle_stay_within_10_and_40_newtons(seed):
     assert len(set(peaks.round(9))) == 8
 
 
-def test_the_probe_ramps_over_one_second_and_holds():
-    times, rows = course(SCENARIOS["probe"].nominal()[1], 5.0)
-    np.testing.assert_allclose(rows[:, 0], np.clip(times - 1.0, 0, 1) * 20.0, atol=1e-9)
+def test_the_probe_rests_for_three_seconds_ramps_over_one_and_holds():
+    times, rows = course(SCENARIOS["probe"].nominal()[1], 7.0)
+    np.testing.assert_allclose(rows[:, 0], np.clip(times - 3.0, 0, 1) * 20.0, atol=1e-9)
     np.testing.assert_array_equal(rows[:, 1], 0.0)
-    ends = np.array([course(SCENARIOS["probe"].varied()[1], 5.0, seed, step=1.0)[1][-1] for seed in range(200)])
+    ends = np.array([course(SCENARIOS["probe"].varied()[1], 7.0, seed, step=1.0)[1][-1] for seed in range(200)])
     sizes, turns = np.hypot(*ends.T), np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
     assert 5 <= sizes.min() < 7
     assert 38 < sizes.max() <= 40

@@ -197,7 +197,7 @@ def test_an_environment_takes_it_from_parameters_and_from_a_file(tmp_path: Path)
     path.write_text("[friction]\nlaw = 'elasto_plastic'\nbreakaway_ratio = 0.6\n")
     observations = []
     for parameters in (rig, str(path), None):
-        env = gymnasium.make("BirthSIM/Probe-v1", parameters=parameters)
+        env = gymnasium.make("BirthSIM/Probe-v2", parameters=parameters)
         env.reset(seed=3)
         for _ in range(30):
             observation, *_ = env.step(np.array([0.3, -0.3, 0.3, -0.3], dtype=np.float32))

@@ -22,7 +22,7 @@ from birthsim_env.physics.plant import Plant
 from tests.oracles import closed_loop
 
 assert agents  # importing it registers the ids
-PROBE, CIRCLE = "BirthSIM/ProbeResidual-v1", "BirthSIM/CircleResidual-v1"
+PROBE, CIRCLE = "BirthSIM/ProbeResidual-v2", "BirthSIM/CircleResidual-v1"
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
@@ -212,7 +212,7 @@ def test_less_damping_than_the_law_has_is_bit_for_bit_the_law() -> None:
 def test_without_a_law_the_actions_are_the_openings(sensors: str) -> None:
     arguments = {"num_envs": 3, "sensors": sensors, "randomize": True}
     inside = gymnasium.make_vec(PROBE, law="none", **arguments)
-    outside = gymnasium.make_vec("BirthSIM/Probe-v1", **arguments)
+    outside = gymnasium.make_vec("BirthSIM/Probe-v2", **arguments)
     inside.reset(seed=6), outside.reset(seed=6)
     for action in np.random.default_rng(0).uniform(-0.1, 0.1, (60, 3, 4)).astype(np.float32):
         for one, other in zip(inside.step(action)[1:4], outside.step(action)[1:4], strict=True):

@@ -27,7 +27,7 @@ from agents.residual.settings import ResidualSettings
 from tests.console import call
 
 ROOT = Path(__file__).parent.parent.parent
-ENVIRONMENT = "BirthSIM/ProbeResidual-v1"
+ENVIRONMENT = "BirthSIM/ProbeResidual-v2"
 SETTINGS = ResidualSettings(impedance="variable_kp", authority=40.0)
 assert agents  # importing it registers the residual environments
 

@@ -153,10 +153,10 @@ def test_eleven_layers_come_back_in_order(tmp_path):
 
 
 def test_writing_again_replaces_the_policy_whole(folder):
-    other = Policy(network(hidden=(4,), seed=5), "BirthSIM/ProbeResidual-v1", ResidualSettings(), {"steps": 9})
+    other = Policy(network(hidden=(4,), seed=5), "BirthSIM/ProbeResidual-v2", ResidualSettings(), {"steps": 9})
     save_policy(other, folder)
     read = load_policy(folder)
-    assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v1", {"steps": 9})
+    assert (read.environment, read.training) == ("BirthSIM/ProbeResidual-v2", {"steps": 9})
     assert len(read.network.layers) == 2
     assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
 

@@ -19,7 +19,7 @@ from birthsim_env import Parameters
 from birthsim_env.observation import SIZE
 
 assert agents  # importing it registers the ids
-CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 
 
 def random_network(inputs, outputs, reach=0.5, squashed=False, seed=0) -> PolicyNetwork:
@@ -83,7 +83,7 @@ def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
     observation, _ = inside.reset(seed=1)
     states = []
     for believed in (rig, None):
-        outside = gymnasium.make_vec("BirthSIM/Probe-v1", num_envs=2, policy_period=1e-3, parameters=rig)
+        outside = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, policy_period=1e-3, parameters=rig)
         controller = ResidualController(believed, tmp_path)
         outside.reset(seed=1)
         for _ in range(200):

@@ -23,7 +23,7 @@ from tests.oracles.residual_parts import UnexplainedForceObserver
 
 assert birthsim_env  # importing it registers the ids
 IDS = tuple(environment_id(name, "Residual") for name in SCENARIOS)
-CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v1"
+CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 RIG = Parameters()
 
 

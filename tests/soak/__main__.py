@@ -80,17 +80,17 @@ def report(laps: Laps, setting: dict[str, Any]) -> str:
             f"`make soak` ran {steps:,} policy steps in {len(laps)} laps of {LANES} lanes (rigs side by side). It took "
             f"{seconds / 3600:.1f} h on one thread ({steps / seconds:,.0f} steps/s, {platform.machine()}).",
             "",
-            "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from them. "
-            "Friction law, sensors and hand differ. The action is random openings or flows, a residual with random actions on "
-            "some law, or a rival.",
+            "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from "
+            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random actions "
+            "on some law, or a rival.",
             "",
             "Every step was checked. Observations are finite and inside their space, rewards are finite and from 0 to 1, and "
             "states and `info` are finite.",
             "",
             table(laps),
             "",
-            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Median memory in each tenth of the run, MB: {tenths}. It grew by "
-            f"{growth(laps):.1f} MB from the sixth tenth to the last.",
+            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Median memory in each tenth of the run, MB: {tenths}. It grew "
+            f"by {growth(laps):.1f} MB from the sixth tenth to the last.",
             "",
             f"Seed {setting['seed']}, BirthSIM {setting['code']['version']}, sources {setting['code']['sources'][:12]}.",
             "",

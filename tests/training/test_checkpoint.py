@@ -25,7 +25,7 @@ from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
 
-PROBE = "BirthSIM/ProbeResidual-v1"
+PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
 TINY = TrainingSettings(
     PROBE, steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),

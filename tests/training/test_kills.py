@@ -24,7 +24,7 @@ from tests.console import COMMANDS, PATIENCE, ROOT, run, strict
 
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
 TINY = TrainingSettings(
-    "BirthSIM/ProbeResidual-v1", steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
+    "BirthSIM/ProbeResidual-v2", steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
     validation_lanes=2, validations=4,
 )  # fmt: skip
 
@@ -148,7 +148,7 @@ def test_a_training_that_is_over_is_not_trained_any_further(tmp_path):
 
 
 CONFIGURATION = """[training]
-environment = "BirthSIM/ProbeResidual-v1"
+environment = "BirthSIM/ProbeResidual-v2"
 steps = 4096
 lanes = 8
 rollout = 32

@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from agents.training.sb3_adapter import SB3VecEnv
 
-PROBE, RESIDUAL = "BirthSIM/Probe-v1", "BirthSIM/CircleResidual-v1"
+PROBE, RESIDUAL = "BirthSIM/Probe-v2", "BirthSIM/CircleResidual-v1"
 SLAM = np.array([[0, 0, 1, -1], [0, 0, 0, 0], [0.02, -0.02, 0.01, 0]], np.float32)
 """Lane 0 runs into an end stop after some tenths of a second, the others live until their time is over."""
 

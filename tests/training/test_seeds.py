@@ -152,7 +152,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
         return {task.name: result for task in tasks}, {}
 
     monkeypatch.setattr(command, "run_tasks", computed)
-    arguments = ("--env", "BirthSIM/Probe-v1", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
+    arguments = ("--env", "BirthSIM/Probe-v2", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     command.main()
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]

@@ -26,13 +26,13 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
 
-PROBE = "BirthSIM/ProbeResidual-v1"
+PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
 SMALL = TrainingSettings(
     PROBE, steps=30_000, lanes=32, rollout=32, batch=256, epochs=4, hidden=(32, 32), learning_rate=2e-3,
     validation_lanes=8, validations=2,
 )  # fmt: skip
-"""On 2.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
+"""On 4.5 s of the stiffness test, a few seconds are enough to take a third off the law's error."""
 BRIEF = replace(SMALL, steps=2048, lanes=16, validation_lanes=4, validations=2)
 ROLLOUT = 16 * 32
 
@@ -49,7 +49,7 @@ def trained(tmp_path_factory):
     """Folder and figures of one small training."""
     folder, make_vec = tmp_path_factory.mktemp("trained"), gymnasium.make_vec
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training.gymnasium, "make_vec", lambda *args, **kwargs: make_vec(*args, **{"duration": 2.5, **kwargs}))
+        patch.setattr(training.gymnasium, "make_vec", lambda *args, **kwargs: make_vec(*args, **{"duration": 4.5, **kwargs}))
         return folder, train(SMALL, RESIDUAL, folder)
 
 
@@ -140,10 +140,10 @@ def test_the_folder_holds_the_policy_whose_figures_were_reported(trained):
     assert (policy.environment, policy.settings, policy.network.squashed) == (PROBE, RESIDUAL, False)
     assert {name: policy.training[name] for name in SMALL.to_dict()} == SMALL.to_dict()
     assert steady([policy.training["law"], policy.training["reached"]]) == steady([reached["law"], reached["policy"]])
-    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True, duration=2.5)
+    env = gymnasium.make_vec(policy.environment, num_envs=SMALL.validation_lanes, randomize=True, duration=4.5)
     assert steady([validate(env, policy.network.actions).to_dict()]) == steady([reached["policy"]])
     # On worlds that neither training nor validation has seen it is better as well.
-    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True, duration=2.5)
+    unseen = gymnasium.make_vec(policy.environment, num_envs=32, randomize=True, duration=4.5)
     assert validate(unseen, policy.network.actions, 50_000).pooled < 0.9 * validate(unseen, zero, 50_000).pooled
 
 
@@ -385,11 +385,11 @@ def test_validation_does_not_let_a_lost_lane_back_in():
 
 def test_the_evaluation_of_the_controller_and_the_validation_of_the_policy_agree(trained):
     folder, _ = trained
-    arguments = {"randomize": True, "duration": 2.5}
+    arguments = {"randomize": True, "duration": 4.5}
     inside = gymnasium.make_vec(PROBE, num_envs=5, **arguments)
     score = validate(inside, load_policy(folder).network.actions, 40)
-    result = evaluate("BirthSIM/Probe-v1", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
-    law = evaluate("BirthSIM/Probe-v1", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
+    result = evaluate("BirthSIM/Probe-v2", ResidualController(policy=folder), "residual", 5, 40, progress=False, **arguments)
+    law = evaluate("BirthSIM/Probe-v2", BacksteppingController(), "law", 5, 40, progress=False, **arguments)
     # The one averages every 10 ms, the other every millisecond of the same trajectory.
     np.testing.assert_allclose(result.metrics["settled_rms"], score.error, rtol=0.02)
     np.testing.assert_array_equal(result.required_strength_ratio, score.required_strength_ratio)

@@ -24,7 +24,7 @@ def example():
     """Runs a file of ``examples/`` on the stiffness test and returns the scores it prints."""
 
     def run(name, steps=45_000):
-        command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v1", str(steps)]
+        command = [sys.executable, "-P", str(EXAMPLES / f"{name}.py"), "BirthSIM/Probe-v2", str(steps)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
         assert done.returncode == 0, done.stderr[-3000:]
         return [float(score) for score in re.findall(r"^\s*[\d,]+ steps: .* score (-?\d+)$", done.stdout, re.MULTILINE)]

@@ -14,7 +14,7 @@ from baselines.work.tasks import Task, run_tasks
 
 SWEEP = """
 [base]
-environment = "BirthSIM/Probe-v1"
+environment = "BirthSIM/Probe-v2"
 randomize = "scenario"
 episodes = 2
 [grid]

@@ -11,8 +11,9 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from moviepy import VideoFileClip
 
 import birthsim_env
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
-IDS = [*(f"BirthSIM/{name}-v1" for name in ("Circle", "Probe", "Descent", "Forceps", "Dystocia")), "BirthSIM/Vacuum-v0"]
+IDS = [environment_id(scenario) for scenario in SCENARIOS]
 STEPS = 40
 
 
@@ -102,7 +103,7 @@ def test_normalised_observations_are_the_bare_ones_scaled(actions, bare):
 
 
 def test_statistics_are_the_sum_of_rewards():
-    env, total, steps, over = wrappers.RecordEpisodeStatistics(gym.make("BirthSIM/Probe-v1")), 0.0, 0, False
+    env, total, steps, over = wrappers.RecordEpisodeStatistics(gym.make("BirthSIM/Probe-v2")), 0.0, 0, False
     env.reset(seed=1)
     while not over:
         *_, reward, terminated, truncated, info = env.step(np.zeros(4, dtype=np.float32))
@@ -112,7 +113,7 @@ def test_statistics_are_the_sum_of_rewards():
 
 
 def test_a_film_is_recorded_of_every_step(tmp_path):
-    env = wrappers.RecordVideo(gym.make("BirthSIM/Probe-v1", render_mode="rgb_array"), str(tmp_path), disable_logger=True)
+    env = wrappers.RecordVideo(gym.make("BirthSIM/Probe-v2", render_mode="rgb_array"), str(tmp_path), disable_logger=True)
     env.reset(seed=1)
     for _ in range(20):
         env.step(np.zeros(4, dtype=np.float32))
@@ -156,7 +157,7 @@ def test_vector_wrappers_say_the_same_of_both():
             wrappers.vector.NormalizeObservation(wrappers.vector.RecordEpisodeStatistics(worlds))
         )
 
-    name, lanes = "BirthSIM/Probe-v1", 4
+    name, lanes = "BirthSIM/Probe-v2", 4
     native = wrapped(gym.make_vec(name, num_envs=lanes, randomize=True, max_episode_steps=30))
     theirs = wrapped(SyncVectorEnv([lambda: gym.make(name, randomize=True, max_episode_steps=30)] * lanes))
     np.testing.assert_array_equal(native.reset(seed=3)[0], theirs.reset(seed=3)[0])
