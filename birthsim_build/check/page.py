@@ -62,7 +62,7 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
 
 def _firmware(report: Report) -> str:
     alone = "\n".join(f"- `{name}`: {size:,}" for name, size in report["loops"].items())
-    cycles = ", ".join(f"{kind} {cycles}" for kind, cycles in CYCLES.items())
+    cycles = ", ".join(f"{cycles} for {kind}" for kind, cycles in CYCLES.items())
     return (
         f"The deepest stack is {report['stack']} bytes. This is the sum of the frames along the longest chain of calls in the "
         "assembly, without those of the library functions that are needed. A running law takes these bytes of RAM:\n\n"
