@@ -192,8 +192,10 @@ learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	{ echo "# Tables of the residual"; echo; \
-	  for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done; } >docs/learned.md
+	$(call renew,learned,$(foreach name,$(SCENARIOS) $(ON_CIRCLE),printf "\n## $(name)\n\n"; cat $(OUT)/learned/$(name)/seeds.md; ) \
+	  printf "\n## Every metric\n\nEvery metric of law and residual: [learned.csv](data/learned.csv)\n")
+	{ echo policy,metric,unit,controller,value,q95,max; \
+	  $(foreach name,$(SCENARIOS) $(ON_CIRCLE),sed "1d; s/^/$(name),/" $(OUT)/learned/$(name)/evaluation.csv; ) } >docs/data/learned.csv
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 scores: $(READY)

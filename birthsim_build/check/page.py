@@ -67,7 +67,7 @@ def _firmware(report: Report) -> str:
         f"The deepest stack is {report['stack']} bytes. This is the sum of the frames along the longest chain of calls in the "
         "assembly, without those of the library functions that are needed. A running law takes these bytes of RAM:\n\n"
         f"{alone}\n\n"
-        "The cycles are an estimate. The operations that the optimised code executes were counted on this machine, and each "
+        "The cycles are an estimate. The operations that the optimised code executes were counted on this machine. Each "
         f"was multiplied with an assumed number of cycles: {cycles}. Microseconds are at {CLOCK / 1e6:.0f} MHz. The bits are "
         "those under qemu. No board has run it."
     )

@@ -81,8 +81,8 @@ def report(laps: Laps, setting: dict[str, Any]) -> str:
             f"{seconds / 3600:.1f} h on one thread ({steps / seconds:,.0f} steps/s, {platform.machine()}).",
             "",
             "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from "
-            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random actions "
-            "on some law, or a rival.",
+            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random "
+            "actions on some law, or a rival.",
             "",
             "Every step was checked. Observations are finite and inside their space, rewards are finite and from 0 to 1, and "
             "states and `info` are finite.",
