@@ -11,6 +11,7 @@
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
+# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -19,6 +20,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
+PROSE := $(OUT)/prose
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
@@ -38,7 +40,11 @@ SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 POLICIES := agents/policies
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+# A page of docs/ keeps what stands above its mark; the tables that commands wrote follow, and their figures go to docs/data.
+renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
+tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
+
+.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
 $(READY): pyproject.toml requirements/project.txt requirements/torch.txt
@@ -111,6 +117,16 @@ lint: $(READY)
 	$(BIN)/ruff check docs/conf.py docs/_generate
 	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
+# README.md is not read yet; CHANGELOG.md tells of the past.
+prose: $(PROSE)/.ready
+	$(PROSE)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js CONTRIBUTING.md SECURITY.md docs
+
+$(PROSE)/.ready: docs/_prose/package.json docs/_prose/package-lock.json
+	mkdir -p $(PROSE)
+	cp docs/_prose/package.json docs/_prose/package-lock.json $(PROSE)
+	npm ci --prefix $(PROSE) --ignore-scripts --no-audit --no-fund --silent
+	touch $@
+
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready
 	$(LOCK)/project.txt $(addprefix --extra ,$(EXTRAS)) $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
@@ -156,8 +172,10 @@ compare: $(READY)
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
 	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
-	{ echo "# Tables of the planner"; echo; sed 's/^#/##/' $(OUT)/bound/comparison.md $(OUT)/bound-probe/comparison.md; } >docs/bound.md
-	cp $(OUT)/comparison/comparison.md $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
+	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
+	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
+	  echo; echo "## Probe"; $(call tables,bound-probe/comparison,bound_probe))
+	cp $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
 
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
@@ -174,14 +192,16 @@ learned: $(READY)
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	{ echo "# Tables of the residual"; echo; \
-	  for name in $(SCENARIOS) $(ON_CIRCLE); do cat $(OUT)/learned/$$name/evaluation.md; echo; done; } >docs/learned.md
+	$(call renew,learned,$(foreach name,$(SCENARIOS) $(ON_CIRCLE),printf "\n## $(name)\n\n"; cat $(OUT)/learned/$(name)/seeds.md; ) \
+	  printf "\n## Every metric\n\nEvery metric of law and residual: [learned.csv](data/learned.csv)\n")
+	{ echo policy,metric,unit,controller,value,q95,max; \
+	  $(foreach name,$(SCENARIOS) $(ON_CIRCLE),sed "1d; s/^/$(name),/" $(OUT)/learned/$(name)/evaluation.csv; ) } >docs/data/learned.csv
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 scores: $(READY)
 	$(BIN)/birthsim-scores --out $(OUT)/scores
 	cp $(OUT)/scores/scores.json birthsim_env/
-	cp $(OUT)/scores/scores.md docs/
+	$(call renew,scores,$(call tables,scores/scores,scores))
 
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
@@ -189,7 +209,7 @@ scratch: $(READY)
 
 moving: $(READY)
 	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
-	cp $(OUT)/moving/comparison.md docs/moving.md
+	$(call renew,moving,$(call tables,moving/comparison,moving))
 
 haptics: $(READY)
 	$(BIN)/birthsim-haptics --out $(OUT)/haptics --page docs/haptics.md

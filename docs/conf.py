@@ -1,7 +1,10 @@
 """How Sphinx builds docs/ into a site (`make docs`): MyST Markdown, notebooks that run, reference pages from code."""
 
+import posixpath
 import sys
 from pathlib import Path
+
+from sphinx.addnodes import download_reference
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
@@ -39,7 +42,7 @@ html_theme = "furo"
 html_title = "BirthSIM"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_js_files = ["tables.js"]
+html_js_files = ["tables.js", "data.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
@@ -55,8 +58,17 @@ def seen_from_the_site(app, page, source):
     source[0] = source[0].replace(f"]({up}../README.md", f"]({up}project/readme.md")
 
 
+def with_data(app, page, template, context, doctree):
+    """Put each data file that a page links into the page, where data.js finds it: a page opened from a disk can fetch none."""
+    for link in doctree.findall(download_reference) if doctree else ():
+        file = HERE / posixpath.dirname(page) / link["reftarget"]
+        if file.suffix == ".csv":
+            app.add_js_file(None, body=file.read_text(encoding="utf-8"), type="text/csv", title=file.name)
+
+
 def setup(app):
     """Write the generated parts before any page is read."""
     app.connect("source-read", seen_from_the_site)
+    app.connect("html-page-context", with_data)
     app.connect("builder-inited", lambda _: _generate.write(HERE.parent / "out" / "docs-generated"))
     return {"parallel_read_safe": False}

@@ -10,6 +10,7 @@ import gymnasium
 
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
+from baselines.bench.evaluation_data import data
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
 from baselines.commands.evaluate_all import evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
@@ -82,7 +83,7 @@ def main() -> None:
         "--out",
         type=Path,
         required=True,
-        help="folder for evaluation.json, evaluation.md, with --all comparison.*, and figures",
+        help="folder for evaluation.json, .md and .csv, with --all comparison.*, and figures",
     )
     run(parser, _evaluate)
 
@@ -144,32 +145,36 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     from baselines.figures.runs import error_over_time
 
     caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
-    caption += f"randomised: {arguments.randomize}"
+    caption += f"--randomize {arguments.randomize}"
     caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in environment_parts(arguments).items())
     classical, learned = evaluations[:known], evaluations[known:]
-    text, pictures = table(evaluations), "error_over_time"
+    seeds, pictures = "", "error_over_time"
     if len(learned) > 1:
         from agents.policy.seeds import seed_table
         from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
         together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]
-        text = "\n\n".join([table(evaluations), *(seed_table(one, learned) for one in classical)])
+        seeds = "".join(f"\n{seed_table(one, learned)}\n" for one in classical)
         pictures += ", learning_curves"
     lines = [caption, "", overview(evaluations)]
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]
     with whole_results(folder) as place:
-        write_text(place / "evaluation.md", f"{caption}\n\n{drawn}\n\n{text}\n")
+        write_text(place / "evaluation.csv", data(evaluations))
+        write_text(place / "evaluation.md", f"{caption}\n\n{drawn}\n\n{table(evaluations)}\n{seeds}")
         write_json(
             place / "evaluation.json", {"arguments": shown_arguments(arguments), "rig": rig.to_dict(), "results": results}
         )
         # The only file that differs from run to run.
         write_json(place / "times.json", {"us_per_lane_and_call": {one.controller: one.cost for one in evaluations}})
         error_over_time(evaluations, caption, place)
-        if len(learned) > 1:
+        if seeds:
+            write_text(place / "seeds.md", f"{caption}\n{seeds}")
             draw_learning_curves(learning_curves(policies), place)
     print("\n".join(lines))
-    print(f"\nwritten to {folder}/: evaluation.md (every metric), evaluation.json, times.json, {pictures} (.png, .svg)")
+    print(
+        f"\nwritten to {folder}/: evaluation.md and .csv (every metric), evaluation.json, times.json, {pictures} (.png, .svg)"
+    )
 
 
 def evaluate_learned(**settings: Any) -> Result:

@@ -11,16 +11,17 @@ import numpy as np
 
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
+from agents.reports.score_tables import Scored, data, overview
 from baselines.bench.comparison import ENVIRONMENTS, default_controllers
-from baselines.bench.evaluation import DISCOUNTS, evaluate
+from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
-from baselines.bench.statistics import number, penalize_lost, summarize
+from baselines.bench.statistics import penalize_lost, summarize
 from baselines.commands.shared import EPISODES, JOBS, add_processes, policy_of, run, seed_number, whole_up_to
 from baselines.registry import UNCONTROLLED, make_controller
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, code_stamp, run_tasks
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.scores import BEST, RIGS, ROLES, SENSORS, SHUT
+from birthsim_env.scores import RIGS, ROLES, SENSORS
 
 Rows = dict[str, dict[str, Any]]
 """Controller -> its figures in one environment under one condition."""
@@ -39,7 +40,7 @@ def main() -> None:
     )
     parser.add_argument("--seed", type=seed_number, default=70000, help="seed of the first episode (default: %(default)s)")
     add_processes(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for scores.json and scores.md")
+    parser.add_argument("--out", type=Path, required=True, help="folder for scores.json, scores.csv and scores.md")
     run(parser, _scores)
 
 
@@ -57,26 +58,27 @@ def _scores(arguments: argparse.Namespace) -> None:
         name, problem = next(iter(failures.items()))
         raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first {name}: {problem}")
     scores: dict[str, Any] = {}
-    lines = [f"# Scores\n\n{_CAPTION.format(episodes=arguments.episodes, seed=arguments.seed)}"]
+    found = []
     for where in conditions:
         name, sensors, rig = where
         rows = {controller: done[task.name] for (place, controller), task in tasks.items() if place == where}
         short = name.removeprefix("BirthSIM/").rpartition("-v")[0]
         known = _roles(rows)
         scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
-        lines.append(f"## {short}, {sensors} sensors, {RIGS[rig]} rig\n\n{_table(rows, known)}")
+        found.append(Scored(short, sensors, RIGS[rig], rows, known))
+    text = f"{_CAPTION.format(episodes=arguments.episodes, seed=arguments.seed)}\n\n{overview(found)}"
     with whole_results(folder) as place:
         write_json(place / "scores.json", {"code": code_stamp("agents"), "seed": arguments.seed, "scores": scores})
-        write_text(place / "scores.md", "\n\n".join(lines) + "\n")
-    print("\n\n".join(lines))
+        write_text(place / "scores.csv", data(found))
+        write_text(place / "scores.md", f"# Scores\n\n{text}\n\nEvery controller, with its returns: [scores.csv](scores.csv)\n")
+    print(text)
 
 
 _CAPTION = (
-    "What an episode pays, by `birthsim-scores`. {episodes} episodes from seed {seed}; where the rig is drawn, so is the "
-    "scenario. Laws run at 1 kHz, random openings last 10 ms. Discounts are per 10 ms. The error is the settled one, median "
-    "over the episodes; a success is an episode with less than 1 mm. The score is 0 for shut valves and 100 for the best "
-    "law, which is chosen by one half of the episodes and measured by the other. docs/controllers.md says who uses the "
-    "force sensor, which is ideal in both sensor models."
+    "{episodes} episodes from seed {seed}. Where the rig is drawn, so is the scenario. Laws run at 1 kHz; random openings last "
+    "10 ms. Discounts are per 10 ms. The error is the settled error, median over the episodes. A success is an episode with "
+    "less than 1 mm. The score is 0 for shut valves and 100 for the best law. One half of the episodes chooses the best law "
+    "and the best policy, the other half measures them."
 )
 
 
@@ -139,20 +141,6 @@ def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
         }
         for role, name in zip(ROLES, chosen, strict=False)
     }  # fmt: skip
-
-
-def _table(rows: Rows, known: dict[str, dict[str, Any]]) -> str:
-    lines = [
-        "| controller | score | error, mm | success, % | lost, % | " + " | ".join(f"return at {d:g}" for d in DISCOUNTS) + " |",
-        "|" + "---|" * (5 + len(DISCOUNTS)),
-    ]
-    low, high = known[SHUT]["return"], known[BEST]["return"]
-    for name, row in sorted(rows.items(), key=lambda item: item[1]["returns"]["1.0"]):
-        score = round(100 * (row["returns"]["1.0"] - low) / (high - low))
-        error = "lost" if row["error"] is None else number(row["error"])
-        paid = " | ".join(f"{row['returns'][str(discount)]:.4g}" for discount in DISCOUNTS)
-        lines.append(f"| {name} | {score} | {error} | {100 * row['success']:.0f} | {100 * row['lost']:.0f} | {paid} |")
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -31,6 +31,9 @@ PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True, "dra
 """Plant -> the environments' argument ``randomize``. The law believes the rig as described: what is ``randomised`` differs from
 that in rig and sensors, ``drawn-sensors`` in the figures of its sensors alone, where the sensor model can draw them."""
 
+RIGS = {"nominal": "nominal rig", "randomised": "drawn rig", "drawn-sensors": "figures drawn, nominal rig"}
+"""Plant -> its words in tables and pictures."""
+
 MOVING = ("sine", "noise", "guided")
 """Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
 
@@ -61,10 +64,8 @@ class Conditions:
 
 
 def known(sensors: str, plant: str) -> str:
-    """Sensor model and plant in words: ``honest sensors, nominal plant``."""
-    return (
-        f"{sensors} sensors, figures drawn, nominal plant" if plant == "drawn-sensors" else f"{sensors} sensors, {plant} plant"
-    )
+    """Sensor model and plant in words: ``honest sensors, nominal rig``."""
+    return f"{sensors} sensors, {RIGS[plant]}"
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,33 @@
-"""The bench in Markdown: an overview, one row per controller, and the figures of every environment, sensor model and plant."""
+"""The bench as Markdown, an overview with one row per controller, and as CSV, with every figure."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.bench.comparison import METRICS, MOVING, REFERENCE, known
+from baselines.bench.comparison import METRICS, MOVING, REFERENCE, RIGS
 from baselines.bench.statistics import number
 
 Figures = Sequence[dict[str, Any]]
 """What ``baselines.bench.comparison.statistics`` returns."""
 
+DATA = (
+    *("environment", "sensors", "rig", "hand", "metric", "unit", "controller", "median", "low", "high", "q95", "worst"),
+    *("ratio", "ratio_low", "ratio_high", "lost", "episodes"),
+)
+"""Columns of the data file: the median over the episodes with its 95 % interval, the 95th percentile and the worst; the
+median of the ratios to ``REFERENCE`` in the same world, with its interval; how many of the episodes were lost."""
+
+OWN_HAND = "own"
+"""What the data file calls the environment's own hand, which is none of ``MOVING``."""
+
 IN_FULL = ("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "cross_motion", "hunting", "air", "saturation")
-"""Metrics of the full tables; the JSON file holds all."""
+"""Metrics of the data file; the JSON file holds all."""
+
+_INTERVAL = ("median", "low", "high")
 
 
 @dataclass(frozen=True)
@@ -99,23 +113,25 @@ def losses(figures: Figures) -> str:
     return markdown(rows)
 
 
-def full(figures: Figures) -> str:
-    """A section per environment, sensor model, plant and moving hand, with a row per metric and controller."""
-    sections = []
+def data(figures: Figures) -> str:
+    """Every figure as CSV with the columns ``DATA``: a row per environment, sensor model, rig, hand, metric and controller."""
+    rows: list[Sequence[str]] = [DATA]
     for where in dict.fromkeys(map(_place, figures)):
         here = [cell for cell in figures if _place(cell) == where]
-        rows = [["metric", "controller", "median [95 % interval]", "95 %", "worst", f"over {REFERENCE} [95 % interval]"]]
+        environment, sensors, plant, hand = where
+        place = [environment, sensors, RIGS[plant].removesuffix(" rig"), hand or OWN_HAND]
         for metric in IN_FULL:
             for cell in here:
-                mine, ratio = cell["metrics"].get(metric), cell["ratios"].get(metric)
-                if mine is not None:
-                    tail = [number(mine["q95"]), number(mine["worst"]), "" if ratio is None else interval(ratio)]
-                    rows.append([f"{metric}, {METRICS[metric]}", cell["controller"], interval(mine), *tail])
-        for cell in here:
-            rows.append(["lost episodes", cell["controller"], f"{cell['lost']} of {cell['episodes']}", "", "", ""])
-        hand = f", moving hand: {where[3]}" if where[3] else ""
-        sections.append(f"## {where[0]}, {known(*where[1:3])}{hand}\n\n{markdown(rows)}")
-    return "\n\n".join(sections)
+                if (mine := cell["metrics"].get(metric)) is None:
+                    continue
+                ratio = cell["ratios"].get(metric)
+                values = [mine[key] for key in (*_INTERVAL, "q95", "worst")]
+                others = ["", "", ""] if ratio is None else [number(ratio[key]) for key in _INTERVAL]
+                count = [str(cell["lost"]), str(cell["episodes"])]
+                rows.append([*place, metric, METRICS[metric], cell["controller"], *map(number, values), *others, *count])
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def _place(cell: dict[str, Any]) -> tuple[str, ...]:

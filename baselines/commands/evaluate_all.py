@@ -8,7 +8,7 @@ from typing import Any
 
 from baselines.bench import comparison
 from baselines.bench.comparison import Conditions, all_conditions, cell_task, default_controllers
-from baselines.bench.comparison_tables import full, losses, overview
+from baselines.bench.comparison_tables import data, losses, overview
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable
 from baselines.bench.studies import study_tasks
@@ -23,9 +23,13 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 NARROWED = {"scenario": "nominal", "all": "randomised", "sensors": "drawn-sensors"}
 """The option --randomize -> the one plant that is then compared."""
 
+_FIGURES = (
+    "Every figure, with its interval, its worst episode and its ratio to the paper's law: [comparison.csv](comparison.csv)"
+)
+
 
 def evaluate_all(arguments: argparse.Namespace) -> None:
-    """Run what ``--out`` does not hold yet, and write comparison.json, comparison.md and the figures."""
+    """Run what ``--out`` does not hold yet, and write comparison.json, .csv, .md and the figures."""
     rig = load_parameters(arguments.parameters)
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
     names = with_options(names, arguments.set)
@@ -42,7 +46,7 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
     }  # fmt: skip
     quick = [own for own in settings if bare_name(own["controller"]) not in SLOW]
     studies = {} if arguments.no_studies else study_tasks(quick, rig)
-    print(f"randomised plant: {described(rig, True)}")
+    print(described(rig, True))
     done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison", arguments.cluster)
     felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies", arguments.cluster)
     gathered = comparison.gather({key: done[task.name] for key, task in cells.items() if task.name in done})
@@ -96,13 +100,15 @@ def _write(
     write_json(folder / "times.json", {"us_per_lane_and_call": comparison.costs(cells)})
     files = ["comparison.json", "times.json"]
     if not arguments.studies_only:
-        text = f"{overview(figures)}\n\n{losses(figures)}"
+        several = len({cell["environment"] for cell in figures}) > 1
+        text = "\n\n".join([overview(figures), *([losses(figures)] if several else [])])
         caption = (
             f"{arguments.episodes} episodes per cell from seed {arguments.seed}, the same worlds for every controller. Medians "
             f"with 95 % bootstrap intervals; a lost episode counts as infinitely bad."
         )
-        write_text(folder / "comparison.md", f"# Comparison\n\n{caption}\n\n{text}\n\n{full(figures)}\n")
+        write_text(folder / "comparison.csv", data(figures))
+        write_text(folder / "comparison.md", f"# Comparison\n\n{caption}\n\n{text}\n\n{_FIGURES}\n")
         print(f"{caption}\n\n{text}\n")
-        files.append("comparison.md")
+        files += ["comparison.csv", "comparison.md"]
     drawn = [*draw_comparison(figures, folder), *draw_studies(by_study, folder)]
     return files + sorted({path.stem + ".png" for path in drawn})

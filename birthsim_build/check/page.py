@@ -37,10 +37,13 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
     equal = sum(line[1] == "equal" for line in wide)
     parts = [
         "# Sizes, speeds and bits of what is built",
-        "Written by `python -m birthsim_build.commands.targets --out out/targets --page docs/targets.md`, for the Circle, "
-        f"ideal and lab sensors, three laws. {periods} control periods (200 policy steps) are compared with Python, in all "
-        "bits of the plant's state, of what the sensors say, of what is asked for and of the openings. Speeds are control "
-        f"periods per second of CPU time (a policy step has 10) of one core ({platform.machine()}) that others used too.",
+        "[Without Python](build.md) says how to compile the closed loop for other machines. This page shows what comes out. "
+        "`python -m birthsim_build.commands.targets --out out/targets --page docs/targets.md` wrote it, for the Circle, "
+        "ideal and lab sensors and three laws.",
+        f"- **Bits.** {periods} control periods (200 policy steps) are compared with Python. They are equal if all bits are: "
+        "of the plant's state, of what the sensors say, of what is asked for and of the openings.\n"
+        "- **Speeds** are control periods per second of CPU time, of one core "
+        f"({platform.machine()}) that others used too. A policy step has 10 periods.",
         _table(("target", "code and data", "needs from elsewhere"), sizes),
         *(
             f"## {target}\n\n{_table(('what', 'bits', 'speed' if target != 'cortex-m7' else 'estimate per period'), lines)}"
@@ -50,21 +53,23 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
         BREAKS,
         "## All loops",
         "`birthsim-build wasm` with all scenarios, sensors and compiled controllers and one policy takes "
-        f"{sum(every['bytes'].values()) / 1e3:,.0f} kB. Of {len(wide)} loops in Node, every controller on the Circle and every "
-        f"scenario with every sensor model, {equal} have the bits of Python.",
+        f"{sum(every['bytes'].values()) / 1e3:,.0f} kB. {len(wide)} loops ran in Node: every controller on the Circle, and "
+        f"every scenario with every sensor model. {equal} of them have the bits of Python.",
         _table(("loop", "bits", "speed"), wide),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 def _firmware(report: Report) -> str:
-    alone = ", ".join(f"`{name}` {size:,}" for name, size in report["loops"].items())
-    cycles = ", ".join(f"{kind} {cycles}" for kind, cycles in CYCLES.items())
+    alone = "\n".join(f"- `{name}`: {size:,}" for name, size in report["loops"].items())
+    cycles = ", ".join(f"{cycles} for {kind}" for kind, cycles in CYCLES.items())
     return (
-        f"The deepest stack is {report['stack']} bytes: the frames in the assembly along the longest chain of calls, without "
-        f"those of the library functions that are needed. Bytes of RAM of a running law: {alone}. Cycles are an estimate: "
-        "operations that the optimised code executes, counted on this machine, times cycles that are assumed for each "
-        f"({cycles}). Microseconds are at {CLOCK / 1e6:.0f} MHz. The bits are those under qemu. No board has run it."
+        f"The deepest stack is {report['stack']} bytes. This is the sum of the frames along the longest chain of calls in the "
+        "assembly, without those of the library functions that are needed. A running law takes these bytes of RAM:\n\n"
+        f"{alone}\n\n"
+        "The cycles are an estimate. The operations that the optimised code executes were counted on this machine. Each "
+        f"was multiplied with an assumed number of cycles: {cycles}. Microseconds are at {CLOCK / 1e6:.0f} MHz. The bits are "
+        "those under qemu. No board has run it."
     )
 
 

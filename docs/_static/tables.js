@@ -46,6 +46,17 @@ function addFilter(table) {
   (table.closest(".table-wrapper") ?? table).before(field);
 }
 
+function addSorting(table) {
+  [...table.tHead.rows[0].cells].forEach((head, column) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "table-sort";
+    button.append(...head.childNodes);
+    button.addEventListener("click", () => sort(table, column, head));
+    head.append(button);
+  });
+}
+
 addEventListener("DOMContentLoaded", () => {
   for (const table of document.querySelectorAll("article table.docutils")) {
     const rows = table.tBodies[0]?.rows.length ?? 0;
@@ -53,13 +64,6 @@ addEventListener("DOMContentLoaded", () => {
     if (rows >= LONG) addFilter(table);
     // A table of words alone is in an order that its writer chose.
     if ([...table.tBodies[0].querySelectorAll("td")].every((cell) => Number.isNaN(worth(cell.textContent)))) continue;
-    [...table.tHead.rows[0].cells].forEach((head, column) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.className = "table-sort";
-      button.append(...head.childNodes);
-      button.addEventListener("click", () => sort(table, column, head));
-      head.append(button);
-    });
+    addSorting(table);
   }
 });

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 
 import gymnasium
@@ -25,7 +26,7 @@ from baselines.bench.comparison import (
     run_cell,
     statistics,
 )
-from baselines.bench.comparison_tables import full, losses, overview
+from baselines.bench.comparison_tables import OWN_HAND, data, losses, overview
 from baselines.bench.pieces import controller_settings, file_stem
 from baselines.figures import comparison as comparison_figures
 from birthsim_env import Parameters
@@ -97,7 +98,7 @@ def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
     class Stopped(evaluation.EpisodeMetrics):
         def add(self, *args):
             calls.append(1)
-            if len(calls) == 5200:
+            if len(calls) == 7200:
                 raise KeyboardInterrupt
             super().add(*args)
 
@@ -112,15 +113,15 @@ def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
     moving = [conditions for conditions in all_conditions() if conditions.hand]
     assert {(one.short, one.plant) for one in moving} == {("Circle", "randomised")}
     assert sorted({one.hand for one in moving}) == ["guided", "noise", "sine"]
-    assert str(moving[0]) == "Circle, ideal sensors, randomised plant, moving hand: sine"
+    assert str(moving[0]) == "Circle, ideal sensors, drawn rig, moving hand: sine"
     assert {conditions.environment for conditions in all_conditions()} == set(ENVIRONMENTS)
     assert [conditions.short for conditions in all_conditions(sensors=("lab",), plants=("nominal",))] == [
         *("Circle", "Probe", "Descent", "Forceps", "Dystocia", "Vacuum")
     ]
-    assert str(PROBE) == "Probe, ideal sensors, nominal plant"
+    assert str(PROBE) == "Probe, ideal sensors, nominal rig"
     drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
     assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
-    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal plant"
+    assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal rig"
 
 
 def test_slow_controllers_are_left_out_unless_named(monkeypatch):
@@ -267,18 +268,16 @@ def test_lost_episodes_are_counted_by_environment(figures):
     assert table[1:] == [[REFERENCE, "0 of 3", "0 of 3"], ["other", "1 of 3", "0 of 3"], ["worst", "3 of 3", "-"]]
 
 
-def test_the_full_tables_have_a_section_per_condition_and_a_row_per_metric_and_controller(figures):
-    text = full(figures)
-    circle, probe = text.split("## ")[1:]
-    assert circle.startswith("BirthSIM/Circle-v1, ideal sensors, randomised plant\n")
-    found = {(row[0], row[1]): row[2:] for row in rows(circle)}
-    assert found["settled_rms, mm", "other"][0].startswith("2 [")
-    assert found["settled_rms, mm", "other"][1:3] == ["lost", "lost"]
-    assert found["settled_rms, mm", REFERENCE][3] == ""
-    assert found["settled_rms, mm", "other"][3].startswith("0.5 [")
-    assert found["lost episodes", "worst"][0] == "3 of 3"
-    assert {row[1] for row in rows(probe)} == {"controller", REFERENCE, "other"}
-    assert len({line.count("|") for line in text.splitlines() if line.startswith("|")}) == 1
+def test_the_data_file_has_a_row_per_condition_metric_and_controller(figures):
+    table = list(csv.DictReader(data(figures).splitlines()))
+    assert {row["environment"] for row in table} == {CIRCLE.environment, PROBE.environment}
+    assert {(row["rig"], row["hand"]) for row in table if row["environment"] == CIRCLE.environment} == {("drawn", OWN_HAND)}
+    found = {(row["metric"], row["controller"]): row for row in table if row["environment"] == CIRCLE.environment}
+    other = found["settled_rms", "other"]
+    assert (other["unit"], other["median"], other["q95"], other["worst"]) == ("mm", "2", "lost", "lost")
+    assert (other["ratio"], other["lost"], other["episodes"]) == ("0.5", "1", "3")
+    assert found["settled_rms", REFERENCE]["ratio"] == ""
+    assert {row["controller"] for row in table if row["environment"] == PROBE.environment} == {REFERENCE, "other"}
 
 
 @pytest.fixture

@@ -31,13 +31,21 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", out)
     assert status == 0, complained
     assert sorted(path.name for path in out.iterdir()) == [
-        *("error_over_time.png", "error_over_time.svg", "evaluation.json", "evaluation.md", "pieces", "times.json")
+        *("error_over_time.png", "error_over_time.svg", "evaluation.csv", "evaluation.json", "evaluation.md", "pieces"),
+        "times.json",
     ]
     table = (out / "evaluation.md").read_text()
     assert table.splitlines()[0] in printed
-    assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, randomised: all")
+    assert table.startswith("BirthSIM/Probe-v2, 3 episodes from seed 7, ideal sensors, --randomize all")
     assert "| metric | unit | backstepping: median | 95 % | max | backstepping-weight: median | 95 % | max |" in table
     assert "| lost episodes |  | 0 of 3 |  |  | 0 of 3 |  |  |" in table
+    figures = (out / "evaluation.csv").read_text().splitlines()
+    assert figures[0] == "metric,unit,controller,value,q95,max"
+    assert "lost episodes,of 3,backstepping-weight,0,," in figures
+    row = next(line for line in table.splitlines() if line.startswith("| settled_rms |"))
+    both = [line.split(",", 3) for line in figures if line.startswith("settled_rms,")]
+    assert [one[2] for one in both] == ["backstepping", "backstepping-weight"]
+    assert row == "| settled_rms | mm | " + " | ".join(one[3].replace(",", " | ") for one in both) + " |"
     content = strict(out / "evaluation.json")
     law, weight = content["results"]
     assert (law["controller"], weight["controller"]) == ("backstepping", "backstepping-weight")
@@ -64,7 +72,7 @@ def test_evaluate_says_null_where_there_is_no_figure_to_give_and_takes_a_rig(tmp
     arguments = ("--episodes", 1, "--randomize", "none", "--sensors", "lab", "--parameters", tmp_path / "rig.toml")
     status, printed, _ = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path)
     assert status == 0
-    assert "BirthSIM/Circle-v1, 1 episodes from seed 0, lab sensors, randomised: none" in printed
+    assert "BirthSIM/Circle-v1, 1 episodes from seed 0, lab sensors, --randomize none" in printed
     content = strict(tmp_path / "evaluation.json")
     (result,) = content["results"]
     # On the circle the reference never rests.
@@ -135,7 +143,7 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     assert len(content["studies"]["polar"]["backstepping"]["stiffness"]) == 4
     assert content["arguments"]["controller"] == ["backstepping", slam]
     text = (tmp_path / "out" / "comparison.md").read_text()
-    table = text[text.index("| controller |") : text.index("## ")].strip()
+    table = text[text.index("| controller |") : text.index("Every figure")].strip()
     assert table in printed
     assert f"| {slam} | lost; lost |" in table
     for name in (
@@ -185,7 +193,7 @@ def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, ca
     line = (*NARROW, "--episodes", 1, "--jobs", 2, "--randomize", "all", "--no-studies", *names, "--out", out)
     status, printed = interrupted("evaluate", line, lambda: list(out.rglob("*.json")))
     assert status == 130
-    assert printed.startswith("randomised plant: rigs drawn: ")
+    assert printed.startswith("rigs drawn: ")
     assert len(list(out.rglob("*.json"))) == 1
     (tmp_path / "go").touch()
     status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
@@ -237,7 +245,7 @@ def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, cap
     own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
     status, _, complained = call("evaluate", monkeypatch, capsys, *case, *own)
     assert status == 0, complained
-    assert "## BirthSIM/Probe-v2, honest sensors, figures drawn, nominal plant" in (tmp_path / "out/comparison.md").read_text()
+    assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]
     assert (cell["sensors"], cell["plant"]) == ("honest", "drawn-sensors")
     status, _, complained = call("evaluate", monkeypatch, capsys, "--randomize", "sensors", "--out", tmp_path / "one")

@@ -97,6 +97,35 @@ def test_a_table_sorts_by_numbers_and_words(page_of):
     assert order() == "abcd"
 
 
+DATA = """<!doctype html><article><p>All: <a href="_downloads/1/figures.csv">figures.csv</a></p></article>
+<script type="text/csv" title="figures.csv">where,rig,law,unit,error
+circle,nominal,b,mm,12
+circle,nominal,a,mm,lost
+circle,"drawn, nominal",a,mm,3
+probe,nominal,a,mm,7
+</script><script>{}{}</script>"""
+
+
+@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
+def test_a_data_file_is_chosen_from_and_sorted(page_of):
+    page = page_of(DATA.format(*((DOCS / "_static" / name).read_text(encoding="utf-8") for name in ("tables.js", "data.js"))))
+
+    def seen():
+        return [row.locator("td:visible").all_text_contents() for row in page.locator("tbody tr:visible").all()]
+
+    assert seen() == [["b", "12"], ["a", "lost"]], "the first of each word, and every law; the unit is the same everywhere"
+    page.get_by_label("rig").select_option("drawn, nominal")
+    assert seen() == [["a", "3"]]
+    page.get_by_label("rig").select_option("all")
+    page.get_by_label("where").select_option("all")
+    page.get_by_role("button", name="error").click()
+    assert seen() == [
+        ["circle", "drawn, nominal", "a", "3"], ["probe", "nominal", "a", "7"], ["circle", "nominal", "b", "12"],
+        ["circle", "nominal", "a", "lost"],
+    ]  # fmt: skip
+    assert "4 of 4 rows" in page.locator("article").inner_text()
+
+
 @pytest.fixture
 def page_of():
     """A function that shows HTML in a browser."""

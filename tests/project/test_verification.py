@@ -86,7 +86,7 @@ def test_a_changed_source_is_stale_and_a_changed_comment_is_not(tmp_path, monkey
     file.write_text("def f(x):\n    return 3 * x\n")
     assert sources.changed(stored) == ["one.py"]
     measured = {"commit": "abc", "sources": stored}
-    assert "**Stale**: changed since are `one.py`." in report.basis(measured)
+    assert "**Stale**: 1 of 2 files have changed since." in report.basis(measured)
 
 
 def test_a_summary_counts_and_lists_what_survived():

@@ -77,18 +77,20 @@ def report(laps: Laps, setting: dict[str, Any]) -> str:
         [
             "# Soak",
             "",
-            f"`make soak`: {steps:,} policy steps in {len(laps)} laps of {LANES} lanes, {seconds / 3600:.1f} h on one thread "
-            f"({steps / seconds:,.0f} steps/s), {platform.machine()}. Each lap is a world of its own: a corner of the ranges "
-            "of domain randomisation or rigs drawn from them, one of three friction laws, either kind of sensors, one of the "
-            "hands; random openings or flows, residuals with random actions on every law, or a rival.",
+            f"`make soak` ran {steps:,} policy steps in {len(laps)} laps of {LANES} lanes (rigs side by side). It took "
+            f"{seconds / 3600:.1f} h on one thread ({steps / seconds:,.0f} steps/s, {platform.machine()}).",
             "",
-            "Checked at every step: observations finite and inside their space, rewards finite and from 0 to 1, states and "
-            "`info` finite.",
+            "Each lap has other conditions. The rigs are at a corner of the ranges of domain randomisation, or drawn from "
+            "them. Friction law, sensors and hand differ. The action is random openings or flows, a residual with random "
+            "actions on some law, or a rival.",
+            "",
+            "Every step was checked. Observations are finite and inside their space, rewards are finite and from 0 to 1, and "
+            "states and `info` are finite.",
             "",
             table(laps),
             "",
-            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Memory, median MB of each tenth: {tenths}; growth from the "
-            f"sixth tenth to the last {growth(laps):.1f} MB.",
+            f"Faults: {sum(len(lap['faults']) for lap in laps)}. Median memory in each tenth of the run, MB: {tenths}. It grew "
+            f"by {growth(laps):.1f} MB from the sixth tenth to the last.",
             "",
             f"Seed {setting['seed']}, BirthSIM {setting['code']['version']}, sources {setting['code']['sources'][:12]}.",
             "",

@@ -157,7 +157,8 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
     command.main()
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]
     assert "residual, 5 seeds " in capsys.readouterr().out
-    assert "; 5 training seeds" in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
+    for page in ("evaluation.md", "seeds.md"):
+        assert "; 5 training seeds" in (tmp_path / page).read_text(encoding="utf-8")
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert content["arguments"]["policy"] == "probe"
     assert [len(result["seeds"]) for result in content["results"]] == [4] * 7

@@ -14,10 +14,10 @@ HERE = Path(__file__).parent
 
 INTRODUCTION = """# Verification
 
-This page says how the physics and the laws were checked, and what the checks found. `make verify` measures accuracy and
-balances and writes the page anew; `make verify-slow` also measures mutation scores and coverage (the mutants and the
-coverage below took {minutes} minutes, and the choice of the tests comes on top). The page is generated: edit
-`tests/verification/`, not this file.
+This page says how the physics and the laws were checked, and what the checks found. The page is generated: edit
+`tests/verification/`, not this file. `make verify` measures accuracy and balances and writes the page anew.
+`make verify-slow` also measures mutation scores and coverage. The mutants and the coverage below took {minutes} minutes;
+the choice of the tests comes on top.
 """
 
 EQUATIONS = """## Equations
@@ -27,52 +27,58 @@ Numbers in brackets are the paper's. Each equation is computed in one place and 
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim-verify` measures its error against a second model of the
-rig: other coordinates, other states, and SciPy's DOP853 with a tolerance of 1e-11. The rigs are the nominal one, two extreme
-corners, random corners and random draws of the documented ranges of randomisation. Two motions of 0.5 s are measured: short
-puffs in which both pistons stick and slip, and strong swings with valves to 0.7 and jerks of 80 N. The error is the largest at
-any of the 50 marks.
+The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim-verify` compares it with a second model of the rig. That
+model has other coordinates and other states, and SciPy's DOP853 integrates it with a tolerance of 1e-11.
+
+- The rigs are the nominal one, two extreme corners of the ranges of randomisation, random corners, and random draws.
+- Two motions of 0.5 s are measured. In the first, short puffs of air make both pistons stick and slip. In the second, valves
+  open to 0.7 and the hand jerks with 80 N.
+- The error is the largest at any of the 50 marks.
 
 {worst}
 
 A tracker's noise is 100 um, so integration adds nothing that a sensor could see. On some drawn rigs steps of 0.5 ms are
-unstable or wrong by millimetres, so 0.25 ms is not wasteful. Where friction reverses or a valve shuts, the right-hand side has
-kinks: there no method keeps its order, and adaptive methods lose their advantage. {itself}
+unstable or wrong by millimetres, so 0.25 ms is not too small. Where friction reverses or a valve shuts, the equations have
+kinks. There no method keeps its order, and adaptive methods lose their advantage. {itself}
 
 ![Error against step and cost](accuracy.png)
 """
 
 BALANCES = """## Balances
 
-A bookkeeper adds up flows, work and heat of every chamber beside the plant, in the same Runge-Kutta stages, and compares the
-sums with what the chambers hold. The gap is the largest of any chamber, relative, at any mark of 20 ms.
+Mass and energy must balance. The test adds up flows, work and heat of every chamber in the same Runge-Kutta stages as the
+plant. Then it compares the sums with what the chambers hold. The gap is the largest relative difference of any chamber at
+any mark of 20 ms.
 """
 
 MUTATION = """## Mutation scores
 
 `python -m tests.mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
-until one fails. The score is the share of changes that some test notices. "One in 3": every third change was tried.
+until one fails. The score is the share of changes that some test notices. "One in 3" means that every third change was tried.
 Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of
 data and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.
 """
 
 SURVIVORS = """### Survivors
 
-Equivalent: no input tells the change from the original, or it only makes scratch space larger. Numerical: it changes results by
-less than any tolerance that means something. Out of reach: only inputs that callers exclude tell them apart. Missing test: a
-test would notice.
+A survivor is a change that no test noticed. Each has a verdict.
+
+- Equivalent: no input tells the change from the original, or it only makes scratch space larger.
+- Numerical: it changes results by less than any tolerance that means something.
+- Out of reach: only inputs that callers exclude tell the two apart.
+- Missing test: a test would notice.
 """
 
 COVERAGE = """## Coverage
 
-Machine code hides its lines, so the kernels run as plain Python here, under the {tests} tests that the mutation tester uses.
-Tests that are too slow uncompiled are left out; they run compiled in `make test`.
+The lines of compiled code cannot be counted. So the kernels run as plain Python here, under the {tests} tests that the
+mutation tester uses. Tests that are too slow uncompiled are left out; they run compiled in `make test`.
 """
 
 PROMISES = """## Promises
 
-What the documentation promises, and the tests that keep it. A bound is what those tests allow. A test checks that
-every test named here exists and that every bound stands in its file.
+The table lists what the documentation promises, and the tests that check it. A bound is what those tests allow. Another
+test checks that every test named here exists, and that every bound stands in its file.
 """
 
 
@@ -121,7 +127,7 @@ def equations() -> str:
 def basis(measured: dict[str, Any]) -> str:
     """The commit of a measurement, and a warning where its sources have changed since."""
     changed = sources.changed(measured["sources"])
-    stale = f" **Stale**: changed since are {', '.join(f'`{path}`' for path in changed)}." if changed else ""
+    stale = f" **Stale**: {len(changed)} of {len(measured['sources'])} files have changed since." if changed else ""
     return f"Measured at commit {measured['commit']}.{stale}\n"
 
 
