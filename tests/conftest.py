@@ -54,9 +54,9 @@ def trained(tmp_path_factory, small):
 
 @pytest.fixture
 def brief(monkeypatch):
-    """Evaluated episodes of 5 s, which have their first push."""
+    """Evaluated episodes of 7 s, which have their first push."""
     make_vec = gymnasium.make_vec
-    monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=5.0, **options))
+    monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=7.0, **options))
 
 
 def pytest_unconfigure(config):

@@ -97,7 +97,7 @@ def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
     class Stopped(evaluation.EpisodeMetrics):
         def add(self, *args):
             calls.append(1)
-            if len(calls) == 5200:
+            if len(calls) == 7200:
                 raise KeyboardInterrupt
             super().add(*args)
 
