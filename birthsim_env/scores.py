@@ -37,8 +37,10 @@ def _scores() -> dict[str, Any]:
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
-    """What is known of an environment: role (``ROLES``) -> its ``controller``, mean ``return`` of an episode, undiscounted,
-    ``error`` (mm, median over episodes of the settled error; None where most are lost), fractions ``lost`` and ``success``.
+    """What is known of an environment: role (``ROLES``) -> figures.
+
+    The figures are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
+    episodes of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
 
     An environment for which no policy comes with the package, ``Vacuum-v0``, has no "best learned policy".
     Of the id with its default arguments apart from ``sensors`` and ``randomize`` (rig and scenario together, or neither); an
