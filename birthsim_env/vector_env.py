@@ -152,10 +152,10 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     def get_state(self) -> State:
         """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
 
-        An environment that was made with the same arguments goes on from it, to the bit, once ``set_state`` has got it; in
-        this process or another one. Not in it is what a user's part keeps outside of its attributes. Raises ``RuntimeError``
-        before the first ``reset``, ``ValueError`` for a user's part with an attribute that is no number, text, array,
-        generator, or list, tuple, dict or object of these.
+        Another environment with the same arguments takes it with ``set_state`` and goes on with the same bits, in this process
+        or another one. It leaves out what a user's part keeps outside of its attributes. Raises ``RuntimeError`` before the
+        first ``reset``. Raises ``ValueError`` for a user's part with an attribute that is no number, text, array, generator, or
+        list, tuple, dict or object of these.
         """
         return self._episodes.get_state(self.np_random, self._ended)
 

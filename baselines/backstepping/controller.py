@@ -47,10 +47,11 @@ SIGN_WIDTH = 0.002
 class LawTerms:
     """What the law knows and wants at one instant in N lanes; the second-last axis counts cylinders 1 and 2. SI units.
 
-    ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated; ``wanted`` (8, N): yd1, yd2 and their three derivatives;
-    ``gains`` (3, 2, N): c1, c2, c3, and ``gain_rates`` their rates at constant setpoints, since they follow the pose;
-    ``wanted_force`` F* (2, N); the rates that the law asks for, ``force_rate`` dF/dt (2, N) and ``pneumatic_stiffness_rate``
-    dK/dt (2, N).
+    - ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated;
+    - ``wanted`` (8, N): yd1, yd2 and their three derivatives;
+    - ``gains`` (3, 2, N): c1, c2, c3; they follow the pose, and ``gain_rates`` are their rates at constant setpoints;
+    - ``wanted_force`` (2, N): F*;
+    - ``force_rate`` (2, N): the dF/dt that the law asks for; ``pneumatic_stiffness_rate`` (2, N): its dK/dt.
     """
 
     joints: Array
