@@ -21,7 +21,7 @@ _ONE = np.ones(1, dtype=np.bool_)
 
 
 class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
-    """The haptic part of BirthSIM: two pneumatic cylinders move the end effector, a model of the fetal head, in a plane.
+    """The haptic part of BirthSIM: two pneumatic cylinders move the end effector, the fetal head, in a vertical plane.
 
     ## Description
     The policy drives four servovalves. The end effector should follow a target, and give way like a spring to the hand that

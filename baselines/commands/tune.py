@@ -209,7 +209,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim-tune",
-        description="Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on.",
+        description="Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on.",
     )
     parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
     parser.add_argument(
