@@ -147,7 +147,8 @@ def page_of():
 
 
 def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands_write():
-    columns = {path.name: tuple(next(csv.reader(path.open(encoding="utf-8")))) for path in (DOCS / "data").iterdir()}
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").iterdir()}
+    columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
     linked = {Path(link).name for text in PAGES.values() for link in re.findall(r"\]\((data/[^)]+)\)", text)}
     assert set(columns) == linked
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "moving", "bound_circle", "bound_probe")}
