@@ -54,7 +54,7 @@ def trained(tmp_path_factory, small):
 
 @pytest.fixture
 def brief(monkeypatch):
-    """Evaluated episodes of 7 s, which have their first push, of the stiffness test too."""
+    """Evaluated episodes of 7 s, which have their first push."""
     make_vec = gymnasium.make_vec
     monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=7.0, **options))
 

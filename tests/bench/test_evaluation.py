@@ -108,7 +108,7 @@ def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors
 
 def test_two_controllers_meet_the_same_worlds(worlds):
     law, weight = Spy(), Spy(BacksteppingController(weight_compensation=True))
-    run(law, duration=1.4), run(weight, duration=1.4)
+    run(law, duration=3.4), run(weight, duration=3.4)
     np.testing.assert_array_equal(worlds[0], worlds[1])
     np.testing.assert_array_equal(law.references, weight.references)
     np.testing.assert_array_equal(law.forces, weight.forces)
@@ -151,7 +151,7 @@ def test_figures_are_those_of_the_environment_step_by_step():
 
 
 def test_the_stiffness_test_tells_a_stiffer_law_from_a_softer_one():
-    measured = run(BacksteppingController(), duration=5.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
+    measured = run(BacksteppingController(), duration=7.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
 
     class Stiff:
         law = BacksteppingController()
@@ -164,7 +164,7 @@ def test_the_stiffness_test_tells_a_stiffer_law_from_a_softer_one():
             rows[8:10] *= 1.5
             return self.law.command(measurement, type(reference)(rows))
 
-    stiff = run(Stiff(), duration=5.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
+    stiff = run(Stiff(), duration=7.0, randomize=False, episodes=1).summary()["stiffness_error"]["median"]
     assert math.isfinite(measured)
     # With LuGre friction it is not exactly 50 % above.
     assert 25 < 100 * ((100 + stiff) / (100 + measured) - 1) < 75
@@ -199,8 +199,8 @@ def test_a_lane_that_terminates_is_lost_and_stops_contributing(sensors):
 
 
 def test_a_lost_episode_counts_as_infinitely_bad_though_its_own_figures_end_with_it():
-    # Lost in the first half second, the lane runs 4.5 s of another episode, whose push must not be measured.
-    result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=5.0)
+    # Lost in the first half second, the lane runs 6.5 s of another episode, whose push must not be measured.
+    result = run(Slam(lanes=(0,), begins=0.0), episodes=2, duration=7.0)
     assert result.lost == [True, False]
     summary = result.summary()
     for name in ("stiffness_error", "cross_motion", "hunting_x", "settled_max_x"):
@@ -225,10 +225,10 @@ def test_nothing_runs_on_once_every_lane_is_lost():
             return super().command(measurement, reference)
 
     slam = Counting(lanes=(0, 1))
-    result = run(slam, episodes=2, duration=5.0)
+    result = run(slam, episodes=2, duration=7.0)
     assert result.lost == [True, True]
     assert 300 < slam.calls < 1000
-    assert result.traces[0].shape == (500, 2, 2)
+    assert result.traces[0].shape == (700, 2, 2)
 
 
 @pytest.mark.parametrize(("at", "complete"), [(375, 2), (200, 2), (599, 4)])

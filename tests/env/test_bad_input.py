@@ -133,6 +133,13 @@ def test_an_impossible_number_of_lanes_is_refused(lanes):
     names_all(refusal(lambda: BirthSIMVectorEnv("circle", num_envs=lanes)), (f"num_envs = {lanes!r}", ">= 1"))
 
 
+@pytest.mark.filterwarnings("ignore:.*is out of date:DeprecationWarning")
+@pytest.mark.parametrize("kind", ["", "Residual"])
+def test_an_older_id_names_the_one_of_now(kind):
+    message = refusal(lambda: gymnasium.make(f"BirthSIM/Probe{kind}-v1"), gymnasium.error.DeprecatedEnv)
+    assert f"BirthSIM/Probe{kind}-v2" in message
+
+
 def test_unknown_ids_and_arguments_name_themselves():
     message = refusal(lambda: gymnasium.make("BirthSIM/Square-v1"), gymnasium.error.NameNotFound)
     assert "Square" in message
