@@ -21,13 +21,13 @@ _ONE = np.ones(1, dtype=np.bool_)
 
 
 class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
-    """The haptic half of BirthSIM: two pneumatic cylinders carry the end effector, the fetal head, in a vertical plane.
+    """The haptic part of BirthSIM: two pneumatic cylinders move the end effector, the fetal head, in a vertical plane.
 
     ## Description
-    The policy drives four servovalves. The end effector should follow a target and give way to the hand that pushes it as a
-    spring of the stiffness asked for: to stay on the *compliant target* xk = xt + Fx/Kclx, yk = yt + Fy/Kcly (19). The plant
-    is that of Herzig et al. (IROS 2015) with temperature, dead volume, leakage, spool lag and LuGre friction; it is
-    integrated by Runge-Kutta steps of 0.25 ms.
+    The policy drives four servovalves. The end effector should follow a target, and give way like a spring to the hand that
+    pushes it. So it should stay on the *compliant target* xk = xt + Fx/Kclx, yk = yt + Fy/Kcly (19), where Kclx and Kcly are
+    the stiffness asked for. The plant is that of Herzig et al. (IROS 2015) with temperature, dead volume, leakage, spool lag
+    and LuGre friction. It is integrated by Runge-Kutta steps of 0.25 ms.
 
     | id | experiment | s |
     |---|---|---|
@@ -66,45 +66,50 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     | 20 ... | last action | 1 |
 
     ## Reward
-    Between 0 and 1 per 10 ms, so that ending early never pays, whatever the discount: the sum of five terms that are also in
-    `info`, `reward_survive` = 1 and four that cost a fraction of c = 8.75:
-    `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm)/c and `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s)/c, e and w
-    position and speed relative to the compliant target. After a jump of the force or of a stiffness setpoint this target moves
-    with a time constant of 60 ms. `reward_effort` = -0.04 mean(a^2)/c; `reward_action_change` =
-    -0.2 mean(|a - last a|)/c. An episode that terminates pays nothing more.
+    Between 0 and 1 per 10 ms, so that ending early never pays, whatever the discount. It is the sum of five terms, which are
+    also in `info`. `reward_survive` is 1. The other four cost a fraction of c = 8.75:
+
+    - `reward_tracking` = -ln(1 + (|ex| + |ey|) / 1 mm)/c
+    - `reward_hunting` = -0.2 ln(1 + (|wx| + |wy|) / 10 mm/s)/c
+    - `reward_effort` = -0.04 mean(a^2)/c
+    - `reward_action_change` = -0.2 mean(|a - last a|)/c
+
+    Here e and w are position and speed relative to the compliant target, and a is the action. After a jump of the force or of
+    a stiffness setpoint the compliant target moves with a time constant of 60 ms. An episode that terminates pays nothing more.
 
     ## Start and end of an episode
-    It starts on the target, moving with it, chambers in balance with weight and friction at the pneumatic stiffness asked
-    for. It terminates when the state leaves the physical range: a piston runs into an end stop faster than
+    The end effector starts on the target and moves with it. The chambers balance weight and friction at the pneumatic
+    stiffness asked for. `reset(options={"position": (x, y)})` starts the end effector there instead, at rest.
+    The episode terminates when the state leaves the physical range: a piston runs into an end stop faster than
     `parameters.mechanics.impact_speed` (0.1 m/s), or a chamber leaves 0.2 to 20 bar or 100 to 1000 K. It is truncated at the
-    scenario's end. `reset(options={"position": (x, y)})` starts the end effector there, at rest.
+    scenario's end.
 
     ## Info
-    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`; the reward terms, which are
-    zero after `reset`; and `is_success`: the settled error, root mean square distance from the compliant target from 0.5 s
-    after a jump on, has been below 1 mm so far, and the episode has not terminated.
+    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`. The reward terms, which are
+    zero after `reset`. `is_success`: whether the settled error has been below 1 mm so far and the episode has not terminated.
+    The settled error is the root mean square distance from the compliant target, from 0.5 s after a jump on.
 
     ## Arguments
     - `action_mode`, `valves`: see above.
     - `sensors`: `"ideal"`; `"lab"`: position at 240 Hz with 0.1 mm noise and 4 ms latency, no velocity, noisy pressures;
       `"honest"`: these with the errors of tracker, pressure cells, force sensor and control board
       (`birthsim_env.physics.electronics`).
-    - `force_sensor`: `False` for a rig without one: the measured force of the hand is zero, and every entry of the observation
-      is computed with that.
-    - `randomize`: `False`; `"plant"` draws the rig at every episode from ranges about the one described
-      (`birthsim_env.parts.drawn.randomization`), `"scenario"` varies the experiment, `True` does both; `"sensors"` varies the
-      experiment and draws the figures of `honest` sensors alone; a mapping such as `{"mechanics.mass": (2, 5)}` draws just
-      these parameters.
+    - `force_sensor`: `False` for a rig without one. The measured force of the hand is then zero, and every entry of the
+      observation is computed with that.
+    - `randomize`: what every episode draws anew. `False`: nothing. `"plant"`: the rig, from ranges about the one described
+      (`birthsim_env.parts.drawn.randomization`). `"scenario"`: the experiment. `True`: both. `"sensors"`: the experiment, and
+      the figures of `honest` sensors alone. A mapping such as `{"mechanics.mass": (2, 5)}` draws just these parameters.
     - `reference`: your own instead of the scenario's: a `Trajectory`, a function of time (s) that returns (x, y) in m, a
       CSV file of time, x, y, or `"file.py:Name"`.
-    - `user_force`: likewise: a `UserForce`, a function of time, or of time, position and velocity, that returns (Fx, Fy) in
-      N, a CSV file of time, Fx, Fy, or `"file.py:Name"`; or a hand that comes with the package: `"steps"`, and the moving
-      ones `"sine"`, `"noise"` and `"guided"`, which holds the end effector and has mass, damper and spring.
+    - `user_force`: the hand, instead of the scenario's. A `UserForce`; a function of time, or of time, position and velocity,
+      that returns (Fx, Fy) in N; a CSV file of time, Fx, Fy; or `"file.py:Name"`. Or the name of a hand of the package:
+      `"steps"`, or one that never stops moving: `"sine"`, `"noise"` and `"guided"`. The guided hand has mass, damper and
+      spring, and holds the end effector.
     - `stiffness`: a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which `reference` takes too.
     - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
     - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
-    - `num_threads`: that share the lanes of a vector environment, the same bits with any number; default: one in a single
-      environment, else all processors, at most `OMP_NUM_THREADS`.
+    - `num_threads`: how many threads share the lanes of a vector environment. The number changes no bit. Default: one in a
+      single environment, else all processors, at most `OMP_NUM_THREADS`.
     - `actuation`: an object of your own between action and valves (`birthsim_env.parts.actuation.Actuation`) instead of a mode.
     - `render_mode`: `None`, `"rgb_array"` or `"human"`, in real time; `picture_size`: (width, height) in px, (640, 480).
       `gymnasium.wrappers.RecordVideo` needs `pip install 'birthsim[video]'`; its videos play in real time too.

@@ -82,11 +82,12 @@ def _close(world: int, seen: int, memory: int, constants: int, tables: int, lane
 
 
 class Outcome:
-    """Of N lanes after a policy step, or where their episodes begin.
+    """What N lanes show after a policy step, or where their episodes begin.
 
-    ``terms`` (6, N): those of the reward, in the order of ``reward.REWARD_TERMS``, and the reward; ``ends`` (2, N): 1 in lanes
-    that have left the physical range, and in those whose episode is successful so far; ``rows`` (info.ROWS, N): the fields of
-    ``info``; ``seen`` (N, size): observations.
+    - ``terms`` (6, N): the terms of the reward, in the order of ``reward.REWARD_TERMS``, and the reward;
+    - ``ends`` (2, N): 1 in lanes that have left the physical range, and in lanes whose episode is successful so far;
+    - ``rows`` (info.ROWS, N): the fields of ``info``;
+    - ``seen`` (N, size): observations.
     """
 
     def __init__(

@@ -37,12 +37,15 @@ def _scores() -> dict[str, Any]:
 
 
 def reference_scores(environment: str, sensors: str = "ideal", randomize: bool = True) -> dict[str, dict[str, Any]]:
-    """What is known of an environment: role (``ROLES``) -> its ``controller``, mean ``return`` of an episode, undiscounted,
-    ``error`` (mm, median over episodes of the settled error; None where most are lost), fractions ``lost`` and ``success``.
+    """What is known of an environment: role (``ROLES``) -> figures.
 
-    An environment for which no policy comes with the package, ``Vacuum-v0``, has no "best learned policy".
-    Of the id with its default arguments apart from ``sensors`` and ``randomize`` (rig and scenario together, or neither); an
-    environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no scores.
+    The figures are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
+    episodes of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
+
+    ``Vacuum-v0``, for which no policy comes with the package, has no "best learned policy".
+    The figures are of the id with its default arguments, apart from ``sensors`` and ``randomize`` (rig and scenario together,
+    or neither). An environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no
+    scores.
     """
     names = {environment_id(scenario, kind): scenario for scenario in SCENARIOS for kind in ("", "Residual")}
     if not isinstance(environment, str) or environment not in names:

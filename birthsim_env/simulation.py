@@ -57,13 +57,19 @@ Part = Stage | Callable[[int], None]
 class Simulation:
     """``num_envs`` lanes under one actuation, ``periods`` control periods per policy step.
 
-    After ``begin`` and after every ``step`` the attributes describe the present instant: ``time`` (N,) s since each lane's
-    episode began; ``motion`` (4, N) true x, y, vx, vy of the end effector; ``force`` (2, N) the hand's, N; ``reference`` and
-    ``measurement``; ``since_jump`` (N,) s since force or stiffness setpoint jumped; ``openings`` (4, N) as last commanded;
-    ``impacts`` (2, N) m/s, the fastest collision of each piston with an end stop during the last step. ``period`` is that of
-    control, s, and ``periods`` how many of them make a policy step. ``beginning`` and ``closing`` stages run where episodes
-    begin, and at the end of a policy step. ``threads`` share the lanes. Without a
-    ``force_sensor`` the measured force of the hand is zero.
+    After ``begin`` and after every ``step`` the attributes describe the present instant:
+
+    - ``time`` (N,), s since each lane's episode began;
+    - ``motion`` (4, N), true x, y, vx, vy of the end effector, m and m/s;
+    - ``force`` (2, N), N, of the hand;
+    - ``reference`` and ``measurement``;
+    - ``since_jump`` (N,), s since the force or a stiffness setpoint jumped;
+    - ``openings`` (4, N) as last commanded;
+    - ``impacts`` (2, N), m/s, the fastest collision of each piston with an end stop during the last step.
+
+    ``period`` is the control period, s, and ``periods`` of them make a policy step. ``beginning`` stages run where episodes
+    begin, ``closing`` stages at the end of a policy step. ``threads`` share the lanes. Without a ``force_sensor`` the measured
+    force of the hand is zero.
     """
 
     def __init__(

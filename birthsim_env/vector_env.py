@@ -25,9 +25,9 @@ Observations = NDArray[np.float32]
 class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     """``num_envs`` lanes of a scenario, made by ``gymnasium.make_vec(id, num_envs=N)``.
 
-    Actions, observations, rewards, arguments and episode ends are those of ``BirthSIMEnv``, per lane; arrays carry the lane
-    first. ``reset(seed=s)`` seeds lane i with s + i (a list gives every lane its own seed); lane i seeded s runs bit for bit
-    as the single environment seeded s. ``max_episode_steps`` shortens episodes.
+    A lane is one rig. Actions, observations, rewards, arguments and episode ends are those of ``BirthSIMEnv``, per lane; arrays
+    carry the lane first. ``reset(seed=s)`` seeds lane i with s + i; a list gives every lane its own seed. A lane gives the same
+    numbers, to the last bit, as a single environment with its seed. ``max_episode_steps`` shortens episodes.
 
     ``autoreset_mode`` says what happens to a lane that ends, as in Gymnasium (``AutoresetMode`` or its value):
     - ``NEXT_STEP`` (default): the next step ignores its action and returns the first observation of its new episode, reward 0;
@@ -88,8 +88,8 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Start new episodes in all lanes. ``options["position"]`` (x, y), m, starts the end effector there, at rest.
 
-        Where ``options["staggered"]`` is true, lane i's first episode is truncated i/N of its steps early, and from then on the
-        lanes are spread over the episode: a learner that sees all of them at the same moment of it forgets the others.
+        Where ``options["staggered"]`` is true, lane i's first episode is truncated i/N of its steps early. From then on the
+        lanes are at different moments of their episodes. A learner that sees all lanes at the same moment forgets the others.
         """
         super().reset(seed=seed if isinstance(seed, int) else None)
         options = dict(options or {})
@@ -152,10 +152,10 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     def get_state(self) -> State:
         """All that the future of the lanes depends on, as arrays by name: ``np.savez(file, **env.get_state())`` keeps it.
 
-        An environment that was made with the same arguments goes on from it, to the bit, once ``set_state`` has got it; in
-        this process or another one. Not in it is what a user's part keeps outside of its attributes. Raises ``RuntimeError``
-        before the first ``reset``, ``ValueError`` for a user's part with an attribute that is no number, text, array,
-        generator, or list, tuple, dict or object of these.
+        Another environment with the same arguments takes it with ``set_state`` and goes on with the same bits, in this process
+        or another one. It leaves out what a user's part keeps outside of its attributes. Raises ``RuntimeError`` before the
+        first ``reset``. Raises ``ValueError`` for a user's part with an attribute that is no number, text, array, generator, or
+        list, tuple, dict or object of these.
         """
         return self._episodes.get_state(self.np_random, self._ended)
 

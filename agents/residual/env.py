@@ -44,32 +44,32 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     """A scenario of ``BirthSIMEnv`` with a control law running inside at 1 kHz, which a policy corrects.
 
     ## Action space
-    `Box(-1, 1, (n,), float32)`, held for one policy period and smoothed by a low-pass (`time_constant` = 28 ms). Zero is
-    exactly the law. n and the entries depend on `impedance`:
+    `Box(-1, 1, (n,), float32)`, held for one policy period and smoothed by a low-pass (`time_constant` = 28 ms). With zero
+    actions the environment behaves exactly as the law alone. n and the entries depend on `impedance`:
 
     | `impedance` | entries |
     |---|---|
     | `"fixed"` | a force along cylinders 1 and 2, in units of `authority` (100 N), that the law believes in |
-    | `"variable_kp"` | and powers of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
-    | `"variable"` | and a power of 2 for the damping; less than zero is zero |
+    | `"variable_kp"` | and an exponent of 4 for the stiffness Kclx, Kcly that the law works with; less than zero is zero |
+    | `"variable"` | and an exponent of 2 for the damping; less than zero is zero |
 
-    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. But for
-    `"fixed"` it also works less stiffly for a while where pistons swing beyond 0.25 m/s, whatever the action
+    However stiffly the law works, its target moves so that a hand at rest feels the stiffness that is asked for. Except with
+    `"fixed"`, the law works less stiffly for a while where pistons swing faster than 0.25 m/s, whatever the action
     (`agents.residual.authority`).
     With `law` = `"none"` there is no law: n = 4, the spool openings of chambers P1, N1, P2, N2, not smoothed.
 
     ## Observation space
-    That of `BirthSIMEnv`, and after the last action the smoothed action, the fractions of the authority left (they fall
-    where pistons oscillate), and the forces that an observer finds unexplained on pistons 1 and 2, in units of 100 N: now,
-    when they last moved out, and when they last moved in. `observation_names` lists all.
+    That of `BirthSIMEnv`. After the last action follow three more groups. First the smoothed action. Then the fractions of the
+    authority that are left; they fall where pistons oscillate. Last the forces on pistons 1 and 2 that the model does not
+    explain, in units of 100 N: now, when the piston last moved out, and when it last moved in. `observation_names` lists all.
 
     ## Reward, start, end and info
     Those of `BirthSIMEnv`.
 
     ## Arguments
     Those of `BirthSIMEnv` without `action_mode`, `valves` and `actuation`, and `law` (one of `agents.residual.settings.LAWS`),
-    `impedance`, `authority` (N) and `time_constant` (s). Without a `force_sensor` neither the law nor the policy is told the
-    hand's force, and the observer of the unexplained forces finds it among them.
+    `impedance`, `authority` (N) and `time_constant` (s). Without a `force_sensor` neither the law nor the policy gets the
+    hand's force. It is then a part of the unexplained forces.
 
     ## Version history
     - v1: as `BirthSIMEnv` v1.

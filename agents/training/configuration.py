@@ -35,10 +35,11 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """An experiment and its algorithm. ``rollout``, ``epochs`` and ``gae_lambda`` are PPO's; ``gradient_steps``, per step of
-    all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. The training ends early once its policy is
-    ``until`` percent below the paper's law in validation, pooled settled error; with 100 it never does. Raises ``ValueError``
-    naming what cannot be.
+    """An experiment and its algorithm.
+
+    PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes. The learning
+    rate falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
+    ``until`` percent below that of the paper's law; with 100 it never ends early. Raises ``ValueError`` naming what cannot be.
     """
 
     environment: str = "BirthSIM/CircleResidual-v1"

@@ -18,10 +18,10 @@ from birthsim_env.state import State
 class SB3VecEnv(VecEnv):
     """Makes ``gymnasium.make_vec(id, num_envs=N, autoreset_mode="SameStep")`` usable by Stable-Baselines3.
 
-    Episode return and length stand in ``infos[i]["episode"]`` of a lane that ends, its last observation in
-    ``infos[i]["terminal_observation"]``, as Stable-Baselines3's own wrappers do it. ``seconds`` is the time spent in
-    ``steps`` of the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset`` says: what an
-    on-policy algorithm with rollouts shorter than an episode needs.
+    When the episode of lane i ends, ``infos[i]["episode"]`` has its return and length, and
+    ``infos[i]["terminal_observation"]`` its last observation, as with Stable-Baselines3's own wrappers. ``seconds`` is the time
+    spent in ``steps`` of the environment. ``staggered`` spreads the lanes over the episode, as ``BirthSIMVectorEnv.reset``
+    says. An on-policy algorithm with rollouts shorter than an episode needs that.
     """
 
     def __init__(self, env: Any, staggered: bool = False) -> None:

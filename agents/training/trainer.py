@@ -34,11 +34,13 @@ def train(
 ) -> dict[str, Any]:
     """Train one residual policy and write it to ``folder``; returns what was reached.
 
-    The policy that is best on the validation worlds (pooled error and its 95 % tail together) is the one that is kept,
-    written whenever it improves; a checkpoint is written at every validation, ``settings.validations`` times. Where ``folder``
-    has one the training goes on from there, and ends with the same policy as one that was never killed. ``position`` is the row
-    of its progress bar. Raises ``ValueError`` for a checkpoint that is damaged or of other settings, for a folder with a policy
-    and without its checkpoint, and where no validation world is within the rig's strength.
+    The policy that is best on the validation worlds is kept (pooled error and its 95 % tail together). It is written whenever
+    it improves. A checkpoint is written at every validation, ``settings.validations`` times. Where ``folder`` has one the
+    training goes on from there, and ends with the same policy as one that was never killed. ``position`` is the row of its
+    progress bar.
+
+    Raises ``ValueError`` for a checkpoint that is damaged or of other settings, for a folder with a policy and without its
+    checkpoint, and where no validation world is within the rig's strength.
     """
     if not (folder / CHECKPOINT).exists():
         for name in (WEIGHTS, "training.json"):

@@ -31,9 +31,13 @@ Lanes = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Score:
-    """Per lane (N,): settled RMS of sqrt(ex^2 + ey^2), mm; error of the rendered stiffness, %: mean settled error along the
-    push over the displacement asked for; hunting, mm; time with a valve at its limit, %; and the fraction of the rig's strength
-    that the world asks for. NaN where an episode says nothing."""
+    """Figures per lane, (N,); NaN where an episode says nothing.
+
+    - ``error``: settled RMS of sqrt(ex^2 + ey^2), mm;
+    - ``stiffness``: error of the rendered stiffness, %, the mean settled error along the push over the displacement asked for;
+    - ``hunting``, mm; ``saturation``, time with a valve at its limit, %;
+    - ``required_strength_ratio``: the fraction of the rig's strength that the world asks for.
+    """
 
     error: Lanes
     stiffness: Lanes

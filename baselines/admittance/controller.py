@@ -35,18 +35,19 @@ LEAST_FRACTION = 0.35
 class AdmittanceBackstepping(StagedController):
     """Renders any stiffness matrix through friction, given a force sensor.
 
-    The stage turns the measured force into the motion that the hand should find, and observes what is not known of the rig,
-    friction above all; ``admittance_law`` follows that motion stiffly.
+    The stage turns the measured force into the motion that the hand should find. It estimates what is not known of the rig,
+    friction above all. ``admittance_law`` follows the motion with a stiff loop.
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
-        gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
-            gain, c in 1/s while the reference moves, and rest_gain once it rests; rest_push, how many times as much the
-            position error of a resting piston weighs; bandwidth, 1/s, of the observer of disturbances;
-            pressure_bandwidth, 1/s, of that of the pressures, where their cells are noisy (``lab`` sensors);
-            friction_fraction, how much of the believed friction is fed forward along the reference; dead_zone, m, of a resting
-            piston's error; lead_time, s, in which a spool follows; oscillation, m/s, of the speed error above which sustained
-            half waves each lower the gain to yielding times itself.
+        gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
+            gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests.
+            rest_push: by how much the position error of a resting piston is multiplied.
+            bandwidth: 1/s, of the observer of disturbances.
+            pressure_bandwidth: 1/s, of the observer of pressures, where their cells are noisy (``lab`` sensors).
+            friction_fraction: fraction of the believed friction that is fed forward along the reference.
+            dead_zone: m, of a resting piston's error. lead_time: s, in which a spool follows.
+            oscillation: m/s. Where the speed error swings beyond it, each sustained half wave multiplies the gain by yielding.
 
     ``gain_fraction`` (2, N) is the gain that is left across and along cylinder 2. Raises ``ValueError`` for unknown gains
     and values out of range.

@@ -47,10 +47,11 @@ SIGN_WIDTH = 0.002
 class LawTerms:
     """What the law knows and wants at one instant in N lanes; the second-last axis counts cylinders 1 and 2. SI units.
 
-    ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated; ``wanted`` (8, N): yd1, yd2 and their three derivatives;
-    ``gains`` (3, 2, N): c1, c2, c3, and ``gain_rates`` their rates at constant setpoints, since they follow the pose;
-    ``wanted_force`` F* (2, N); the rates that the law asks for, ``force_rate`` dF/dt (2, N) and ``pneumatic_stiffness_rate``
-    dK/dt (2, N).
+    - ``joints`` (4, N): y1, y2, v1, v2 as measured or estimated;
+    - ``wanted`` (8, N): yd1, yd2 and their three derivatives;
+    - ``gains`` (3, 2, N): c1, c2, c3; they follow the pose, and ``gain_rates`` are their rates at constant setpoints;
+    - ``wanted_force`` (2, N): F*;
+    - ``force_rate`` (2, N): the dF/dt that the law asks for; ``pneumatic_stiffness_rate`` (2, N): its dK/dt.
     """
 
     joints: Array
@@ -82,18 +83,18 @@ class BacksteppingController(StagedController):
         pneumatic_gain: c4, 1/s, of the pneumatic stiffness.
         sign_width: speed, m/s, over which the sign of (4) is smoothed.
         damping_ratio: zeta of the damping B = 2 zeta sqrt(K m_e) that slow pushes meet beside the stiffness K, whatever K is at
-            the time; m_e is the mass that moves, m at the end effector. None: equal gains, the least damped, with a zeta of
-            about 0.8. More takes a larger sum c1 + c2 + c3, and a slow valve bears no more than it must: the law takes
-            c1 = c3 > c2, which makes the sum as small as it can be (``gains.gains_for``). With valves of 4 ms up to 4000 N/m a
-            ratio of 2 is rendered, one of 3 no longer.
-        frozen_friction: leave the part of the Coulomb friction out of dF*/dt. At rest the model's acceleration, which does not
-            know the hand, is not zero and would make that part render a stiffness 25 to 90 % too high.
+            the time; m_e is the mass that moves, m at the end effector. None means equal gains, the least damped, with a zeta
+            of about 0.8. A larger zeta takes a larger sum c1 + c2 + c3, and slow valves allow only so much. So the law takes
+            c1 = c3 > c2, which makes the sum as small as it can be (``gains.gains_for``). With valves of 4 ms and up to
+            4000 N/m a ratio of 2 is rendered, one of 3 no longer.
+        frozen_friction: leave the Coulomb friction out of dF*/dt. The model does not know the hand, so its acceleration is not
+            zero at rest. With Coulomb friction the law would then render a stiffness 25 to 90 % too high.
         valves: ``two_valves`` per cylinder, or ``one_valve``, a 5/3 valve that gives chamber N minus the opening of chamber P
             and leaves the pneumatic stiffness to itself (section VI). An environment with one valve per cylinder takes rows
             0 and 2 of the openings as its action.
-        force_first: where a valve of two saturates, the pneumatic stiffness gives way to the force. In the paper's law both
-            fall short: a push that drives cylinder 2 fast into an emptying chamber makes it stiffer than wanted, both its
-            valves drain, no force is left to come back, and the episode is lost.
+        force_first: where a valve of two saturates, give up pneumatic stiffness to keep the force. The paper's law gives up
+            some of both. A push that drives cylinder 2 fast into an emptying chamber then makes it stiffer than wanted. Both
+            its valves drain, no force is left to come back, and the episode is lost.
 
     The gains follow the setpoints Kclx, Kcly at every call (18). From sampled positions an observer estimates the speeds. The
     damping factor is the damping relative to that of equal gains. Values up to 1.01 mean equal gains. It is ignored where

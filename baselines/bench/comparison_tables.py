@@ -18,8 +18,9 @@ DATA = (
     *("environment", "sensors", "rig", "hand", "metric", "unit", "controller", "median", "low", "high", "q95", "worst"),
     *("ratio", "ratio_low", "ratio_high", "lost", "episodes"),
 )
-"""Columns of the data file: the median over the episodes with its 95 % interval, the 95th percentile and the worst; the
-median of the ratios to ``REFERENCE`` in the same world, with its interval; how many of the episodes were lost."""
+"""Columns of the data file. The first seven say where, what and who. The next five are the median over the episodes with its
+95 % interval, the 95th percentile and the worst. Then come the median of the ratios to ``REFERENCE`` in the same world, with
+its interval, and how many of the episodes were lost."""
 
 OWN_HAND = "own"
 """What the data file calls the environment's own hand, which is none of ``MOVING``."""

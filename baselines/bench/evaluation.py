@@ -78,11 +78,11 @@ def evaluate(
     progress: bool = True,
     **arguments: Any,
 ) -> Evaluation:
-    """Run ``episodes`` episodes, seeded seed, seed + 1, ..., of a registered id under a controller at the control rate.
+    """Run ``episodes`` episodes of a registered id under a controller, which is asked at every control period.
 
-    ``arguments`` go to the environment. An episode that terminates is lost: ``metrics`` holds its figures up to that moment,
-    ``summary`` counts them as infinite.
-    After an interrupt (Ctrl-C) the episodes that are complete are returned.
+    The episodes have the seeds seed, seed + 1, and so on. ``arguments`` go to the environment. An episode that terminates is
+    lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
+    episodes that are complete are returned.
     """
     if episodes < 1:
         raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")

@@ -57,10 +57,14 @@ class StiffnessTest:
 
 @dataclass(frozen=True)
 class StiffnessResult:
-    """What the rigs did: the mean ``displacement`` (2, N), m, of the last second at full force from the last second at rest;
-    ``expected`` (2, N), m, what the stiffness asked for gives; ``hunting`` (2, N), m, largest peak to peak in these seconds;
-    ``lost`` (N,), the lanes that left the range of numbers or ran into an end stop; ``offset`` (2, N), m, the mean of the last
-    second at rest from the target."""
+    """What the rigs did in the last second at rest and in the last second at full force.
+
+    - ``displacement`` (2, N), m: mean of the latter less mean of the former;
+    - ``expected`` (2, N), m: the displacement that the stiffness asked for gives;
+    - ``hunting`` (2, N), m: largest peak to peak in these seconds;
+    - ``lost`` (N,): lanes that left the range of numbers or ran into an end stop;
+    - ``offset`` (2, N), m: distance of the mean at rest from the target.
+    """
 
     displacement: Array
     expected: Array

@@ -53,9 +53,9 @@ class Port(Protocol):
 class RigPort:
     """N rigs at rest on their targets, one control period at a time.
 
-    Arguments: ``rigs``, one per lane; ``reference``, a resting target in every lane; ``controller``; name and first seed of the
-    ``sensors``, lane i has seed + i; ``hand_mass`` (N,), kg; ``damping_factor`` (N,) for laws whose ``command`` takes one;
-    ``force_sensor`` False shows the law a force of zero. Raises ``ValueError`` for a target outside the workspace.
+    ``rigs`` has a rig per lane, ``reference`` a resting target in every lane. ``sensors`` is the name of a sensor model; lane i
+    seeds it with ``seed`` + i. ``hand_mass`` (N,) is in kg. ``damping_factor`` (N,) is for laws whose ``command`` takes one.
+    With ``force_sensor`` False the law sees a force of zero. Raises ``ValueError`` for a target outside the workspace.
 
     Besides what ``Port`` has: ``air`` (N,), kg from the supply; ``saturated`` (N,), periods with a valve at its limit;
     ``impacts`` (N,), m/s, the fastest collision with an end stop.

@@ -5,11 +5,11 @@ units; each is a keyword of its constructor. Where low is positive the gain is s
 linear one. That holds for names of the registry and for ``path/to/file.py:Class``.
 
 A trial runs the gains through worlds that no evaluation uses (seeds from 3,000,000 on), every lane with a rig of its own from
-the documented ranges: ``Circle-v1``, everything randomised, and the stiffness test of ``baselines.bench.probes``, with each
-sensor model. The loss of a lane is in mm: the settled RMS error on the circle; the error of the displacement at full force plus
-the hunting in the stiffness test; at most ``WORST``, which is what a lost lane costs. The cost is the sum over
-scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the gains of a file; the
-next are drawn at random, the rest are proposed by Optuna's TPE sampler.
+the documented ranges. The worlds are those of ``Circle-v1``, rig and scenario drawn, and of the stiffness test of
+``baselines.bench.probes``, with each sensor model. The loss of a lane is in mm: on the circle the settled error, in the
+stiffness test the error of the displacement at full force plus the hunting. A lost lane costs ``WORST``, and no lane more. The
+cost is the sum over scenarios and sensors of mean + 95 % quantile of the loss. Trial 0 has the middle of every range, or the
+gains of a file. The next trials are drawn at random; Optuna's TPE sampler proposes the rest.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def start_of(path: Path | None, bounds: Bounds) -> Gains:
 
 
 def probes(rig: Parameters, lanes: int) -> StiffnessTest:
-    """Stiffness tests on randomised rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
+    """Stiffness tests on drawn rigs: the poses in turn, 1000-4000 N/m, 5-40 N either way along x or y."""
     rigs = [draw_parameters(rig, documented_ranges(rig), stream(WORLDS + lane, 0, "parameters")) for lane in range(lanes)]
     rng, lane = np.random.default_rng(WORLDS), np.arange(lanes)
     force, stiffness = np.zeros((2, lanes)), np.zeros((3, lanes))
@@ -209,7 +209,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim-tune",
-        description="Tune a controller's gains on randomised rigs; interrupted (Ctrl-C), the same command carries on.",
+        description="Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on.",
     )
     parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
     parser.add_argument(

@@ -1,16 +1,19 @@
 """Piston speed from position samples that are rare, noisy and late.
 
-A Luenberger observer with a disturbance state runs at the control rate on the control model (pressures are measured at
-every period), and is corrected when a position sample arrives, against what it believed when that sample was taken:
-    y' = v,  v' = f(y, v) + g F + d,  d' = 0;  corrections 1 - e^3, 3/2 (1 - e)^2 (1 + e)/Ts, (1 - e)^3/Ts^2
-place a triple pole at e = exp(-w Ts), whatever the time Ts between samples, and are carried on over the sample's age.
-The disturbance d stands for what the observer is not told: Coulomb friction, the model's errors, and the user's force
-where it is not measured, as an acceleration.
+A Luenberger observer with a disturbance state runs at the control rate on the control model; pressures are measured at every
+period:
+    y' = v,  v' = f(y, v) + g F + d,  d' = 0
+The disturbance d is an acceleration. It stands for what the observer is not told: Coulomb friction, the model's errors, and
+the user's force where it is not measured.
 
-Friction holds a resting piston still, and an observer that knows it averages the noise away: while a piston rests,
+When a position sample arrives, the observer is corrected by the difference to what it believed when that sample was taken.
+The corrections of y, v and d are 1 - e^3, 3/2 (1 - e)^2 (1 + e)/Ts and (1 - e)^3/Ts^2 times this difference. They place a
+triple pole at e = exp(-w Ts), whatever the time Ts between samples. They are carried on over the sample's age.
+
+Friction holds a resting piston still. An observer that knows this averages the noise away. While a piston rests,
     v' = ... - 2 wr v,  d' = -wr^2 v    (the pseudo-measurement v = 0 with a double pole wr: d is what friction carries)
-and position samples move y alone, by 1 - exp(-ws Ts). It rests once it is slow, and no longer when the low-passed
-innovation leaves what noise explains, or when its user says that the reference moves: only then can it be allowed to rest.
+and position samples move y alone, by 1 - exp(-ws Ts). A piston counts as resting once it is slow. It no longer does when the
+low-passed innovation is larger than noise explains, or when the user of the observer says that the reference moves.
 """
 
 from __future__ import annotations

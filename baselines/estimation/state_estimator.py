@@ -1,7 +1,7 @@
 """What a controller with a force sensor knows at one instant: the motion that the hand should find, and the state of the rig.
 
-A Cartesian ``Admittance`` turns the measured force into the motion. What is not known of the rig, friction above all, is fed
-forward along it and observed for the rest: by ``DisturbanceObserver`` where speeds are measured, and by ``PistonObserver`` and
+A Cartesian ``Admittance`` turns the measured force into the motion. Friction is fed forward along this motion. Observers
+estimate the rest of what is not known of the rig: ``DisturbanceObserver`` where speeds are measured, and ``PistonObserver`` and
 ``ChamberObserver`` from sampled positions and noisy pressures.
 """
 
@@ -46,11 +46,18 @@ def disturbance_forces(joints: Array, believed: Array, disturbance: Array, p: Ar
 
 @dataclass(frozen=True)
 class Estimate:
-    """N lanes at one instant. ``motion`` (8, N): x and y that are wanted and three derivatives, SI; ``force`` (2, N), N, the
-    user's; ``joints`` (4, N): y1, y2, v1, v2; ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
-    ``believed`` (2, N), N, what acts along the pistons besides, ``disturbance`` (2, N), m/s2, what still accelerates them
-    unexplained, and ``disturbance_force`` (2, N), N, both together; ``moving`` (N,) 1 where the motion does, ``rest`` (2, N)
-    how far each piston is taken to rest, 0 to 1. The arrays are good until the next ``update``."""
+    """N lanes at one instant. The arrays are good until the next ``update``.
+
+    - ``motion`` (8, N): x and y that are wanted, and three derivatives, SI;
+    - ``force`` (2, N), N: the hand's;
+    - ``joints`` (4, N): y1, y2, v1, v2;
+    - ``pressures`` (4, N), Pa, and ``spools`` (4, N) of chambers P1, N1, P2, N2;
+    - ``believed`` (2, N), N: other forces that are believed to act along the pistons;
+    - ``disturbance`` (2, N), m/s2: accelerations of the pistons that are still unexplained;
+    - ``disturbance_force`` (2, N), N: the last two together;
+    - ``moving`` (N,): 1 where the motion moves;
+    - ``rest`` (2, N): how far each piston is taken to rest, 0 to 1.
+    """
 
     motion: Array
     force: Array
@@ -67,9 +74,9 @@ class Estimate:
 class StateEstimator:
     """The ``Estimate`` of N lanes, one control period at a time, for one kind of sensors.
 
-    Arguments: the rig as believed; ``sampled``, whether positions are samples; ``gains`` with bandwidth, 1/s, of the observer
-    of disturbances, pressure_bandwidth, 1/s, of that of pressures (for sampled sensors), and friction_fraction, how much of the
-    believed friction is fed forward along the motion.
+    Arguments: the rig as believed, and ``sampled``, whether positions are samples. ``gains`` has three entries: bandwidth, 1/s,
+    of the observer of disturbances; pressure_bandwidth, 1/s, of the observer of pressures (for sampled sensors);
+    friction_fraction, the fraction of the believed friction that is fed forward along the motion.
     """
 
     def __init__(self, parameters: Parameters, sampled: bool, gains: Mapping[str, float]) -> None:

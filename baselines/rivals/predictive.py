@@ -77,13 +77,14 @@ class Planner:
 
 
 class NonlinearMPC:
-    """The law of this module, about half a millisecond a lane and call: an upper bound, not a real-time controller.
+    """The law of this module. A call takes about half a millisecond per lane: it shows what computing can reach, not real time.
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
-        gains: those of ``TUNABLE``, SI units; what is not given is the value of ``TUNED`` for the sensors that it meets:
-            speed_tolerance, m/s, stiffness_tolerance, N/m, and flow_tolerance, kg/s, what counts as much as a position error
-            of ``POSITION_TOLERANCE``; bandwidth, pressure_bandwidth and friction_fraction of ``StateEstimator``.
+        gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
+            speed_tolerance (m/s), stiffness_tolerance (N/m) and flow_tolerance (kg/s) are errors that count as much as a
+            position error of ``POSITION_TOLERANCE``. The others are bandwidth, pressure_bandwidth and friction_fraction of
+            ``StateEstimator``.
 
     Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
     """

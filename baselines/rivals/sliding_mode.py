@@ -66,9 +66,11 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
 class SlidingMode(TrackingController):
     """Third-order sliding mode about the compliant motion (this module).
 
-    Arguments are those of ``TrackingController``, with the gains surface_rate: r, 1/s, at which errors decay on the surface;
-    reaching_rate: h, m/s3, at which the boundary layer is approached; layer_rate: b, 1/s, at which s decays inside, so that
-    the layer is h/b thick; friction_fraction; dead_zone.
+    Arguments are those of ``TrackingController``. The gains are friction_fraction, dead_zone and three more:
+
+    - surface_rate: r, 1/s, at which errors decay on the surface;
+    - reaching_rate: h, m/s3, at which the boundary layer is approached;
+    - layer_rate: b, 1/s, at which s decays inside the layer, which is h/b thick.
     """
 
     LAW = staticmethod(control)

@@ -28,14 +28,17 @@ VALVE_LAYOUTS = ("two_valves", "one_valve")
 class Actuation(Protocol):
     """What stands between a policy and the valves.
 
-    ``size`` is the length of an action and ``names`` describes its entries. ``begin(lanes)`` starts new episodes in the
-    lanes of a mask (N,); ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
-    ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on. ``memory()`` (M, N) is
-    what a policy should see of its state, in units that make it roughly [-1, 1], and ``memory_names`` describes its rows.
+    ``size`` is the length of an action and ``names`` describes its entries. Four methods make an actuation:
 
-    The loop stops for ``openings``, once a policy step or once a control period. An actuation that comes with the package has
-    ``stages(lanes, sampled)`` besides, which are compiled into the loop, and where these show a memory the rows ``shown``
-    (M, N), and ``explain(measurement, reference)``, which raises the error for what they could not serve.
+    - ``begin(lanes)`` starts new episodes in the lanes of a mask (N,);
+    - ``accept(actions)`` takes the actions (size, N), in [-1, 1], of a policy step;
+    - ``openings(plant, measurement, reference)`` returns the spool openings (4, N) from this instant on;
+    - ``memory()`` (M, N) returns what a policy should see of the actuation's state, roughly in [-1, 1]; ``memory_names``
+      describes its rows.
+
+    The loop stops for ``openings``, once a policy step or once a control period. An actuation of the package also has
+    ``stages(lanes, sampled)``, which are compiled into the loop. Where these show a memory it has the rows ``shown`` (M, N).
+    Its ``explain(measurement, reference)`` raises the error for what the stages could not serve.
     """
 
     size: int

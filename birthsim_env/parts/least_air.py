@@ -55,10 +55,10 @@ def least_air(
 ) -> StiffnessSchedule:
     """``stiffness`` with its pneumatic setpoints, N/m, replaced by those that take the least air along ``reference``.
 
-    ``duration`` (s) of the reference; ``pushes``: forces (Fx, Fy) of the hand, N, that the cylinders bear at every setpoint,
-    besides none; ``phase`` (s) between two changes of a setpoint; ``reserve`` (Pa) from the pressures' limits, so that flows
-    remain for control. Closed-loop setpoints stay. Raises ``ValueError`` for numbers that are drawn, a reference out of reach
-    and pushes that the cylinders cannot bear.
+    ``duration`` (s) is that of the reference. ``pushes`` are forces (Fx, Fy) of the hand, N; at every setpoint the cylinders
+    bear each of them, and no push. ``phase`` (s) is the time between two changes of a setpoint. The pressures stay ``reserve``
+    (Pa) away from their limits, so that flows remain for control. Closed-loop setpoints do not change. Raises ``ValueError``
+    for numbers that are drawn, a reference out of reach and pushes that the cylinders cannot bear.
     """
     for name, number, unit, least in (
         ("duration", duration, "s", GRID), ("phase", phase, "s", stiffness.transition), ("reserve", reserve, "Pa", 0.0),

@@ -33,9 +33,10 @@ LONGEST, SHORTEST = 1e6, 1e-3
 class Trajectory:
     """Where the end effector should be.
 
-    ``prepare(num_envs)`` is called once, ``begin(lane, rng)`` at the start of every episode of a lane with that lane's own
-    random stream; both may stay as they are. ``sample(time)`` gets the time of every lane since its episode began, s, (N,),
-    and returns (8, N): x, y (m), vx, vy, ax, ay and jerks jx, jy, consistent with each other.
+    A trajectory of your own overrides ``sample``, and the other two methods where it needs them. ``prepare(num_envs)`` is
+    called once. ``begin(lane, rng)`` is called at the start of every episode of a lane, with that lane's own random stream.
+    ``sample(time)`` gets the time of every lane since its episode began, s, (N,). It returns (8, N): x, y (m), vx, vy, ax, ay
+    and jerks jx, jy, consistent with each other.
     """
 
     def prepare(self, num_envs: int) -> None:

@@ -28,10 +28,14 @@ class StiffnessSchedule:
     ``sample(time)`` gets the time of every lane, s, (N,), and returns (7, N): Kclx, Kcly (N/m), the pneumatic stiffness
     setpoints of cylinders 1 and 2 (N/m), their rates (N/(m s)), and Kclxy (N/m), which couples x and y.
 
-    Arguments, one entry per phase, numbers or ranges (low, high): ``times`` (s) at which the phases start, the first 0;
-    ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given; ``closed_loop_xy`` (N/m), what
-    couples them, whose square must be below the product of the two; ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
-    ``transition`` (s) of the pneumatic stiffness.
+    The arguments have one entry per phase, a number or a range (low, high):
+
+    - ``times`` (s) at which the phases start, the first 0;
+    - ``closed_loop`` (N/m) for both axes, or for x alone where ``closed_loop_y`` is given;
+    - ``closed_loop_xy`` (N/m), which couples the axes; its square must be below the product of their stiffnesses;
+    - ``pneumatic1``, ``pneumatic2`` (N/m) for the cylinders.
+
+    ``transition`` (s) is how long a change of the pneumatic stiffness takes.
     """
 
     def __init__(

@@ -6,9 +6,9 @@ LuGre (Canudas de Wit et al., IEEE TAC 1995), design section 2:
 Elasto-plastic (Dupont, Hayward, Armstrong and Altpeter, "Single state elastoplastic friction models", IEEE TAC 2002):
     dz/dt = v (1 - alpha q),  q = s0 z sgn(v) / G(v) = sgn(v) z / z_ss(v),  Ff as LuGre
 Up to the break-away deflection, q <= z_ba / z_ss, and whenever z opposes v, alpha = 0: the bristle is a spring and nothing
-creeps. Beyond, alpha rises to 1 at q = 1, so that steady sliding is LuGre's; LuGre itself is alpha = 1 throughout, and drifts
-under any oscillating force. The paper's sine transition is replaced by the cubic 3 s^2 - 2 s^3, which has the same ends, middle
-and symmetry, is at most 0.010 away from it, and needs only products.
+creeps. Beyond, alpha rises to 1 at q = 1, so that steady sliding is LuGre's. LuGre itself is alpha = 1 throughout; it drifts
+under any oscillating force. The authors' sine transition is replaced by the cubic 3 s^2 - 2 s^3, which needs only products. It
+has the same ends, middle and symmetry, and is at most 0.010 away.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import subprocess
@@ -12,6 +13,8 @@ from pathlib import Path
 import gymnasium
 import pytest
 
+from agents.reports import score_tables
+from baselines.bench import comparison_tables, evaluation_data
 from baselines.bench.metrics import UNITS
 from birthsim_env import Parameters
 from tests.live import browser
@@ -141,6 +144,16 @@ def page_of():
 
         yield shown
         chromium.close()
+
+
+def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands_write():
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").iterdir()}
+    columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
+    linked = {Path(link).name for text in PAGES.values() for link in re.findall(r"\]\((data/[^)]+)\)", text)}
+    assert set(columns) == linked
+    compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "moving", "bound_circle", "bound_probe")}
+    others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation_data.DATA)}
+    assert columns == compared | others
 
 
 @pytest.mark.slow

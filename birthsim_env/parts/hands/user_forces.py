@@ -30,14 +30,18 @@ MOST = 100
 class UserForce:
     """The hand (or the uterus) that pushes the end effector.
 
-    ``prepare(num_envs)`` is called once, ``begin(lane, rng)`` at the start of every episode of a lane with that lane's own
-    random stream; both may stay as they are. ``force(time, position, velocity)`` gets K instants of every lane, s, (K, N),
-    and the end effector's position and velocity at the first of them, (2, N), m and m/s; it returns (K, 2, N), N. Each
-    sample is held for one control period. A force that depends on position or velocity sets ``closed_loop = True`` and
-    is then asked at every control period (K = 1), and again at the same instant where another lane starts anew; it may
-    return one force per lane, (2, N).
-    A component that changes faster than ``jump_rate``, N/s, jumps: no tracking can follow, and ``info["since_jump"]`` starts
-    anew.
+    Three methods make a hand; a class of your own overrides those that it needs.
+
+    ``prepare(num_envs)`` is called once. ``begin(lane, rng)`` is called at the start of every episode of a lane, with that
+    lane's own random stream. ``force(time, position, velocity)`` returns forces (K, 2, N), N, at K instants of N lanes. It gets
+    these instants, s, (K, N), and the end effector's position and velocity at the first of them, (2, N), m and m/s. Each
+    force is held for one control period.
+
+    A force that depends on position or velocity sets ``closed_loop = True``. It is then asked at every control period (K = 1),
+    and again at the same instant where another lane starts anew. It may return one force per lane, (2, N).
+
+    A component that changes faster than ``jump_rate``, N/s, counts as a jump: no controller can follow it, and
+    ``info["since_jump"]`` starts anew.
     """
 
     closed_loop = False

@@ -1,8 +1,10 @@
-"""Sensor models: ``ideal`` sees everything at every control period, ``lab`` is a magnetic tracker and pressure cells with
-noise and latency, ``honest`` has the errors of a force sensor, a tracker, pressure cells and a control board besides.
+"""The three sensor models.
 
-A sensor model's ``measure`` is called at every control instant at which somebody looks: at each one where ``sampled`` is
-True, at policy instants otherwise.
+``ideal`` sees everything at every control period. ``lab`` is a magnetic tracker and pressure cells with noise and latency.
+``honest`` also has the errors that data sheets state: of a force sensor, a tracker, pressure cells and a control board.
+
+A sensor model's ``measure`` is called whenever somebody looks: at every control period where ``sampled`` is True, else at
+every policy period.
 """
 
 from __future__ import annotations

@@ -98,8 +98,8 @@ class Parameters:
     def replace(self, changes: dict[str, Any]) -> Parameters:
         """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
 
-        What hangs on bores and strokes follows where ``changes`` do not name it: the dead volume grows with the largest
-        piston, the linkage with a stroke of cylinder 1 that it has no room for, k2 with a longer cylinder 2.
+        Three figures depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with the
+        largest piston, the linkage with a stroke of cylinder 1 that it has no room for, and k2 with a longer cylinder 2.
         """
         grouped: dict[str, dict[str, Any]] = {}
         for dotted, value in changes.items():
