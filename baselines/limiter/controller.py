@@ -27,6 +27,7 @@ import numpy as np
 
 from baselines.controller import Controller, checked_command, lanes_of
 from baselines.impedance import Impedance, declared_by
+from baselines.limiter.air_spring import AirSpring
 from baselines.limiter.port_energy import PortEnergy
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
@@ -82,6 +83,7 @@ class PortLimiter:
             self.authority = np.ones(0)
         elif self.authority.size:
             self._energy.reset(lanes)
+            self._air.reset(lanes)
             self.authority[lanes], self._ceiling[lanes], self._level[lanes] = 1.0, 1.0, self._capacity
 
     def command(self, measurement: Measurement, reference: Reference, **options: Any) -> Array:
@@ -93,11 +95,13 @@ class PortLimiter:
             return self.command(*one_lane(measurement, reference), **options)[:, 0]
         lanes = lanes_of(measurement, reference)
         if self.authority.size != lanes:
-            self._energy = PortEnergy(self._period, lanes)
+            self._energy, self._air = PortEnergy(self._period, lanes), AirSpring(self.parameters, lanes)
             self.authority, self._level, self._ceiling = np.ones(lanes), np.full(lanes, self._capacity), np.ones(lanes)
             self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
-        return self._slowed(self._bounded(measurement, reference) * openings, measurement, reference)
+        authority = self._bounded(measurement, reference)
+        passive = self._air.openings(measurement, reference, authority)
+        return self._slowed(authority * openings + (1.0 - authority) * passive, measurement, reference)
 
     def _bounded(self, measurement: Measurement, reference: Reference) -> Array:
         if math.isinf(self._capacity):
