@@ -36,6 +36,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 
 MARGIN = 1.5
+PATH = 1
 """A law that renders half as much again as was asked for is not to be taken for one that makes energy."""
 
 ALLOWANCE = 0.1
@@ -100,15 +101,15 @@ class PortLimiter:
             self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
         authority = self._bounded(measurement, reference)
-        passive = self._air.openings(measurement, reference, authority)
+        passive = self._air.openings(measurement, reference)
         return self._slowed(authority * openings + (1.0 - authority) * passive, measurement, reference)
 
     def _bounded(self, measurement: Measurement, reference: Reference) -> Array:
         if math.isinf(self._capacity):
             return self.authority
-        work, asked, offset = self._energy.update(measurement, reference)
+        work, asked0, offset, asked = self._energy.update(measurement, reference)
         # About the moving target; and a rig that only stays behind it gives nothing.
-        work = np.maximum(work - asked, np.minimum(work, 0.0)) + ALLOWANCE * np.abs(asked)
+        work = np.maximum(work - asked0, np.minimum(work, 0.0)) + ALLOWANCE * (asked if PATH else np.abs(asked0))
         stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         stored = _spring_energy(stiffness, offset)
         # Whoever asks for a stiffer spring while it is stretched pays for it.

@@ -44,10 +44,11 @@ class PortEnergy:
         mean = 0.5 * (force + self._force) * (new & ~starts)
         work = (mean * (measurement.position - self._place)).sum(axis=0)
         asked = (mean * (target - self._target)).sum(axis=0)
+        path = np.sqrt((mean**2).sum(axis=0) * ((target - self._target)**2).sum(axis=0))
         self._stamp = np.where(new, measurement.position_time, self._stamp)
         self._force = np.where(new, force, self._force)
         self._place, self._target = np.where(new, measurement.position, self._place), np.where(new, target, self._target)
-        return work, asked, self._place - self._target
+        return work, asked, self._place - self._target, path
 
     def _force_before(self, late: Array) -> Array:
         """The force ``late`` (N,) s ago, (2, N), N."""
