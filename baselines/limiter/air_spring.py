@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from baselines.valve_inverse import openings_for_flows
+from baselines.limiter.past import Past
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
@@ -17,6 +18,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 RETURN = 0.02
 MEMORY = 0.5
 HAND = 1.0
+OLDER = 0.0
 
 SIGNS = np.array([[1.0], [-1.0], [1.0], [-1.0]])
 
@@ -28,9 +30,11 @@ class AirSpring:
         self._period = parameters.electronics.control_period
         self._areas = p[[at.AREA_P1, at.AREA_N1, at.AREA_P2, at.AREA_N2], None]
         self._middle = np.repeat(p[[at.HALF_L1, at.HALF_L2], None], 2, axis=0) + p[at.DEAD_VOLUME] / self._areas
+        self._past = Past(self._period, 6, lanes)
         self._forces = np.full((4, lanes), np.nan)
 
     def reset(self, lanes: Mask) -> None:
+        self._past.reset(lanes)
         self._forces[:, lanes] = np.nan
 
     def pistons(self, position: Array) -> Array:
@@ -39,11 +43,14 @@ class AirSpring:
         return joints[:2]
 
     def openings(self, measurement: Measurement, reference: Reference) -> Array:
+        late = measurement.time - measurement.position_time + OLDER
+        past = self._past.at(late, np.concatenate([measurement.pressures, measurement.user_force]))
+        pressures, force = past[:4], past[4:]
         pistons = self.pistons(measurement.position)
         here = self._middle + SIGNS * np.repeat(pistons, 2, axis=0)
         there = self._middle + SIGNS * np.repeat(self.pistons(reference.position), 2, axis=0)
-        present = measurement.pressures * self._areas
-        hand = HAND * np.repeat(joint_force(measurement.user_force, pistons, self._parameters), 2, axis=0)
+        present = pressures * self._areas
+        hand = HAND * np.repeat(joint_force(force, pistons, self._parameters), 2, axis=0)
         balanced = present + SIGNS * hand * here / (2.0 * self._middle)
         self._forces = np.where(np.isnan(self._forces), balanced, self._forces)
         self._forces += -math.expm1(-self._period / MEMORY) * (balanced - self._forces)

@@ -29,6 +29,7 @@ from baselines.controller import Controller, checked_command, lanes_of
 from baselines.impedance import Impedance, declared_by
 from baselines.limiter.air_spring import AirSpring
 from baselines.limiter.port_energy import PortEnergy
+from baselines.limiter.past import Past
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
@@ -83,6 +84,7 @@ class PortLimiter:
         if lanes is None:
             self.authority = np.ones(0)
         elif self.authority.size:
+            self._past.reset(lanes)
             self._energy.reset(lanes)
             self._air.reset(lanes)
             self.authority[lanes], self._ceiling[lanes], self._level[lanes] = 1.0, 1.0, self._capacity
@@ -96,7 +98,7 @@ class PortLimiter:
             return self.command(*one_lane(measurement, reference), **options)[:, 0]
         lanes = lanes_of(measurement, reference)
         if self.authority.size != lanes:
-            self._energy, self._air = PortEnergy(self._period, lanes), AirSpring(self.parameters, lanes)
+            self._past, self._energy, self._air = Past(self._period, 2, lanes), PortEnergy(self._period, lanes), AirSpring(self.parameters, lanes)
             self.authority, self._level, self._ceiling = np.ones(lanes), np.full(lanes, self._capacity), np.ones(lanes)
             self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
@@ -107,7 +109,7 @@ class PortLimiter:
     def _bounded(self, measurement: Measurement, reference: Reference) -> Array:
         if math.isinf(self._capacity):
             return self.authority
-        work, asked0, offset, asked = self._energy.update(measurement, reference)
+        work, asked0, offset, asked = self._energy.update(measurement, reference, self._past.at(measurement.time - measurement.position_time, measurement.user_force))
         # About the moving target; and a rig that only stays behind it gives nothing.
         work = np.maximum(work - asked0, np.minimum(work, 0.0)) + ALLOWANCE * (asked if PATH else np.abs(asked0))
         stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])

@@ -17,12 +17,13 @@ LONGEST_DELAY = 0.06
 """s: the oldest position whose force is still known; the longest latency that ``Electronics`` allows is 0.05 s."""
 
 
+LAG = 0.005
+
+
 class PortEnergy:
     """N lanes; ``update`` is called once per control period of ``period`` s."""
 
     def __init__(self, period: float, lanes: int) -> None:
-        self._period = period
-        self._forces: Array = np.zeros((math.ceil(LONGEST_DELAY / period) + 2, 2, lanes))
         self._stamp = np.full(lanes, -np.inf)
         self._force, self._place, self._target = (np.zeros((2, lanes)) for _ in range(3))
 
@@ -30,30 +31,20 @@ class PortEnergy:
         """Forget the past of the lanes of a mask (N,)."""
         self._stamp[lanes] = -np.inf
 
-    def update(self, measurement: Measurement, reference: Reference) -> tuple[Array, Array, Array]:
+    def update(self, measurement: Measurement, reference: Reference, force: Array) -> tuple[Array, Array, Array]:
         """Work, J, (N,), that the hand has done since the last call, that which it would have done had it moved as the target,
         and x - xt, m, (2, N), at the newest position."""
         starts = np.isneginf(self._stamp)
-        self._forces = np.roll(self._forces, 1, axis=0)
-        self._forces[0] = measurement.user_force
-        self._forces[:, :, starts] = measurement.user_force[:, starts]
         late = measurement.time - measurement.position_time
-        force = self._force_before(late)
         target = reference.position - late * reference.velocity
         new = measurement.position_time > self._stamp
         mean = 0.5 * (force + self._force) * (new & ~starts)
-        work = (mean * (measurement.position - self._place)).sum(axis=0)
+        gain = -np.expm1(-(measurement.position_time - self._stamp) / LAG) if LAG > 0 else np.ones_like(late)
+        place = np.where(starts, measurement.position, self._place + gain * (measurement.position - self._place))
+        work = (mean * (place - self._place)).sum(axis=0)
         asked = (mean * (target - self._target)).sum(axis=0)
         path = np.sqrt((mean**2).sum(axis=0) * ((target - self._target)**2).sum(axis=0))
         self._stamp = np.where(new, measurement.position_time, self._stamp)
         self._force = np.where(new, force, self._force)
-        self._place, self._target = np.where(new, measurement.position, self._place), np.where(new, target, self._target)
+        self._place, self._target = np.where(new, place, self._place), np.where(new, target, self._target)
         return work, asked, self._place - self._target, path
-
-    def _force_before(self, late: Array) -> Array:
-        """The force ``late`` (N,) s ago, (2, N), N."""
-        place = np.clip(late / self._period, 0.0, len(self._forces) - 1.001)
-        whole = place.astype(np.intp)
-        part, lane = place - whole, np.arange(len(late))
-        newer, older = self._forces[whole, :, lane].T, self._forces[whole + 1, :, lane].T
-        return np.asarray(newer + part * (older - newer))
