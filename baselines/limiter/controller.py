@@ -37,7 +37,6 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 
 MARGIN = 1.5
-PATH = 1
 """A law that renders half as much again as was asked for is not to be taken for one that makes energy."""
 
 ALLOWANCE = 0.1
@@ -87,7 +86,7 @@ class PortLimiter:
             self._past.reset(lanes)
             self._energy.reset(lanes)
             self._air.reset(lanes)
-            self.authority[lanes], self._ceiling[lanes], self._level[lanes] = 1.0, 1.0, self._capacity
+            self.authority[lanes], self._ceiling[lanes], self._level[:, lanes] = 1.0, 1.0, self._capacity
 
     def command(self, measurement: Measurement, reference: Reference, **options: Any) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
@@ -99,7 +98,7 @@ class PortLimiter:
         lanes = lanes_of(measurement, reference)
         if self.authority.size != lanes:
             self._past, self._energy, self._air = Past(self._period, 2, lanes), PortEnergy(self._period, lanes), AirSpring(self.parameters, lanes)
-            self.authority, self._level, self._ceiling = np.ones(lanes), np.full(lanes, self._capacity), np.ones(lanes)
+            self.authority, self._level, self._ceiling = np.ones(lanes), np.full((2, lanes), self._capacity), np.ones(lanes)
             self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
         authority = self._bounded(measurement, reference)
@@ -109,16 +108,17 @@ class PortLimiter:
     def _bounded(self, measurement: Measurement, reference: Reference) -> Array:
         if math.isinf(self._capacity):
             return self.authority
-        work, asked0, offset, asked = self._energy.update(measurement, reference, self._past.at(measurement.time - measurement.position_time, measurement.user_force))
-        # About the moving target; and a rig that only stays behind it gives nothing.
-        work = np.maximum(work - asked0, np.minimum(work, 0.0)) + ALLOWANCE * (asked if PATH else np.abs(asked0))
+        late = measurement.time - measurement.position_time
+        work, asked, path, offset = self._energy.update(measurement, reference, self._past.at(late, measurement.user_force))
+        # A rig that only stays behind its target gives nothing.
+        work = np.maximum(work, np.minimum(work + asked, 0.0)) + ALLOWANCE * path
         stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
         stored = _spring_energy(stiffness, offset)
         # Whoever asks for a stiffer spring while it is stretched pays for it.
         credit = np.maximum(stored - _spring_energy(self._stiffness, offset), 0.0)
         self._stiffness = stiffness
         self._level = np.minimum(self._level + work + credit, MARGIN * stored + self._capacity)
-        least = np.clip(self._level / self._capacity, 0.0, 1.0)
+        least = np.clip(self._level.min(axis=0) / self._capacity, 0.0, 1.0)
         lasting, returning, back = self._rates
         self._ceiling += lasting * (self.authority - self._ceiling) + returning * (1.0 - self._ceiling)
         self.authority = np.minimum(least, self.authority + back * np.maximum(self._ceiling - self.authority, 0.0))
