@@ -1,9 +1,9 @@
 """The rig as an air spring about its target: what the valves are led to where a law may not act.
 
 Valves that shut lock in the pressures of that moment. These balance neither weight nor hand, and the rig moves to where they
-do, which gives a hand 0.1 J and more. So the valves give each chamber the air with which the rig alone would rest at its target.
-A chamber's air is judged by pressure times length, at the time at which the position was taken. The product does not depend on
-how the rig moves, so the valves do not excite what they hold. A rig of constant air is a spring that friction damps.
+do, which gives a hand 0.1 J and more. So the valves give each chamber the air with which the rig alone would rest at its
+target. A chamber's air is judged by pressure times length, at the time at which the position was taken. The product does not
+depend on how the rig moves, so the valves do not excite what they hold. A rig of constant air is a spring that friction damps.
 
 The forces of the chambers that balance the weight are those of now and the hand's share, averaged over ``MEMORY``: over an
 oscillation the acceleration averages to nothing.
