@@ -74,7 +74,9 @@ def test_a_stiffer_spring_that_is_asked_for_is_paid_by_who_asks():
         for k in range(4000):
             place = 0.02 * (min(k, 1000) / 1000 if k < 3000 else (4000 - k) / 1000)
             stiffness = KX if k < 2000 else KX * soften
-            limiter.command(seen(k * T, np.array([place]), 0.0, stiffness * place), resting([(0.5, 0.0)], [stiffness]))
+            speed = 20.0 * T * (float(k < 1000) - float(k >= 3000))
+            force = stiffness * place + 60.0 * speed
+            limiter.command(seen(k * T, np.array([place]), speed, force), resting([(0.5, 0.0)], [stiffness]))
         ends.append(limiter.authority[0])
     assert ends == pytest.approx([1.0, 1.0])
 
