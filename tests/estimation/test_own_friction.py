@@ -41,14 +41,12 @@ def test_friction_turns_with_the_piston_as_lugre_says(level):
     times = PERIOD * np.arange(1000)
     truth = -s0 * solve_ivp(rate, (0.0, 1.0), [0.0], t_eval=times, rtol=1e-9, atol=1e-12, max_step=1e-3).y[0]
     found = []
-    for t in times:
+    for t in times[1:]:
         pistons[ESTIMATE + 3] = speed(t - 0.5 * PERIOD)
         own_friction.rub(memory, pistons, levels, P, PERIOD, fresh, friction, before)
         found.append(friction[1, 0])
-    # A step is exact for the speed in its middle; speeds change by 0.5 mm/s in it.
-    print(np.abs(np.array(found) - truth).max() / static, np.abs(np.array(found) - truth).mean() / static)
-    assert np.abs(np.array(found) - truth).max() < 0.15 * 2 * static
-    assert np.abs(np.array(found) - truth).mean() < 0.02 * static
+    # A step is exact for the speed in its middle; in it the speed changes by up to 0.5 mm/s, and the bristle by 25 mN of that.
+    assert np.abs(np.array(found) - truth[1:]).max() < 0.025
 
 
 def test_what_holds_a_resting_piston_is_friction_up_to_its_static_level():
