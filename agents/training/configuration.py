@@ -37,7 +37,8 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 class TrainingSettings:
     """An experiment and its algorithm. ``rollout``, ``epochs`` and ``gae_lambda`` are PPO's; ``gradient_steps``, per step of
     all lanes, are SAC's and TQC's. The learning rate falls linearly to a hundredth. The training ends early once its policy is
-    ``until`` percent below the paper's law in validation, pooled settled error; with 100 it never does. Raises ``ValueError``
+    ``until`` percent below the paper's law in validation, pooled settled error; with 100 it never does. A ``privileged`` policy
+    is told the true figures of the rig (``agents.residual.privileged``), and runs in no controller. Raises ``ValueError``
     naming what cannot be.
     """
 
@@ -60,10 +61,12 @@ class TrainingSettings:
     validation_lanes: int = 64
     validations: int = 6
     until: float = 100.0
+    privileged: bool = False
 
     def __post_init__(self) -> None:
         for name, allowed in (
             ("algorithm", ALGORITHMS), ("sensors", tuple(SENSORS)), ("randomize", RANDOMIZE),
+            ("privileged", (True, False)),
         ):  # fmt: skip
             one_of(name, getattr(self, name), allowed)
         if not isinstance(self.environment, str):
