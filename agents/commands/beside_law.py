@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy
 from agents.policy.seeds import policy_folders
-from agents.residual.privileged import acting
+from agents.residual.privileged import PolicyFunction, acting
 from agents.residual.settings import LAWS, ResidualSettings
+from agents.training.student_file import NAME as STUDENT
+from agents.training.student_file import Taught, load_student
 from agents.training.validation import Score, validate
 from baselines.bench.haptics.rendering import rendering
 from baselines.bench.haptics.worlds import Condition
@@ -57,7 +59,9 @@ SETPOINT, PUSH = 2000.0, 10.0
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="agents.commands.beside_law", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--policy", required=True, metavar="NAME", help="folder that birthsim-train wrote, or a shipped policy")
+    parser.add_argument(
+        "--policy", required=True, metavar="NAME", help="a folder of birthsim-train or distill, or a shipped policy"
+    )
     parser.add_argument(
         "--beside", nargs="+", default=[], metavar="NAME", help=f"what else runs: one or more of {', '.join(LAWS)}, or policies"
     )
@@ -90,12 +94,14 @@ def _compare(arguments: argparse.Namespace) -> None:
             print(_row(label, score, within))
         mean = np.mean([score.error for score in others.values()], axis=0)
         print(_less(f"all seeds, less than {name}", (mean - errors)[:, within]))
-    if not _privileged(policies[0]):
+    if not isinstance(policies[0], Taught) and not _privileged(policies[0]):
         _feel(folders, settings, arguments)
 
 
-def _seeds_of(name: str) -> tuple[list[Path], list[Policy]]:
-    """Folders and policies of the seeds of one training."""
+def _seeds_of(name: str) -> tuple[list[Path], Sequence[Policy | Taught]]:
+    """Folders and policies of the seeds of one training; or of one student."""
+    if (Path(name) / STUDENT).is_file():
+        return [Path(name)], [load_student(Path(name))]
     folders = policy_folders(name)
     policies = [load_policy(folder) for folder in folders]
     if len({(policy.environment, policy.settings) for policy in policies}) > 1:
@@ -111,12 +117,18 @@ def _law(settings: ResidualSettings, environment: str, arguments: argparse.Names
     return score
 
 
-def _scores(policies: Sequence[Policy], arguments: argparse.Namespace) -> list[Score]:
+def _scores(policies: Sequence[Policy | Taught], arguments: argparse.Namespace) -> list[Score]:
     """Those of policies of the same settings."""
     env = _worlds(policies[0].environment, policies[0].settings, arguments)
-    scores = [validate(env, acting(one.network.actions, env, _privileged(one)), arguments.seed) for one in policies]
+    scores = [validate(env, _acting(one, env), arguments.seed) for one in policies]
     env.close()
     return scores
+
+
+def _acting(policy: Policy | Taught, env: Any) -> PolicyFunction:
+    if isinstance(policy, Taught):
+        return policy.student.acting()
+    return acting(policy.network.actions, env, _privileged(policy))
 
 
 def _privileged(policy: Policy) -> bool:
