@@ -37,7 +37,8 @@ CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nv
   nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx
 
 SCENARIOS := circle probe descent forceps dystocia
-ON_CIRCLE := circle_lab circle_pure
+ON_CIRCLE := circle_lab circle_pure circle_honest_blind
+HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
 # A page of docs/ keeps what stands above its mark; the tables that commands wrote follow, and their figures go to docs/data.
@@ -179,7 +180,8 @@ compare: $(READY)
 
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
-	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; \
+	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 $$([ $$name = circle_honest_blind ] && echo $(HONEST_RIG)) \
+	    --out $(OUT)/training/$$name || exit 1; \
 	  for seed in 0 1 2 3 4; do mkdir -p $(POLICIES)/$$name/seed_$$seed && \
 	    cp $(OUT)/training/$$name/seed_$$seed/policy.safetensors $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
 
@@ -190,6 +192,8 @@ learned: $(READY)
 	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
 	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
 	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
+	$(BIN)/birthsim-evaluate --controller admittance-sensorless backstepping-force-first residual --policy circle_honest_blind --sensors honest $(HONEST_RIG) \
+	  --episodes 128 --seed 150000 --out $(OUT)/learned/circle_honest_blind
 	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	$(call renew,learned,$(foreach name,$(SCENARIOS) $(ON_CIRCLE),printf "\n## $(name)\n\n"; cat $(OUT)/learned/$(name)/seeds.md; ) \

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.policy.controller import ResidualController
-from agents.residual.settings import ResidualSettings
+from agents.policy.files import Policy, load_policy
+from agents.policy.seeds import policy_folders
+from agents.residual.privileged import PolicyFunction, acting
+from agents.residual.settings import LAWS, ResidualSettings
+from agents.training.student_file import NAME as STUDENT
+from agents.training.student_file import Taught, load_student
 from agents.training.validation import Score, validate
 from baselines.bench.haptics.rendering import rendering
 from baselines.bench.haptics.worlds import Condition
@@ -27,6 +32,16 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
+HEAD = (
+    "settled error, mm: median",
+    "95 %",
+    "less than the law: median of the pairs, mm",
+    "mean, mm",
+    "stiffness error, %: median",
+    "lost",
+)
+"""Columns of the table of errors."""
+
 FELT = (
     "bandwidth, Hz: mean",
     "JND at 1 Hz: median",
@@ -35,23 +50,21 @@ FELT = (
     "less own error than the law: mean, mm",
     "lost",
 )
+"""Columns of the table of what a hand feels."""
+
 SETPOINT, PUSH = 2000.0, 10.0
 """N/m and N, of the multisine hand."""
-
-HEAD = (
-    "settled error, mm: median",
-    "95 %",
-    "less than the law: median of the pairs, mm",
-    "mean, mm",
-    "stiffness, %",
-    "lost",
-)
 
 
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="agents.commands.beside_law", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--policy", required=True, metavar="DIR", help="folder that birthsim-train wrote")
+    parser.add_argument(
+        "--policy", required=True, metavar="NAME", help="a folder of birthsim-train or distill, or a shipped policy"
+    )
+    parser.add_argument(
+        "--beside", nargs="+", default=[], metavar="NAME", help=f"what else runs: one or more of {', '.join(LAWS)}, or policies"
+    )
     parser.add_argument("--sensors", choices=tuple(SENSORS), default="honest", help="default: %(default)s")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=128, help="default: %(default)s")
@@ -61,31 +74,72 @@ def main() -> None:
 
 
 def _compare(arguments: argparse.Namespace) -> None:
-    try:
-        from agents.policy.files import load_policy
-        from agents.policy.seeds import policy_folders
-    except ImportError as error:
-        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-    folders = policy_folders(arguments.policy)
-    policies = [load_policy(folder) for folder in folders]
-    if len({(policy.environment, policy.settings) for policy in policies}) > 1:
-        raise ValueError(f"--policy {arguments.policy!r} holds policies of several settings; allowed: seeds of one training")
+    folders, policies = _seeds_of(arguments.policy)
     settings = policies[0].settings
-    env = gymnasium.make_vec(
-        policies[0].environment, num_envs=arguments.episodes, sensors=arguments.sensors, parameters=arguments.parameters,
-        randomize=True, **settings.to_dict(),
-    )  # fmt: skip
-    law = validate(env, lambda seen: np.zeros((len(seen), settings.size), np.float32), arguments.seed)
-    scores = [validate(env, policy.network.actions, arguments.seed) for policy in policies]
-    env.close()
-    within = law.feasible
+    law, scores = _law(settings, policies[0].environment, arguments), _scores(policies, arguments)
+    within, errors = law.feasible, np.stack([score.error for score in scores])
     print(f"{int(within.sum())} of {arguments.episodes} episodes are within the rig's strength; 95 % intervals of pairs.\n")
     print(f"| | {' | '.join(HEAD)} |\n|{'---|' * (1 + len(HEAD))}")
     print(_row(settings.law, law, within))
     for folder, score in zip(folders, scores, strict=True):
         print(_row(folder.name, score, within, (law.error - score.error)[None, within]))
-    print(_less("all seeds", np.stack([law.error - score.error for score in scores])[:, within]))
-    _feel(folders, settings, arguments)
+    print(_less("all seeds", (law.error - errors)[:, within]))
+    for name in arguments.beside:
+        if name in LAWS:
+            others = {name: _law(replace(settings, law=name), policies[0].environment, arguments)}
+        else:
+            places, its = _seeds_of(name)
+            others = {f"{name} {place.name}": score for place, score in zip(places, _scores(its, arguments), strict=True)}
+        for label, score in others.items():
+            print(_row(label, score, within))
+        mean = np.mean([score.error for score in others.values()], axis=0)
+        print(_less(f"all seeds, less than {name}", (mean - errors)[:, within]))
+    if not isinstance(policies[0], Taught) and not _privileged(policies[0]):
+        _feel(folders, settings, arguments)
+
+
+def _seeds_of(name: str) -> tuple[list[Path], Sequence[Policy | Taught]]:
+    """Folders and policies of the seeds of one training; or of one student."""
+    if (Path(name) / STUDENT).is_file():
+        return [Path(name)], [load_student(Path(name))]
+    folders = policy_folders(name)
+    policies = [load_policy(folder) for folder in folders]
+    if len({(policy.environment, policy.settings) for policy in policies}) > 1:
+        raise ValueError(f"policy = {name!r} holds policies of several settings; allowed: seeds of one training")
+    return folders, policies
+
+
+def _law(settings: ResidualSettings, environment: str, arguments: argparse.Namespace) -> Score:
+    """The law of ``settings`` alone."""
+    env = _worlds(environment, settings, arguments)
+    score = validate(env, lambda seen: np.zeros((len(seen), settings.size), np.float32), arguments.seed)
+    env.close()
+    return score
+
+
+def _scores(policies: Sequence[Policy | Taught], arguments: argparse.Namespace) -> list[Score]:
+    """Those of policies of the same settings."""
+    env = _worlds(policies[0].environment, policies[0].settings, arguments)
+    scores = [validate(env, _acting(one, env), arguments.seed) for one in policies]
+    env.close()
+    return scores
+
+
+def _acting(policy: Policy | Taught, env: Any) -> PolicyFunction:
+    if isinstance(policy, Taught):
+        return policy.student.acting()
+    return acting(policy.network.actions, env, _privileged(policy))
+
+
+def _privileged(policy: Policy) -> bool:
+    return bool(policy.training.get("privileged", False))
+
+
+def _worlds(environment: str, settings: ResidualSettings, arguments: argparse.Namespace) -> Any:
+    return gymnasium.make_vec(
+        environment, num_envs=arguments.episodes, sensors=arguments.sensors, parameters=arguments.parameters, randomize=True,
+        **settings.to_dict(),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
         arguments.policy = policy_of(arguments.env)
-    policies, laws = _policies(arguments.policy)
+    policies, laws, learned_with = _policies(arguments.policy)
     if policies:
         names = ["backstepping", *laws] if names == ["residual"] else names
         names = list(dict.fromkeys([*names, "residual"]))
@@ -133,6 +133,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         pieces[name] = evaluation_tasks(name, own, arguments.env, world, *span, work=evaluate_learned)
     folder, drawn = make_folder(arguments.out), described(rig, world["randomize"], world["sensors"])
     print(drawn)
+    if learned_with - {arguments.sensors}:
+        print(f"the policy was trained with {', '.join(sorted(learned_with))} sensors; here they are {arguments.sensors}")
     jobs = arguments.jobs or JOBS
     done, failures = run_tasks(
         [task for tasks in pieces.values() for task in tasks], folder, jobs, "episodes", arguments.cluster
@@ -182,18 +184,20 @@ def evaluate_learned(**settings: Any) -> Result:
     return evaluate_piece(**settings)
 
 
-def _policies(path: str | None) -> tuple[list[Path], list[str]]:
-    """The policy folders at ``path``, and the laws that those policies sit on."""
+def _policies(path: str | None) -> tuple[list[Path], list[str], set[str]]:
+    """The policy folders at ``path``, the laws that those policies sit on, and the sensors that they were trained with."""
     if path is None:
-        return [], []
+        return [], [], set()
     try:
         from agents.policy.files import load_policy
         from agents.policy.seeds import policy_folders
     except ImportError as error:
         raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
     folders = policy_folders(path)
-    laws = dict.fromkeys(load_policy(folder).settings.law for folder in folders)
-    return folders, [law for law in laws if law != NO_LAW]
+    policies = [load_policy(folder) for folder in folders]
+    laws = dict.fromkeys(policy.settings.law for policy in policies)
+    trained = {str(policy.training["sensors"]) for policy in policies if "sensors" in policy.training}
+    return folders, [law for law in laws if law != NO_LAW], trained
 
 
 if __name__ == "__main__":

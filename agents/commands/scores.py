@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy.files import WEIGHTS
+from agents.policy.files import WEIGHTS, load_policy
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
 from agents.reports.score_tables import Scored, data, overview
 from baselines.bench.comparison import ENVIRONMENTS, default_controllers
@@ -83,12 +83,13 @@ _CAPTION = (
 
 
 def _contestants(environment: str) -> Iterable[tuple[str, str]]:
-    """Names and policy folders ("" for a law) of whatever is measured in an environment."""
+    """Names and policy folders ("" for a law) of whatever is measured in an environment: of policies, those that were trained
+    with sensors of the table."""
     for law in (*UNCONTROLLED, *default_controllers()):
         yield law, ""
     for name in shipped_names():
         if name.partition("_")[0] == policy_of(environment):
-            for folder in policy_folders(name):
+            for folder in (one for one in policy_folders(name) if load_policy(one).training["sensors"] in SENSORS):
                 yield f"{name} {folder.name}", f"{name}/{folder.name}"
 
 

@@ -30,13 +30,17 @@ IMPEDANCES = {"fixed": 2, "variable_kp": 4, "variable": 5}
 class ResidualSettings:
     """What a residual may do.
 
-    ``law`` underneath, one of ``LAWS``. ``impedance``: ``"fixed"``, an action is a force along each cylinder; with
-    ``"variable_kp"`` also the stiffness Kclx, Kcly that the law works with, with ``"variable"`` its damping besides (neither
-    of them without a law or on one that is stiff by itself). ``authority`` (N) bounds the force: 100 N, since the weight of
-    2 kg more than believed is 40 to 57 N along cylinder 1 and friction comes on top. ``time_constant`` (s) of the low-pass
-    between an action and the law: without it single lanes oscillate. ``policy_period`` (s). Raises ``ValueError`` for values
-    outside these limits, and without a
-    ``force_sensor`` for what needs the hand's force: a law of ``FORCE_LAWS``, and an impedance that varies.
+    - ``law`` underneath, one of ``LAWS``.
+    - ``impedance``: with ``"fixed"`` an action is a force along each cylinder; with ``"variable_kp"`` also the stiffness Kclx,
+      Kcly that the law works with; with ``"variable"`` its damping besides. Without a law, and on the
+      admittance laws, only ``"fixed"``.
+    - ``authority`` (N) bounds the force: 100 N, since the weight of 2 kg more than believed is 40 to 57 N along cylinder 1 and
+      friction comes on top.
+    - ``time_constant`` (s) of the low-pass between an action and the law: without it single lanes oscillate.
+    - ``policy_period`` (s).
+    - ``force_sensor``: without one, neither a law of ``FORCE_LAWS`` nor an impedance that varies, which need the hand's force.
+
+    Raises ``ValueError`` for values outside these limits.
     """
 
     law: str = "backstepping"

@@ -11,6 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents.policy.files import Policy, policy_content, save_policy
+from agents.residual.privileged import acting
 from agents.residual.settings import ResidualSettings
 from agents.training.algorithms import network_of
 from agents.training.checkpoint import save_checkpoint
@@ -98,7 +99,7 @@ class Monitor(BaseCallback):
         began = time.perf_counter()
         average: Any = self.model.average  # type: ignore[attr-defined]
         network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
-        score = validate(self._env, network.actions)
+        score = validate(self._env, acting(network.actions, self._env, self._settings.privileged))
         figures, law = score.to_dict(), self._reached["law"]
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started

@@ -18,6 +18,7 @@ from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS, events_in
 from agents.training.monitor import Monitor, described
+from agents.training.privileged import Privileged
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.shifted_reward import ShiftedReward
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
@@ -57,8 +58,9 @@ def train(
     if settings.until < 100:
         law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
         paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
+    seen = Privileged(env) if settings.privileged else env
     # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
-    paid = ShiftedReward(env, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else env
+    paid = ShiftedReward(seen, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else seen
     normalized = VecNormalize(paid, gamma=settings.discount)
     model = make_model(settings, normalized, str(folder / EVENTS))
     normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)

@@ -7,11 +7,13 @@ import json
 import sys
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 from scipy import stats
 
 from agents.commands import evaluate as command
+from agents.commands.scores import _contestants
 from agents.policy.controller import observation_size
 from agents.policy.files import load_policy, save_policy
 from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
@@ -21,6 +23,8 @@ from agents.reports.learning_curves import learning_curves, over_seeds
 from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
+from baselines.registry import make_controller
+from birthsim_env.physics.rig.parameters import Parameters
 
 
 def evaluation(name, error, lost=(), beyond=()):
@@ -120,6 +124,39 @@ def test_shipped_policies_load_fit_and_are_small(name):
         assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]
     reached = [load_policy(place).training["reached"]["pooled_mm"] for place in places]
     assert best_policy(name) == places[int(np.argmin(reached))]
+
+
+def test_a_policy_without_a_force_sensor_ignores_what_the_environment_measures():
+    """``--policy circle_honest_blind`` in an environment with a force sensor."""
+    law = make_controller("residual", Parameters(), policy="circle_honest_blind")
+    port = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors="honest", policy_period=0.001)
+    port.reset(seed=0)
+    asked = []
+    for lie in (0.0, 50.0):
+        law.reset()
+        seen = replace(port.measurement, user_force=np.full((2, 2), lie))
+        asked.append(law.command(seen, port.reference))
+    np.testing.assert_array_equal(*asked)
+    port.close()
+
+
+@pytest.mark.parametrize(("sensors", "said"), [("honest", False), ("lab", True)])
+def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_path, monkeypatch, capsys, sensors, said):
+    def refused(*_):
+        raise ValueError("enough")
+
+    monkeypatch.setattr(command, "run_tasks", refused)
+    arguments = ("--policy", "circle_honest_blind", "--sensors", sensors, "--episodes", "1", "--out", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
+    with pytest.raises(SystemExit):
+        command.main()
+    told = "the policy was trained with honest sensors; here they are lab"
+    assert (told in capsys.readouterr().out) is said
+
+
+def test_scores_are_of_policies_that_were_trained_with_their_sensors():
+    names = {policy.partition("/")[0] for _, policy in _contestants("BirthSIM/Circle-v1") if policy}
+    assert names == {"circle", "circle_lab", "circle_pure"}
 
 
 def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkeypatch):

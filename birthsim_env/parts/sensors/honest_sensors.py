@@ -227,6 +227,15 @@ class HonestSensors:
         """Figure -> what the episode of each lane has, (N,)."""
         return dict(zip(at.FIGURES, self._errors, strict=False))
 
+    @property
+    def errors(self) -> Array:
+        """Rows of ``sensor_errors`` that the episode of each lane has, (ROWS, N)."""
+        return self._errors
+
+    def shift(self, place: Array) -> Array:
+        """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
+        return at.shift(self._errors, self._constants, place)
+
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         _honest(

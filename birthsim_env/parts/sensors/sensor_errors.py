@@ -111,3 +111,12 @@ def work_out(figures: Array, unit: Array, constants: Array, errors: Array) -> No
         errors[HEIGHT, i] = figures[DISTORTION, i] * math.sqrt(2.0 / WAVES)
         for axis in range(2):
             errors[REGISTERED + axis, i] = field(errors, i, axis, constants[AT_X], constants[AT_Y])
+
+
+def shift(errors: Array, constants: Array, place: Array) -> Array:
+    """By how much scale and distortion move what the tracker shows of the true ``place``, both (2, N), m."""
+    waves = errors[WAVE:HEIGHT].reshape(2, WAVES, 3, -1)
+    total = np.sin(waves[:, :, 0] * place[0] + waves[:, :, 1] * place[1] + waves[:, :, 2]).sum(axis=1)
+    scaled = errors[SCALED] * (place - constants[AT_X : AT_Y + 1, None])
+    moved: Array = errors[HEIGHT] * total - errors[REGISTERED:] + scaled
+    return moved

@@ -1,0 +1,53 @@
+"""What a privileged policy is told besides: the true figures of the rig that was drawn, and what its sensors do wrong.
+
+No controller can know them. A policy that does says what is left to be learned by one that guesses them from measurements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.sensor_errors import CELLS, SCALED
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
+
+PolicyFunction = Callable[[NDArray[np.float32]], NDArray[Any]]
+
+DRAWN = (at.MASS, at.FC1, at.FC2, at.FV1, at.FV2, at.TAU, at.DEAD_VOLUME, at.H_WALL)
+"""Rows of the parameters that randomisation of a rig draws; friction: Coulomb and viscous, of cylinders 1 and 2."""
+
+PRESSURE_UNIT, PLACE_UNIT = 2000.0, 1e-3
+"""Pa and m that are told as 1: the default bias of a pressure cell, and the default distortion of the tracker."""
+
+FIGURES = len(DRAWN) + 6
+"""How many numbers are told."""
+
+
+def true_figures(env: Any) -> NDArray[np.float32]:
+    """Of the lanes of a vector environment now, (N, FIGURES): the parameters ``DRAWN`` over those that the owner describes; the
+    biases of the four pressure cells; and by how much scale and distortion move the place that the tracker shows, x and y.
+
+    Without ``honest`` sensors the last six are zero.
+    """
+    simulation, rows = env.simulation, list(DRAWN)
+    figures: Array = np.zeros((FIGURES, env.num_envs))
+    figures[: len(rows)] = simulation.plant.lane_parameters[rows] / simulation.nominal[rows, None]
+    if isinstance(simulation.sensors, HonestSensors):
+        figures[len(rows) : -2] = simulation.sensors.errors[CELLS:SCALED] / PRESSURE_UNIT
+        figures[-2:] = simulation.sensors.shift(simulation.motion[:2]) / PLACE_UNIT
+    return figures.T.astype(np.float32)
+
+
+def told(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Observations (N, D) of a vector environment with its ``true_figures``, (N, D + FIGURES)."""
+    return np.concatenate([observations, true_figures(env)], axis=1)
+
+
+def acting(policy: PolicyFunction, env: Any, privileged: bool) -> PolicyFunction:
+    """What a ``policy`` does in ``env``: observations (N, D) -> actions (N, size); a ``privileged`` one is ``told``."""
+    return (lambda seen: policy(told(env, seen))) if privileged else policy

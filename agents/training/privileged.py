@@ -1,0 +1,34 @@
+"""A training of a privileged policy: its worlds tell it ``agents.residual.privileged``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnvWrapper
+
+from agents.residual.privileged import FIGURES, told, true_figures
+from agents.training.sb3_adapter import SB3VecEnv
+
+
+class Privileged(VecEnvWrapper):
+    """``venv`` with ``told`` observations. The last observation of an episode has the figures of the step before."""
+
+    def __init__(self, venv: SB3VecEnv) -> None:
+        own: Any = venv.observation_space
+        more = np.full(FIGURES, np.inf, dtype=np.float32)
+        super().__init__(venv, spaces.Box(np.append(own.low, -more), np.append(own.high, more), dtype=np.float32))
+        self._lanes = venv.env
+
+    def reset(self) -> Any:
+        """As ``venv``."""
+        return told(self._lanes, np.asarray(self.venv.reset()))
+
+    def step_wait(self) -> Any:
+        """As ``venv``."""
+        before = true_figures(self._lanes)
+        observations, rewards, ended, infos = self.venv.step_wait()
+        for lane in np.flatnonzero(ended):
+            infos[lane]["terminal_observation"] = np.append(infos[lane]["terminal_observation"], before[lane])
+        return told(self._lanes, np.asarray(observations)), rewards, ended, infos

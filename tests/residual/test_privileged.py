@@ -1,0 +1,67 @@
+"""What a privileged policy is told is what was drawn, and no more."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from agents.residual.privileged import FIGURES, acting, told, true_figures
+from birthsim_env.parts.drawn.randomization import documented_ranges
+from birthsim_env.physics.rig.parameters import Parameters
+
+LANES = 64
+
+
+@pytest.fixture
+def make():
+    made = []
+
+    def one(**arguments):
+        made.append(gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=LANES, **arguments))
+        made[-1].reset(seed=5)
+        return made[-1]
+
+    yield one
+    for env in made:
+        env.close()
+
+
+def test_as_described_nothing_is_special(make):
+    figures = true_figures(make(sensors="lab"))
+    np.testing.assert_array_equal(figures, np.tile([1.0] * (FIGURES - 6) + [0.0] * 6, (LANES, 1)).astype(np.float32))
+
+
+def test_every_figure_of_the_rig_that_is_drawn_is_told(make):
+    nominal, ranges = Parameters(), documented_ranges(Parameters())
+    figures = true_figures(make(randomize="plant")).T[:-6]
+    names = (
+        "mechanics.mass", "cylinder1.coulomb_friction", "cylinder2.coulomb_friction", "cylinder1.viscous_friction",
+        "cylinder2.viscous_friction", "valves.time_constant", "chambers.dead_volume", "chambers.wall_heat_transfer",
+    )  # fmt: skip
+    assert set(names) == set(ranges)
+    for name, row in zip(names, figures, strict=True):
+        section, own = name.split(".")
+        low, high = np.array(ranges[name]) / getattr(getattr(nominal, section), own)
+        assert low <= row.min() < row.max() <= high, name
+        assert np.ptp(row) > 0.8 * (high - low), name
+
+
+def test_the_errors_of_honest_sensors_are_told(make):
+    rig = Parameters().replace({f"electronics.{name}": 0.0 for name in ("position_noise", "pressure_noise", "missed_periods")})
+    rig = rig.replace({"electronics.adc_bits": 0.0})
+    env = make(sensors="honest", parameters=rig)
+    figures, simulation = true_figures(env).T[-6:], env.simulation
+    seen = simulation.measurement
+    # The first sample of an episode is not late. A single's 24 bits of numbers near 1.
+    np.testing.assert_allclose(figures[4:], 1e3 * (seen.position - simulation.motion[:2]), atol=1e-6)
+    np.testing.assert_allclose(figures[:4], (seen.pressures - simulation.plant.pressures) / 2000.0, atol=1e-6)
+    assert (np.ptp(figures, axis=1) > 0.5).all()
+
+
+def test_only_a_privileged_policy_is_told(make):
+    env = make(randomize=True)
+    seen = np.zeros((LANES, 4), np.float32)
+    for privileged, length in ((False, 4), (True, 4 + FIGURES)):
+        assert acting(np.shape, env, privileged)(seen) == (LANES, length)
+    np.testing.assert_array_equal(told(env, seen)[:, 4:], true_figures(env))
