@@ -1,58 +1,51 @@
 """A passivity observer at the port between rig and hand (Hannaford and Ryu 2002), from what the sensors tell.
 
-Positions come late and at times of their own, so the force is taken at the time stamp of each position, on a straight
-line between the control periods on either side, and the work between two positions by the trapezoid rule.
+Work is counted about the moving target, between two positions by the trapezoid rule, and twice: with positions that are late
+by ``LAG``, and with forces that are late by as much. The hand of an oscillation that goes on neither gives nor takes, and a
+count without delay would let it be. With late positions, a hand that is a spring k takes k pi X^2 sin(w LAG) in each cycle of
+amplitude X; with late forces, a hand that is a mass does. A rig whose oscillation decays fast enough passes both counts.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 
-LONGEST_DELAY = 0.06
-"""s: the oldest position whose force is still known; the longest latency that ``Electronics`` allows is 0.05 s."""
+LAG = 0.008
+"""s, time constant of a low-pass, assumed: two samples of the tracker, whose noise it halves."""
 
 
 class PortEnergy:
-    """N lanes; ``update`` is called once per control period of ``period`` s."""
+    """N lanes; ``update`` is called once per control period."""
 
-    def __init__(self, period: float, lanes: int) -> None:
-        self._period = period
-        self._forces: Array = np.zeros((math.ceil(LONGEST_DELAY / period) + 2, 2, lanes))
+    def __init__(self, lanes: int) -> None:
         self._stamp = np.full(lanes, -np.inf)
-        self._force, self._place, self._target = (np.zeros((2, lanes)) for _ in range(3))
+        self._forces: Array = np.zeros((2, 2, lanes))
+        self._offset, self._target = (np.zeros((2, lanes)) for _ in range(2))
 
     def reset(self, lanes: Mask) -> None:
         """Forget the past of the lanes of a mask (N,)."""
         self._stamp[lanes] = -np.inf
 
-    def update(self, measurement: Measurement, reference: Reference) -> tuple[Array, Array, Array]:
-        """Work, J, (N,), that the hand has done since the last call, that which it would have done had it moved as the target,
-        and x - xt, m, (2, N), at the newest position."""
+    def update(self, measurement: Measurement, reference: Reference, force: Array) -> tuple[Array, Array, Array, Array]:
+        """Takes the hand's ``force``, N, (2, N), when the position was taken. Returns what the hand has done since the last
+        call, J, (2, N), in both counts: work about the moving target, and that of a motion as the target's; the target's path
+        times the force, J, (2, N); and x - xt, m, (2, N), late by ``LAG``."""
         starts = np.isneginf(self._stamp)
-        self._forces = np.roll(self._forces, 1, axis=0)
-        self._forces[0] = measurement.user_force
-        self._forces[:, :, starts] = measurement.user_force[:, starts]
-        late = measurement.time - measurement.position_time
-        force = self._force_before(late)
-        target = reference.position - late * reference.velocity
-        new = measurement.position_time > self._stamp
-        mean = 0.5 * (force + self._force) * (new & ~starts)
-        work = (mean * (measurement.position - self._place)).sum(axis=0)
-        asked = (mean * (target - self._target)).sum(axis=0)
+        since = measurement.position_time - self._stamp
+        target = reference.position - (measurement.time - measurement.position_time) * reference.velocity
+        away = measurement.position - target
+        offset = np.where(starts, away, self._offset - np.expm1(-since / LAG) * (away - self._offset))
+        # Late by one lag more than the offset.
+        slow = self._forces[1] - np.expm1(-since / (2.0 * LAG)) * (force - self._forces[1])
+        forces = np.stack([force, np.where(starts, force, slow)])
+        new = since > 0.0
+        mean, moved = 0.5 * (forces + self._forces) * (new & ~starts), target - self._target
+        work, asked = (mean * (offset - self._offset)).sum(axis=1), (mean * moved).sum(axis=1)
+        path = np.sqrt((mean**2).sum(axis=1) * (moved**2).sum(axis=0))
         self._stamp = np.where(new, measurement.position_time, self._stamp)
-        self._force = np.where(new, force, self._force)
-        self._place, self._target = np.where(new, measurement.position, self._place), np.where(new, target, self._target)
-        return work, asked, self._place - self._target
-
-    def _force_before(self, late: Array) -> Array:
-        """The force ``late`` (N,) s ago, (2, N), N."""
-        place = np.clip(late / self._period, 0.0, len(self._forces) - 1.001)
-        whole = place.astype(np.intp)
-        part, lane = place - whole, np.arange(len(late))
-        newer, older = self._forces[whole, :, lane].T, self._forces[whole + 1, :, lane].T
-        return np.asarray(newer + part * (older - newer))
+        self._forces = np.where(new, forces, self._forces)
+        self._offset, self._target = np.where(new, offset, self._offset), np.where(new, target, self._target)
+        return work, asked, path, self._offset

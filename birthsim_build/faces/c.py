@@ -7,6 +7,7 @@ from pathlib import Path
 
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import LAYOUT, ROWS
+from birthsim_env import __version__
 
 HERE = Path(__file__).resolve().parent
 STATIC = ("example.c", "CMakeLists.txt", "birthsim.pc")
@@ -34,4 +35,4 @@ def write_header(images: Mapping[str, Words], folder: Path, example: str | None 
 def write_example(folder: Path) -> None:
     """Write the example and how to build it."""
     for name in STATIC:
-        (folder / name).write_bytes((HERE / name).read_bytes())
+        (folder / name).write_text((HERE / name).read_text().replace("@VERSION@", __version__))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import shutil
@@ -21,6 +22,11 @@ def need(there, reason):
     """Skip where a tool is missing; under CI fail."""
     if not there:
         (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)(reason)
+
+
+def imported(name):
+    """A module; skip where it is missing, under CI fail."""
+    return importlib.import_module(name) if os.environ.get("CI") == "true" else pytest.importorskip(name)
 
 
 def need_program(name, package):

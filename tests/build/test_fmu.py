@@ -23,11 +23,10 @@ from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
 from birthsim_env.physics.plant import Plant
-from tests.build.targets import need_linker
+from tests.build.targets import imported, need_linker
 from tests.console import call
 
-fmpy = pytest.importorskip("fmpy")
-validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
+fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
 
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]

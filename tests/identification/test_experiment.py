@@ -49,6 +49,7 @@ BAD = [
     (f"{','.join(NAMES)}\n" + "".join(f"{k % 4},0.5,0,0,0,0,0\n" for k in range(9)), "at least 8 rows of finite numbers"),
     (f"{','.join(NAMES)}\n" + "".join(f"{k},0.5,0,2,0,0,0\n" for k in range(9)), "an added opening of 2; allowed: -1 to 1"),
     (f"{','.join(NAMES)}\n" + "".join(f"{k},1.5,0,0,0,0,0\n" for k in range(9)), "position = (1.5, 0) m is unreachable"),
+    (f"{','.join(NAMES)}\n" + "".join(f"{0.1 * k:g},0.5,0,0,0,0,0\n" for k in range(9)), "lasts 0.8 s; allowed: 4 to 600 s"),
 ]
 
 

@@ -58,6 +58,7 @@ BAD: list[tuple[list[str], str]] = [
     (["log.csv", "--out", "none/rig.toml"], "none/rig.toml'; allowed: a file that ends in .toml, in a folder that exists"),
     (["log.csv", "--out", "rig.toml", "--duration", "5"], "--duration is given; allowed with --propose only"),
     (["--propose", "plan.csv", "--report", "r"], "--report is given; allowed with LOG only"),
+    (["log.csv", "--out", "rig.toml", "--report", "r"], "log = 'log.csv' cannot be read: No such file or directory"),
     (["--propose", "plan.csv", "--out", "a.toml"], "--out is given; allowed with LOG or --simulate"),
     (["--propose", "plan.csv", "--duration", "1"], "duration = 1.0; allowed: a finite number >= 4 and <= 600 (s)"),
     (["--simulate", "plan.csv", "--out", "a.toml"], "a.toml'; allowed: a file that ends in .csv, .parquet, .mcap"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -174,6 +175,24 @@ def test_what_is_wrong_with_a_file_is_named(name: str, content: bytes | None, wo
     with pytest.raises(ValueError, match=re.escape(words)) as error:
         read_table(tmp_path / name)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("value", [None, [1.0], "1", 10**400])
+def test_what_is_no_number_in_a_message_is_named_by_its_row(value: object, tmp_path: Path) -> None:
+    writer = pytest.importorskip("mcap.writer", reason="mcap is not installed: pip install 'birthsim[log]'").Writer
+    content = rows()
+    with (tmp_path / "log.mcap").open("wb") as file:
+        log = writer(file)
+        log.start()
+        channel = log.register_channel("/rig", "json", log.register_schema("rig", "jsonschema", b"{}"))
+        for row in range(len(content["time"])):
+            message = {name: float(values[row]) for name, values in content.items()} | (
+                {"position_x": value} if row == 9 else {}
+            )
+            log.add_message(channel, row, json.dumps(message).encode(), row)
+        log.finish()
+    with pytest.raises(ValueError, match="row 9: position_x = nan; allowed: finite numbers in every row"):
+        read_trial(tmp_path / "log.mcap", OWNER)
 
 
 def test_a_file_of_another_kind_is_not_written(tmp_path: Path) -> None:

@@ -125,6 +125,7 @@ def test_keys_pause_push_and_reset(window):
     assert pushed["force"][0] == pytest.approx(0, abs=2)
     window.page.keyboard.up("ArrowUp")
     window.wait("birthsim.frame.pointer === null")
+    window.live(2.0)  # so long does what follows have to see that time began anew
     time = window.frame()["time"]
     body.press("r")
     window.wait(f"birthsim.frame.time < {time}")

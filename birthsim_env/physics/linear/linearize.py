@@ -53,7 +53,8 @@ def balanced_pressures(
 ) -> Array:
     """Pressures of chambers P1, N1, P2, N2, (4,), Pa, that carry the weight at rest at an end effector position (2,), m.
 
-    ``pneumatic_stiffness`` (2,), N/m, is that of (9); one out of reach is approached.
+    ``pneumatic_stiffness`` (2,), N/m, is that of (9); one out of reach is approached. Raises ``ValueError`` for a pose
+    outside the workspace and for a stiffness that is not finite.
     """
     rig = load_parameters(parameters)
     piston = geometry.inverse_geometry(checked("pose", pose, (2,), "m"), rig)

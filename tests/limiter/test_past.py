@@ -1,0 +1,25 @@
+"""Signals at the time of a late position."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.limiter.past import Past
+
+T = 0.001
+
+
+def test_a_ramp_is_known_at_any_time_before():
+    """A straight line between two periods is exact for a ramp."""
+    past, late = Past(T, 1, 2), np.array([0.0043, 0.0271])
+    for k in range(100):
+        told = past.at(late, np.full((1, 2), 3.0 * k * T))
+    np.testing.assert_allclose(told[0], 3.0 * (99 * T - late), rtol=1e-12)
+
+
+def test_before_the_start_all_was_as_it_is_and_lanes_start_anew():
+    past, late = Past(T, 1, 2), np.full(2, 0.01)
+    assert past.at(late, np.full((1, 2), 5.0)) == pytest.approx(np.full((1, 2), 5.0))
+    past.reset(np.array([True, False]))
+    np.testing.assert_array_equal(past.at(late, np.full((1, 2), 7.0)), [[7.0, 5.0]])
