@@ -19,7 +19,7 @@ function element(tag, content, properties = {}) {
 function choices(head, rows, show) {
   const words = head.flatMap((title, column) => {
     const values = [...new Set(rows.map((row) => row[column]))];
-    const numbers = values.some((value) => !Number.isNaN(worth(value)));
+    const numbers = values.some((value) => Number.isFinite(worth(value)));
     return numbers || UNCHOSEN.includes(title) ? [] : [{ title, column, values }];
   });
   const chosen = words.map(({ title, column, values }, index) => {
