@@ -50,7 +50,7 @@ def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
     describe(now.time, now.since_jump, plant.state, now.motion, now.reference.rows, now.force, now.impacts, rig, rows)
     info = single_info(rows)
     hold = hands.hold
-    pointer = (math.nan, math.nan) if hold is None else hold.position
+    pointer = (math.nan, math.nan) if hold is None else hold.pointer(plant.end_effector()[:2, 0], hands.stiffness)
     parts: Sequence[Any] = (
         info["time"], episode_time, info["piston_position"], info["position"], info["velocity"], info["target"],
         info["compliant_target"], hands.scenario_now, hands.drag_now, pointer, info["pressure"], info["opening"],

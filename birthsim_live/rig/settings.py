@@ -22,6 +22,10 @@ RESIDUAL = "residual"
 """Controller whose policies are choices of their own: ``residual:circle``."""
 
 
+NOTHING = "nothing"
+"""What a rig is compared with where no second one is beside it."""
+
+
 @dataclass(frozen=True)
 class Slider:
     """A number that can be set: what it is called, its unit, from where to where, and where it stands at first."""
@@ -57,11 +61,13 @@ class Strict(BaseModel):
 
 
 class Settings(Strict):
-    """What is set. Numbers are those of ``sliders``; ``scenario_force`` keeps or drops the scenario's own hand, and
-    ``stiffness_source`` says whether the stiffness setpoints are the scenario's or the sliders'."""
+    """What is set. Numbers are those of ``sliders``; ``compare`` is the controller of a second rig beside the first;
+    ``scenario_force`` keeps or drops the scenario's own hand, and ``stiffness_source`` says whether the stiffness setpoints
+    are the scenario's or the sliders'."""
 
     scenario: str = "probe"
     controller: str = "admittance-backstepping"
+    compare: str = NOTHING
     valves: str = "two_valves"
     sensors: str = "ideal"
     scenario_force: bool = False
@@ -111,9 +117,11 @@ class Choices:
 
     def __init__(self, rig: Parameters) -> None:
         self.sliders, self.controllers = sliders(rig), controller_choices()
+        known = tuple(choice["name"] for choice in self.controllers if "missing" not in choice)
         self.words: dict[str, tuple[str, ...]] = {
             "scenario": tuple(SCENARIOS),
-            "controller": tuple(choice["name"] for choice in self.controllers if "missing" not in choice),
+            "controller": known,
+            "compare": (NOTHING, *known),
             "valves": VALVE_LAYOUTS,
             "sensors": tuple(SENSORS),
         }

@@ -15,7 +15,7 @@ from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.clock import Clock, Source
 from birthsim_live.rig.hand import DRAG_LIMIT
-from birthsim_live.rig.settings import Choices, opening_settings
+from birthsim_live.rig.settings import NOTHING, Choices, opening_settings
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client
 from birthsim_live.server.shapes import shapes
@@ -134,6 +134,7 @@ def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
         "choices": {
             "scenario": choices.words["scenario"],
             "controller": choices.controllers,
+            "compare": [{"name": NOTHING, "title": NOTHING}, *choices.controllers],
             "valves": choices.words["valves"],
             "sensors": choices.words["sensors"],
         },
