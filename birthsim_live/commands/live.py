@@ -21,6 +21,9 @@ def main() -> None:
     add_address(parser, 8000)
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument(
+        "--compare", metavar="CONTROLLER", help="open with a second rig under this controller beside the first"
+    )
+    parser.add_argument(
         "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
     )
     parser.add_argument(
@@ -34,6 +37,8 @@ def main() -> None:
 
 def _live(arguments: argparse.Namespace) -> None:
     if arguments.static is not None:
+        if arguments.compare is not None:
+            raise ValueError(f"--compare {arguments.compare} beside --static; allowed: ?compare={arguments.compare} in a link")
         _build(arguments.static, arguments.parameters)
         return
     need_server()
@@ -45,6 +50,8 @@ def _live(arguments: argparse.Namespace) -> None:
     with listen(arguments.host, arguments.port) as listening:
         rig = load_parameters(arguments.parameters)
         session = Session(rig, opening_settings(rig))
+        if arguments.compare is not None:
+            session.change({"compare": arguments.compare})
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
         hub = LiveHub(session, arguments.record_dir)

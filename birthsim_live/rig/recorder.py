@@ -45,7 +45,7 @@ class Recorder:
         self._rig, self._interval = session.rig, EVERY * session.period
         self._rows: list[Array] = []
         self._events: list[dict[str, Any]] = []
-        self._known: dict[str, Any] = {}
+        self._known: dict[str, Any] = {"second_lost": None}
         self._paths, self._periods, self._count, self._length = -1, 0, 0, 0
         self._notes, self._disk = threading.Lock(), threading.Lock()
         self._file: FileIO | None = None

@@ -45,14 +45,14 @@ _HEAD = struct.Struct("<II")
 
 @dataclass(frozen=True)
 class Recording:
-    """What a file holds: the rig, rows (T, COLUMNS) every ``interval`` s, those of the rig beside it (T, COLUMNS), NaN where
-    there is none, and events in the order of their rows."""
+    """What a file holds: the rig, rows (T, COLUMNS) every ``interval`` s, events in the order of their rows, and the rows of
+    the rig beside it (T, COLUMNS), NaN where there is none."""
 
     rig: Parameters
     rows: Array
-    second: Array
     interval: float
     events: list[dict[str, Any]]
+    second: Array
 
     @property
     def duration(self) -> float:
@@ -125,7 +125,7 @@ def _checked(numbers: Array, header: Any, events: list[Any]) -> Recording:
         if len(event) != 2 or len(kinds) != 1 or not last <= event["row"] < len(rows) or not _fits(kinds[0], event[kinds[0]]):
             raise ValueError(f"event {str(event)[:80]}; allowed: a row in order, and {', '.join(EVENTS)}")
         last = event["row"]
-    return Recording(Parameters.from_dict(header["rig"]), rows, second, interval, events)
+    return Recording(Parameters.from_dict(header["rig"]), rows, interval, events, second)
 
 
 def _fits(kind: str, value: Any) -> bool:

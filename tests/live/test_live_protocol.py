@@ -20,6 +20,7 @@ SETPOINTS = dict(zip(STIFFNESSES, (1500.0, 2500.0, 4000.0, 2000.0), strict=True)
 
 GOOD = [
     ({"type": "drag", "position": [0.5, -1], "id": 3}, protocol.Drag(position=(0.5, -1.0), id=3)),
+    ({"type": "push", "force": [0, -20.5], "id": 4}, protocol.Push(force=(0.0, -20.5), id=4)),
     ({"type": "release"}, protocol.Release()),
     ({"type": "set", "settings": {"Kclx": 3}}, protocol.Set(settings={"Kclx": 3})),
     ({"type": "pause", "paused": True}, protocol.Pause(paused=True)),
@@ -35,7 +36,7 @@ BAD = [
     ("", "no JSON"),
     ("{", "no JSON"),
     ("[1]", r"message = \[1\]"),
-    ("{}", "no known type; allowed: drag, release"),
+    ("{}", "no known type; allowed: drag, push, release"),
     ('{"type":"drop"}', "no known type"),
     ('{"type":["drag"]}', "no known type"),
     ('{"type":"drag","position":[0,NaN],"id":1}', "position.1 = nan; allowed: a finite number"),
@@ -43,6 +44,7 @@ BAD = [
     ('{"type":"drag","position":[0,1e999],"id":1}', "position.1 = inf"),
     ('{"type":"drag","position":[0,1' + 4000 * "0" + '],"id":1}', r"position.1 = 1000*\.\.\.; allowed: a finite number"),
     ('{"type":"drag","position":[0,1' + 9000 * "0" + '],"id":1}', "no JSON"),
+    ('{"type":"push","force":[0,101],"id":1}', "push.force.1 = 101; allowed: -100 to 100 N"),
     ('{"type":"drag","position":[0],"id":1}', "drag.position.1 is missing"),
     ('{"type":"drag","position":[0,true],"id":1}', "position.1 = True; allowed: a valid number"),
     ('{"type":"drag","position":[0,0],"id":-1}', "drag.id = -1; allowed: greater than or equal to 0"),

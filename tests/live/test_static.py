@@ -14,7 +14,7 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_live.rig.frames import COLUMNS
-from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.hand import Hold, Push
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
@@ -36,16 +36,19 @@ ROWS = """async (cases) => {
   const read = async (name) => await fetch(new URL(`rig/${name}`, location));
   const [pack, code] = [await (await read("pack.json")).json(), await (await read("loop.wasm")).arrayBuffer()];
   const found = [];
-  for (const { settings, periods, pointer } of cases) {
+  const policyOf = async (name) => {
+    const file = pack.controllers[name]?.policy?.file;
+    return file && (await (await read(file)).json());
+  };
+  for (const { settings, periods, hold } of cases) {
     const session = new Session(pack, await Machine.of(code));
-    const file = pack.controllers[settings.controller]?.policy?.file;
-    session.change(settings, file && (await (await read(file)).json()));
+    session.change(settings, await policyOf(settings.controller), await policyOf(settings.compare));
     session.reset();
-    if (pointer) session.hands.hold = { position: pointer, id: 1 };
+    if (hold) session.hands.hold = { ...hold, id: 1 };
     const rows = [];
     for (let k = 0; k < periods; k += 1) {
       session.advance(1, Infinity);
-      rows.push(...rowOf(session));
+      rows.push(...rowOf(session), ...(session.second ? rowOf(session.second) : []));
     }
     const bytes = new Uint8Array(Float64Array.from(rows).buffer);
     let text = "";
@@ -54,7 +57,7 @@ ROWS = """async (cases) => {
   }
   return found;
 }"""
-"""Rows of every period of sessions with settings, beside the one that is shown."""
+"""Rows of every period of sessions with settings, and of the rigs beside theirs."""
 
 
 SILENT = """async () => {
@@ -109,17 +112,20 @@ def same(found, expected):
     return bool(np.all((found == expected) | (np.isnan(found) & np.isnan(expected))))
 
 
-def rows_of(settings, periods, pointer=None):
-    """Rows of every period of a session in Python, (periods, COLUMNS); a hand at ``pointer``, m, pulls from the start."""
+def rows_of(settings, periods, hold=None):
+    """Rows of every period of a session in Python, (periods, COLUMNS for each rig); a hand that does ``hold`` acts from the
+    start."""
     rig = load_parameters(None)
     session = Session(rig, opening_settings(rig))
     session.change(settings)
     session.reset()
-    session.hands.hold = Hold(np.array(pointer), 1) if pointer else None
-    rows = np.empty((periods, COLUMNS))
+    for kind, value in (hold or {}).items():
+        session.hands.hold = {"position": Hold, "force": Push}[kind](np.array(value, dtype=float), 1)
+    rigs = [session, session.second] if session.second else [session]
+    rows = np.empty((periods, len(rigs) * COLUMNS))
     for row in rows:
         session.advance(1)
-        row[:] = session.row()
+        row[:] = np.concatenate([rig.row() for rig in rigs])
     return rows
 
 
@@ -142,11 +148,16 @@ def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python
     ]
     cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
     several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
-    several += [{"settings": {}, "periods": PERIODS, "pointer": place} for place in ([0.56, 0.02], [0.7, -0.2])]
+    holds = [{"position": [0.56, 0.02]}, {"position": [0.7, -0.2]}, {"force": [20, -5]}, {"force": [90, 90]}]
+    several += [{"settings": {}, "periods": PERIODS, "hold": hold} for hold in holds]
+    pairs = [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")]
+    for controller, compare in pairs:
+        settings = {"controller": controller, "compare": compare, "scenario": "circle", "sensors": "lab", "mass": 4.0}
+        several.append({"settings": {**settings, **pushed}, "periods": PERIODS, "hold": holds[0]})
     texts = window.page.evaluate(ROWS, several)
     for one, text in zip(several, texts, strict=True):
-        found = np.frombuffer(base64.b64decode(text)).reshape(-1, COLUMNS)
-        assert same(found, rows_of(**one)), one["settings"]
+        found = np.frombuffer(base64.b64decode(text)).reshape(PERIODS, -1)
+        assert same(found, rows_of(**one)), one
 
 
 def test_displacement_is_force_over_stiffness(window):

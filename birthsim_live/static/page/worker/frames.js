@@ -22,7 +22,7 @@ export function instant(session) {
     episode_time: [session.episodeTime],
     scenario_force: hands.scenarioNow,
     drag_force: hands.dragNow,
-    pointer: hands.hold?.position ?? NOWHERE,
+    pointer: hands.pointer ?? NOWHERE,
   };
   return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? show.memory.some(...pack.info[INFO[name]])]));
 }
@@ -32,10 +32,20 @@ export function rowOf(session) {
   return Float64Array.from(Object.values(instant(session)).flat());
 }
 
+/** The same of a rig that is not there. */
+export const NO_ROW = new Float64Array(Object.values(FIELDS).reduce((sum, size) => sum + size)).fill(NaN);
+
 const told = (value) => (Number.isFinite(value) ? value : null);
 
-/** The present instant as the page shows it; null where there is no number. */
+/** The present instant as the page shows it; `second` is that of the rig beside it, or null. */
 export function frameOf(session) {
+  const { second } = session;
+  if (second) second.hands.hold = session.hands.hold; // in a pause too
+  return { ...shown(session), second: second && shown(second) };
+}
+
+/** One rig, null where there is no number. */
+function shown(session) {
   const now = instant(session);
   const { numbers, hands, pack } = session;
   const force = now.scenario_force.map((value, k) => value + now.drag_force[k]);
@@ -48,7 +58,7 @@ export function frameOf(session) {
   const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? told(values[0]) : values.map(told)]);
   return {
     ...Object.fromEntries(named),
-    pointer: hands.hold?.position ?? null,
+    pointer: hands.pointer,
     force: force.map(told),
     error_mm: told(1e3 * Math.hypot(...off)),
     rendered: rendered.map(told),

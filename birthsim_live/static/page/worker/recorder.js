@@ -1,6 +1,6 @@
 // Takes a session down and makes the file that birthsim-replay plays (birthsim_live/rig/recording.py has the format).
 
-import { rowOf } from "./frames.js";
+import { NO_ROW, rowOf } from "./frames.js";
 
 const ROWS = 512; // in a chunk
 
@@ -32,7 +32,7 @@ export class Recorder {
     Object.assign(this, { name, every, longest, interval: every * session.period, header: session.pack.header });
     this.rows = [];
     this.events = [];
-    this.known = {};
+    this.known = { second_lost: "null" };
     this.paths = -1;
     this.periods = 0;
     this.take(session);
@@ -53,7 +53,8 @@ export class Recorder {
       if (this.paths !== session.paths) this.note("path", session.path());
       this.paths = session.paths;
       this.note("lost", session.lost);
-      this.rows.push(rowOf(session));
+      this.note("second_lost", session.second?.lost ?? null);
+      this.rows.push(new Float64Array([...rowOf(session), ...(session.second ? rowOf(session.second) : NO_ROW)]));
     }
     this.periods += 1;
   }
