@@ -23,6 +23,13 @@ const coordinate = (axis) => ({
 });
 
 export const PLOTS = [
+  {
+    title: "error",
+    unit: "mm",
+    least: 1,
+    zero: true,
+    curves: [curve("error", null, "end-effector", 1.6), curve("second_error", null, "second", 1.6, DASHED)],
+  },
   coordinate("x"),
   coordinate("y"),
   {
@@ -80,6 +87,8 @@ export function rowOf(frame) {
     row[`pneumatic_${i + 1}`] = frame.pneumatic[i];
     row[`pneumatic_setpoint_${i + 1}`] = frame.pneumatic_setpoint[i];
   });
+  row.error = frame.error_mm;
+  row.second_error = frame.second?.error_mm ?? NaN;
   ["P1", "N1", "P2", "N2"].forEach((name, i) => {
     row[name] = BAR * frame.pressures[i];
   });

@@ -2,17 +2,18 @@
 
 import { Connection } from "./connection.js";
 import { NAMES, rowOf } from "./curves.js";
-import { Drag, keyOfTheRig } from "./drag.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
+import { Hand } from "./hand.js";
 import { History } from "./history.js";
+import { Keys, keyOfTheRig } from "./keys.js";
 import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
 import { Plots } from "./plots.js";
 import { Readouts } from "./readouts.js";
-import { Scene } from "./scene.js";
+import { Rigs } from "./rigs.js";
 import { Settings } from "./settings.js";
 import { Transport } from "./transport.js";
 
@@ -21,15 +22,13 @@ const byId = (id) => document.getElementById(id);
 /**
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
- * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
- * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
+ * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
+ * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures.
  */
 const send = (message) => connection.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [] };
 window.birthsim = rig;
 
-const scene = new Scene(byId("rig"));
-rig.scene = scene;
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
 const history = new History(NAMES, 512, 0.025);
@@ -41,28 +40,28 @@ const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
 const link = new Link();
 const transport = new Transport(send, (name) => connection.address(name));
-const drag = new Drag(byId("rig"), {
-  scene,
+const enabled = () => rig.connected && rig.hello.mode === "live";
+const hand = new Hand({
   send,
-  frame: () => rig.frame,
-  stiffness: () => rig.settings.drag_stiffness,
-  enabled: () => rig.connected && rig.hello.mode === "live",
   sent: (id, time) => {
-    scene.cue = false;
+    rigs.cued();
     rig.monitor.sent(id, time);
   },
 });
+const rigs = new Rigs(hand, history, { frame: () => rig.frame, enabled });
+rig.scenes = rigs.scenes;
+new Keys(hand, enabled);
 
 const connection = new Connection({
   closed: (seconds) => {
     rig.connected = false;
-    drag.release();
+    hand.release();
     banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
     readouts.say("offline", "connection lost");
   },
   failed: ({ message }) => {
     rig.connected = false;
-    drag.release();
+    hand.release();
     banner("offline", `The rig cannot be shown: ${message}`);
     readouts.say("offline", "no rig");
   },
@@ -71,7 +70,7 @@ const connection = new Connection({
     rig.connected = true;
     rig.frame = null;
     history.clear();
-    scene.setUp(message.geometry, message.air);
+    rigs.setUp(message);
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
@@ -82,14 +81,14 @@ const connection = new Connection({
   settings: (message) => showSettings(message.settings),
   state: (message) => showState(message),
   path: ({ points }) => {
-    scene.setPath(points);
+    rigs.setPath(points);
     magnifier.setPath(points);
   },
   frame: (message) => {
     rig.frame = withNumbers(message);
     rig.monitor.received += 1;
     history.push(message.time, rowOf(rig.frame));
-    drag.follow(rig.frame);
+    hand.stay();
   },
   error: ({ message }) => notices.show(message),
 });
@@ -108,12 +107,13 @@ function setUpSettings(message) {
 function withNumbers(frame) {
   const number = (value) => value ?? NaN;
   const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
-  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm) };
+  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm), second: frame.second && withNumbers(frame.second) };
 }
 
 function showSettings(values) {
   if (!values) return;
   rig.settings = values;
+  rigs.show(values);
   if (rig.hello.mode !== "live") return;
   settings.show(values);
   guide.show(values);
@@ -132,9 +132,10 @@ function banner(id, words) {
   element.hidden = !words;
 }
 
-function pixel(point) {
-  const [x, y] = scene.pen.pixel(point);
-  const box = byId("rig").getBoundingClientRect();
+function pixel(point, k = 0) {
+  const { pen, sheet } = rigs.scenes[k];
+  const [x, y] = pen.pixel(point);
+  const box = sheet.canvas.getBoundingClientRect();
   return [box.left + x, box.top + y];
 }
 
@@ -144,15 +145,16 @@ let drawn = null;
 function draw(now) {
   requestAnimationFrame(draw);
   const { frame, state } = rig;
-  if (!frame || !state || !scene.pen) return;
+  if (!frame || !state || !rigs.scenes[0].pen) return;
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
-    scene.draw(frame, drag.held);
-    magnifier.draw(frame, scene.pen.scale);
+    rigs.draw(frame);
+    magnifier.draw(frame, rigs.scenes[0].pen.scale);
     rig.monitor.drew(frame);
-    banner("lost", frame.lost ? `${frame.lost} Press R to reset.` : "");
+    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
   }
   transport.step(frame);
+  rigs.step(frame, now);
   gauges.step(frame.pressures, now);
   plots.step(now);
   if (rig.connected) readouts.step(frame, state, now);

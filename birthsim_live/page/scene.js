@@ -14,10 +14,12 @@ const STILL = matchMedia("(prefers-reduced-motion: reduce)");
 const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
 
 export class Scene {
-  constructor(canvas) {
+  /** `magnified`: a frame shows what the magnifier does, and until somebody has pulled a hint shows what to do. */
+  constructor(canvas, { magnified }) {
     this.geometry = null;
     this.path = [];
-    this.cue = true; // shows what to do until somebody has done it
+    this.magnified = magnified;
+    this.cue = magnified;
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
     pen.onNightfall(() => this.layOut());
   }
@@ -84,7 +86,7 @@ export class Scene {
       drawRig(world, pose, geometry, frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere))));
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
-    this.drawWindow(frame);
+    if (this.magnified) this.drawWindow(frame);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);

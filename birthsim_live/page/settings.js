@@ -2,7 +2,7 @@
 
 import { NumberField } from "./slider.js";
 
-const LISTS = { scenario: "Scenario", controller: "Controller", valves: "Valves", sensors: "Sensors" };
+const LISTS = { scenario: "Scenario", controller: "Controller", compare: "Compare", valves: "Valves", sensors: "Sensors" };
 const GROUPS = {
   "Rendered stiffness": { Kclx: ["along x ", ["K", "clx"]], Kcly: ["along y ", ["K", "cly"]] },
   "Pneumatic stiffness": { Kpneu1: ["cylinder 1 ", ["K", "pneu1"]], Kpneu2: ["cylinder 2 ", ["K", "pneu2"]] },
