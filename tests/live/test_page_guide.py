@@ -41,9 +41,9 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
     wanted = {
         "Feel the friction": {"controller": "backstepping", "mass": 3, "stiffness_source": "scenario"},
         "Halve the stiffness": {"controller": "backstepping", "Kclx": 1000, "Kcly": 1000, "stiffness_source": "sliders"},
-        "What the force sensor buys": {"controller": "admittance-backstepping", "stiffness_source": "scenario"},
-        "What learning adds": {"controller": "residual:circle", "scenario": "circle", "mass": 4, "friction": 1.5},
-        "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1},
+        "What the force sensor buys": {"controller": "admittance-backstepping", "compare": "backstepping"},
+        "What learning adds": {"controller": "residual:circle", "compare": "backstepping", "scenario": "circle", "mass": 4},
+        "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1, "compare": "nothing"},
     }
     window.page.locator("#guide").select_option("Feel the friction")
     places = set()
@@ -58,7 +58,10 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
     window.page.locator("select[name=controller]").select_option("lqr")
     window.wait(f"{LESSON} === 'Your own settings'")
     window.page.locator("select[name=controller]").select_option("admittance-backstepping")
+    window.page.locator("select[name=compare]").select_option("backstepping")
     window.wait(f"{LESSON} === 'What the force sensor buys'")
+    window.page.locator("#guide").select_option("Feel the friction")
+    window.wait("birthsim.frame.second === null")
 
 
 def test_the_settings_are_a_link(chromium, server):
