@@ -1,9 +1,9 @@
 """A recording: rows of numbers and what was set, in one file of chunks, each readable without those that follow.
 
 A chunk is its length and the CRC-32 of its content, four bytes each, little-endian, and then its content, compressed by zlib:
-a line of JSON, and rows (T, COLUMNS) of float64 to the end. ``frames.FIELDS`` names the columns.
+a line of JSON, and rows (T, COLUMNS) of float64 to the end.
 
-first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, s between rows; no rows
+first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, names as in ``FIELDS``, s between rows
 others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost"}, the row counted from the file's first
 
 A process that is killed leaves whole chunks, and perhaps a part of one at the end, which readers leave out.
@@ -34,6 +34,9 @@ LARGEST = 2**27
 """Bytes, unpacked, that a file may hold."""
 
 EVENTS = ("settings", "path", "lost")
+
+FIRST_COLUMNS = list(FIELDS)[: list(FIELDS).index("friction")]
+"""What older files hold; they play with NaN in place of the rest."""
 
 _HEAD = struct.Struct("<II")
 
@@ -68,7 +71,7 @@ def load_recording(path: str | Path) -> Recording:
             raise ValueError("no chunk is whole")
         header = chunks[0][0]
         events = [event for said, _ in chunks[1:] for event in said["events"]]
-        return _checked(np.concatenate([rows for _, rows in chunks]), header, events)
+        return _checked(np.concatenate([numbers for _, numbers in chunks]), header, events)
     except OSError as error:
         raise ValueError(f"recording = {str(path)!r} cannot be read: {error.strerror or error}") from error
     except Exception as error:
@@ -79,7 +82,7 @@ def load_recording(path: str | Path) -> Recording:
 
 
 def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
-    """What the chunks say, and their rows; the last one is left out where it is not whole."""
+    """What the chunks say, and the numbers of their rows; the last one is left out where it is not whole."""
     place, claimed = 0, 0
     while place + _HEAD.size <= len(content):
         length, digest = _HEAD.unpack_from(content, place)
@@ -95,13 +98,17 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
         if claimed > LARGEST:
             raise ValueError(f"it holds more than {LARGEST} bytes; allowed: up to {LARGEST}")
         said, _, rows = raw.partition(b"\n")
-        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64).reshape(-1, COLUMNS)
+        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64)
 
 
-def _checked(rows: Array, header: Any, events: list[Any]) -> Recording:
-    if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("columns") != list(FIELDS):
+def _checked(numbers: Array, header: Any, events: list[Any]) -> Recording:
+    columns = header.get("columns") if isinstance(header, dict) else None
+    if columns not in (list(FIELDS), FIRST_COLUMNS) or header.get("format") != FORMAT:
         found = header.get("format") if isinstance(header, dict) else header
         raise ValueError(f"format {found!r}; allowed: {FORMAT!r}")
+    held = numbers.reshape(-1, sum(FIELDS[name] for name in columns))
+    rows = np.full((len(held), COLUMNS), math.nan)
+    rows[:, : held.shape[1]] = held
     if len(rows) == 0:
         raise ValueError("no rows; allowed: at least one")
     interval = header["interval"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,15 +38,15 @@ class Session:
     """A rig under a controller, a scenario and hands; settings change while it moves.
 
     Arguments: ``rig`` as its owner describes it, which is what the controller believes; ``settings`` to start with;
-    ``seed`` of the world, episode after episode.
+    ``seed`` of the world, episode after episode; ``policies``, folders, are choices beside those that are shipped.
 
     ``settings`` is what is set; ``lost`` says why the rig stands still, or is None; ``hands.hold`` is the person's pointer;
     ``paths`` counts the changes of the target's path; ``recorder`` takes every instant, where there is one. Time runs on
     through every change; only ``reset`` starts it anew.
     """
 
-    def __init__(self, rig: Parameters, settings: Settings | None = None, seed: int = 0) -> None:
-        self.rig, self.choices = rig, Choices(rig)
+    def __init__(self, rig: Parameters, settings: Settings | None = None, seed: int = 0, policies: Sequence[str] = ()) -> None:
+        self.rig, self.choices = rig, Choices(rig, policies)
         self.settings = settings or default_settings(rig)
         self.period = rig.electronics.control_period
         self.lost: str | None = None
