@@ -34,6 +34,8 @@ FIELDS = {
     "stiffness": ("N/m", "setpoint of the Cartesian stiffness", _PLANE),
     "pneumatic": ("N/m", "pneumatic stiffness of the cylinder", _CYLINDERS),
     "pneumatic_setpoint": ("N/m", "setpoint of the pneumatic stiffness", _CYLINDERS),
+    "friction": ("N", "friction on the piston, positive where it holds back a motion outwards", _CYLINDERS),
+    "flows": ("kg/s", "air that flows into the chamber, out of it where negative", _CHAMBERS),
 }
 """Field of a recording -> unit, meaning, and what its columns' names end with."""
 

@@ -1,10 +1,10 @@
 """A recording: rows of numbers and what was set, in one file of chunks, each readable without those that follow.
 
 A chunk is its length and the CRC-32 of its content, four bytes each, little-endian, and then its content, compressed by zlib:
-a line of JSON, and rows (T, 2 COLUMNS) of float64 to the end. ``frames.FIELDS`` names the columns, first those of the rig, then
-those of the rig beside it: NaN while there is none. Files of format 2 have one rig, in rows (T, COLUMNS).
+a line of JSON, and rows of float64 to the end: (T, 2 COLUMNS), first the rig, then the one beside it, NaN while there is none.
+Files of format 2 have one rig.
 
-first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, s between rows; no rows
+first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, names as in ``FIELDS``, s between rows
 others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost" | "second_lost"}, the row counted from the
               file's first
 
@@ -39,6 +39,9 @@ LARGEST = 2**27
 """Bytes, unpacked, that a file may hold."""
 
 EVENTS = ("settings", "path", "lost", "second_lost")
+
+FIRST_COLUMNS = list(FIELDS)[: list(FIELDS).index("friction")]
+"""What older files hold; they play with NaN in place of the rest."""
 
 _HEAD = struct.Struct("<II")
 
@@ -75,7 +78,7 @@ def load_recording(path: str | Path) -> Recording:
             raise ValueError("no chunk is whole")
         header = chunks[0][0]
         events = [event for said, _ in chunks[1:] for event in said["events"]]
-        return _checked(np.concatenate([rows for _, rows in chunks]), header, events)
+        return _checked(np.concatenate([numbers for _, numbers in chunks]), header, events)
     except OSError as error:
         raise ValueError(f"recording = {str(path)!r} cannot be read: {error.strerror or error}") from error
     except Exception as error:
@@ -106,12 +109,15 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
 
 
 def _checked(numbers: Array, header: Any, events: list[Any]) -> Recording:
-    if not isinstance(header, dict) or header.get("format") not in RIGS or header.get("columns") != list(FIELDS):
+    columns = header.get("columns") if isinstance(header, dict) else None
+    if columns not in (list(FIELDS), FIRST_COLUMNS) or header.get("format") not in RIGS:
         found = header.get("format") if isinstance(header, dict) else header
         raise ValueError(f"format {found!r}; allowed: {', '.join(map(repr, RIGS))}")
-    both = numbers.reshape(-1, RIGS[header["format"]] * COLUMNS)
-    rows = both[:, :COLUMNS]
-    second = both[:, COLUMNS:] if both.shape[1] > COLUMNS else np.full_like(rows, np.nan)
+    rigs, held = RIGS[header["format"]], sum(FIELDS[name] for name in columns)
+    several = numbers.reshape(-1, rigs, held)
+    rows, second = np.full((2, len(several), COLUMNS), math.nan)
+    rows[:, :held] = several[:, 0]
+    second[:, :held] = several[:, 1] if rigs == 2 else math.nan
     if len(rows) == 0:
         raise ValueError("no rows; allowed: at least one")
     interval = header["interval"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,8 @@ class Session:
     """A rig under a controller, a scenario and hands; settings change while it moves.
 
     Arguments: ``rig`` as its owner describes it, which is what the controller believes; ``settings`` to start with;
-    ``seed`` of the world, episode after episode; ``controller`` where that of the settings has been built already.
+    ``seed`` of the world, episode after episode; ``policies``, folders, are choices beside those that are shipped;
+    ``controller`` where that of the settings has been built already.
 
     ``settings`` is what is set; ``lost`` says why the rig stands still, or is None; ``hands.hold`` is the person's pointer;
     ``paths`` counts the changes of the target's path; ``recorder`` takes every instant, where there is one. ``second`` is the
@@ -48,9 +49,14 @@ class Session:
     """
 
     def __init__(
-        self, rig: Parameters, settings: Settings | None = None, seed: int = 0, controller: Controller | None = None
+        self,
+        rig: Parameters,
+        settings: Settings | None = None,
+        seed: int = 0,
+        policies: Sequence[str] = (),
+        controller: Controller | None = None,
     ) -> None:
-        self.rig, self.choices = rig, Choices(rig)
+        self.rig, self.choices = rig, Choices(rig, policies)
         self.settings = settings or default_settings(rig)
         self.period = rig.electronics.control_period
         self.lost: str | None = None
@@ -157,7 +163,7 @@ class Session:
     def _beside(self, controller: Controller | None) -> Session:
         """A rig with the same settings under the controller to compare with."""
         own = self.settings.model_copy(update={"controller": self.settings.compare, "compare": NOTHING})
-        return Session(self.rig, own, self._seed, controller)
+        return Session(self.rig, own, self._seed, self.choices.policies, controller)
 
     def advance(self, periods: int, until: float = math.inf) -> int:
         """Run at least one and up to ``periods`` control periods, none begun after ``until`` (``time.perf_counter``, s); how

@@ -16,7 +16,7 @@ from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES, frame_of
 from birthsim_live.rig.hand import DRAG_LIMIT, Hold, Push, drag_force
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import EVERY, Recorder
-from birthsim_live.rig.recording import load_recording, packed
+from birthsim_live.rig.recording import FIRST_COLUMNS, load_recording, packed
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
 from birthsim_live.server import live_hub
@@ -182,12 +182,14 @@ def test_a_recording_of_one_rig_of_before_is_still_played(tmp_path: Path) -> Non
         one.advance(EVERY)
         rows.append(one.row())
     header = {
-        "format": "birthsim-recording-2", "birthsim": "0.9", "rig": RIG.to_dict(), "columns": list(FIELDS), "interval": 0.004,
+        "format": "birthsim-recording-2", "birthsim": "0.9", "rig": RIG.to_dict(), "columns": FIRST_COLUMNS, "interval": 0.004,
     }  # fmt: skip
     path = tmp_path / "old.rec"
-    path.write_bytes(packed(header) + packed({"events": []}, np.array(rows)))
+    held = SLICES[FIRST_COLUMNS[-1]].stop
+    path.write_bytes(packed(header) + packed({"events": []}, np.array(rows)[:, :held]))
     recording = load_recording(path)
-    assert same(recording.rows, np.array(rows))
+    assert same(recording.rows[:, :held], np.array(rows)[:, :held])
+    assert np.isnan(recording.rows[:, held:]).all()
     assert recording.second.shape == (5, COLUMNS)
     assert Player(recording).frame()["second"] is None
     assert [one.topic for one in read_log(path).series] == ["/rig"]

@@ -69,9 +69,11 @@ def test_a_window_is_told_everything_and_then_sees_frames(live: TestClient) -> N
     with live.websocket_connect(SOCKET) as ws:
         hello = json.loads(ws.receive_text())
         assert (hello["type"], hello["protocol"], hello["mode"]) == ("hello", 1, "live")
-        assert [json.loads(ws.receive_text())["type"] for _ in range(3)] == ["settings", "state", "path"]
+        assert [json.loads(ws.receive_text())["type"] for _ in range(4)] == ["settings", "state", "path", "history"]
         assert hello["settings"]["controller"] == "admittance-backstepping"
-        assert {"name": "residual:circle", "title": "residual (circle)"} in hello["choices"]["controller"]
+        titles = {choice["name"]: choice["title"] for choice in hello["choices"]["controller"]}
+        assert titles["residual:circle"] == "residual (circle)"
+        assert all(choice["about"] for choices in hello["choices"].values() for choice in choices)
         assert set(hello["ranges"]) <= set(hello["settings"])
         assert len(hello["geometry"]["workspace"]) == 66
         assert {"pivot1", "half_stroke1", "bounds", "barrels", "head"} <= set(hello["geometry"])
@@ -175,7 +177,7 @@ def test_recording_download_and_replay(live: TestClient, tmp_path: Path) -> None
     for foreign in ("../secret.rec", "..%2fsecret.rec", "none.rec", "one.txt"):
         assert live.get(f"/recordings/{foreign}").status_code == 404
     recording = load_recording(tmp_path / name)
-    with client(ReplayHub(Player(recording))) as replay, replay.websocket_connect(SOCKET) as ws:
+    with client(ReplayHub(Player(recording), "one.rec")) as replay, replay.websocket_connect(SOCKET) as ws:
         hello = until(ws, of("hello"))
         assert hello["mode"] == "replay"
         assert hello["state"]["duration"] == recording.duration

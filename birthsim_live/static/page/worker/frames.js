@@ -2,13 +2,14 @@
 
 export const FIELDS = {
   time: 1, episode_time: 1, joints: 2, position: 2, velocity: 2, target: 2, compliant: 2, scenario_force: 2, drag_force: 2,
-  pointer: 2, pressures: 4, openings: 4, stiffness: 2, pneumatic: 2, pneumatic_setpoint: 2,
+  pointer: 2, pressures: 4, openings: 4, stiffness: 2, pneumatic: 2, pneumatic_setpoint: 2, friction: 2,
+  flows: 4,
 };
 
 const INFO = {
   joints: "piston_position", position: "position", velocity: "velocity", target: "target", compliant: "compliant_target",
   pressures: "pressure", openings: "opening", stiffness: "stiffness_setpoint", pneumatic: "pneumatic_stiffness",
-  pneumatic_setpoint: "pneumatic_stiffness_setpoint",
+  pneumatic_setpoint: "pneumatic_stiffness_setpoint", friction: "friction", flows: "flows",
 };
 
 const NOWHERE = [NaN, NaN];
