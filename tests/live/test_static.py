@@ -174,8 +174,11 @@ def test_displacement_is_force_over_stiffness(window):
     window.wait(f"birthsim.monitor.report().drawn > {drawn + 20} && birthsim.frame.real_time > 0.5")
 
 
-def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
+@pytest.mark.parametrize("compare", ["nothing", "backstepping"])
+def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path, compare):
     page = window.page
+    page.locator("select[name=compare]").select_option(compare)
+    window.wait(f"birthsim.settings.compare === '{compare}'")
     page.locator("select[name=scenario]").select_option("circle")
     page.locator("input[name=scenario_force]").check()
     window.wait("birthsim.settings.scenario === 'circle' && birthsim.settings.scenario_force")
@@ -195,13 +198,35 @@ def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
     download.value.save_as(tmp_path / "circle.rec")
     recording = load_recording(tmp_path / "circle.rec")
     begun = int(np.argmin(recording.rows[:, 0]))
-    rows = recording.rows[begun:]
+    rows = np.hstack([recording.rows, recording.second])[begun:]
     assert len(rows) > 300
     instants = np.round(rows[:, 0] / 0.001).astype(int)
-    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2]}
+    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2], "compare": compare}
     expected = rows_of(settings, int(instants[-1]))
     moved = instants > 0
-    assert same(rows[moved], expected[instants[moved] - 1])
+    assert same(rows[moved, : expected.shape[1]], expected[instants[moved] - 1])
+    assert np.isfinite(rows[moved, COLUMNS]).all() == (compare != "nothing")
+
+
+def test_one_hand_pulls_both_heads_and_keys_push_both(chromium, address):
+    with Window(chromium, f"{address}?controller=admittance-backstepping&compare=residual:circle") as window:
+        window.wait("birthsim.frame.second !== null && document.body.dataset.rigs === '2'")
+        x, y = window.value("birthsim.pixel(birthsim.frame.second.position, 1)")
+        window.page.mouse.move(x, y)
+        window.page.mouse.down()
+        window.page.mouse.move(x + 40, y, steps=6)
+        window.wait("birthsim.frame.second.force[0] > 5 && birthsim.frame.force[0] > 5")
+        frame = window.frame()
+        assert frame["pointer"] == frame["second"]["pointer"]
+        window.page.mouse.up()
+        window.wait("birthsim.frame.pointer === null && birthsim.frame.second.pointer === null")
+        window.page.keyboard.down("ArrowDown")
+        window.wait("birthsim.frame.force[1] === -20 && birthsim.frame.second.force[1] === -20")
+        window.page.keyboard.up("ArrowDown")
+        window.wait("birthsim.frame.second.force[1] === 0")
+        window.page.locator("select[name=compare]").select_option("nothing")
+        window.wait("birthsim.frame.second === null && document.body.dataset.rigs === '1'")
+        assert window.complaints == []
 
 
 def test_every_choice_runs_in_the_window(window):
