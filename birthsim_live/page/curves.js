@@ -22,7 +22,15 @@ const coordinate = (axis) => ({
   ],
 });
 
+/** Always in sight. */
 export const PLOTS = [
+  {
+    title: "error",
+    unit: "mm",
+    least: 2,
+    zero: true,
+    curves: [curve("error", [["e"]], "force", 1.8), curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED)],
+  },
   coordinate("x"),
   coordinate("y"),
   {
@@ -41,16 +49,6 @@ export const PLOTS = [
     ]),
   },
   {
-    title: "pneumatic stiffness",
-    unit: "N/m",
-    least: 1000,
-    zero: true,
-    curves: [
-      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
-      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
-    ],
-  },
-  {
     title: "rendered stiffness",
     unit: "N/m",
     least: 1000,
@@ -65,11 +63,33 @@ export const PLOTS = [
   },
 ];
 
-export const NAMES = PLOTS.flatMap((plot) => plot.curves.map(({ name }) => name));
+/** Beside the pictures of the physics. */
+export const DEEPER = [
+  {
+    title: "power",
+    unit: "W",
+    least: 2,
+    curves: [curve("power", [["P"]], "force", 1.8)],
+  },
+  {
+    title: "pneumatic stiffness",
+    unit: "N/m",
+    least: 1000,
+    zero: true,
+    curves: [
+      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
+      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
+    ],
+  },
+];
 
-/** One row of the history, in the units of the plots. */
-export function rowOf(frame) {
-  const row = {};
+/** Name of a curve -> its unit. */
+export const UNITS = Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit])));
+
+/** One row of the history, in the units of the plots; `rms` is the running one of the error, mm. */
+export function rowOf(frame, rms) {
+  const [vx, vy] = frame.velocity;
+  const row = { error: frame.error_mm, error_rms: rms, power: frame.force[0] * vx + frame.force[1] * vy };
   ["x", "y"].forEach((axis, i) => {
     row[`position_${axis}`] = MM * frame.position[i];
     row[`target_${axis}`] = MM * frame.target[i];

@@ -1,8 +1,9 @@
 // Puts the page together: what comes from the server, what is drawn when, and what the keys do.
 
-import { Connection } from "./connection.js";
-import { NAMES, rowOf } from "./curves.js";
+import { About } from "./about.js";
+import { DEEPER, PLOTS, UNITS, rowOf } from "./curves.js";
 import { Drag, keyOfTheRig } from "./drag.js";
+import { Files } from "./files.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
 import { History } from "./history.js";
@@ -10,10 +11,14 @@ import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
+import { Physics } from "./physics/panel.js";
 import { Plots } from "./plots.js";
 import { Readouts } from "./readouts.js";
+import { RunningRms } from "./rms.js";
 import { Scene } from "./scene.js";
 import { Settings } from "./settings.js";
+import { Source } from "./source.js";
+import { explain } from "./terms.js";
 import { Transport } from "./transport.js";
 
 const byId = (id) => document.getElementById(id);
@@ -24,7 +29,7 @@ const byId = (id) => document.getElementById(id);
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
  * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
  */
-const send = (message) => connection.send(message);
+const send = (message) => source.send(message);
 const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
 window.birthsim = rig;
 
@@ -32,15 +37,20 @@ const scene = new Scene(byId("rig"));
 rig.scene = scene;
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
-const history = new History(NAMES, 512, 0.025);
-const plots = new Plots(byId("plots"), history);
+const names = Object.keys(UNITS);
+const recent = new History(names, 512, 0.025);
+const whole = new History(names, 2048, 0.025);
+const rms = new RunningRms();
+const physics = new Physics(byId("physics"), byId("open-physics"));
+const plots = new Plots([[PLOTS, byId("plots")], [DEEPER, byId("deeper")]], recent);
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
 const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
 const link = new Link();
-const transport = new Transport(send, (name) => connection.address(name));
+const about = new About();
+const transport = new Transport(send, (name) => source.address(name));
 const drag = new Drag(byId("rig"), {
   scene,
   send,
@@ -53,7 +63,7 @@ const drag = new Drag(byId("rig"), {
   },
 });
 
-const connection = new Connection({
+const source = new Source({
   closed: (seconds) => {
     rig.connected = false;
     drag.release();
@@ -70,8 +80,14 @@ const connection = new Connection({
     rig.hello = message;
     rig.connected = true;
     rig.frame = null;
-    history.clear();
+    recent.clear();
+    plots.show(recent);
+    rms.clear();
     scene.setUp(message.geometry, message.air);
+    physics.setUp(message);
+    explain(message.words.figures);
+    about.setUp(message.words);
+    byId("back").hidden = !source.player;
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
@@ -85,11 +101,21 @@ const connection = new Connection({
     scene.setPath(points);
     magnifier.setPath(points);
   },
+  history: ({ frames }) => {
+    const replay = rig.hello.mode === "replay";
+    const history = replay ? whole : recent;
+    history.clear();
+    rms.clear();
+    for (const frame of frames.map(withNumbers)) history.push(frame.time, rowOf(frame, rms.push(frame.time, frame.error_mm)));
+    if (replay) plots.show(whole, rig.hello.state.duration);
+  },
   frame: (message) => {
-    rig.frame = withNumbers(message);
+    const frame = (rig.frame = withNumbers(message));
     rig.monitor.received += 1;
-    history.push(message.time, rowOf(rig.frame));
-    drag.follow(rig.frame);
+    rms.push(frame.time, frame.error_mm);
+    if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rms.value));
+    for (const part of [scene, magnifier, physics]) part.push(frame);
+    drag.follow(frame);
   },
   error: ({ message }) => notices.show(message),
 });
@@ -114,7 +140,10 @@ function withNumbers(frame) {
 function showSettings(values) {
   if (!values) return;
   rig.settings = values;
-  if (rig.hello.mode !== "live") return;
+  if (rig.hello.mode !== "live") {
+    transport.showSettings(values);
+    return;
+  }
   settings.show(values);
   guide.show(values);
   link.show(values);
@@ -147,17 +176,20 @@ function draw(now) {
   if (!frame || !state || !scene.pen) return;
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
-    scene.draw(frame, drag.held);
     magnifier.draw(frame, scene.pen.scale);
+    scene.draw(frame, drag.held, magnifier.window);
     rig.monitor.drew(frame);
     banner("lost", frame.lost ? `${frame.lost} Press R to reset.` : "");
   }
   transport.step(frame);
   gauges.step(frame.pressures, now);
-  plots.step(now);
-  if (rig.connected) readouts.step(frame, state, now);
+  physics.step(frame, now);
+  plots.step(frame.time, now);
+  if (rig.connected) readouts.step(frame, rms.value, state, now);
 }
 
+new Files({ history: () => plots.shown.history, open: (file) => source.open(file) });
+byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);
   if (!wish) return;
