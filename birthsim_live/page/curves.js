@@ -7,8 +7,11 @@ const DOTTED = [2, 3];
 const MM = 1e3;
 const BAR = 1e-5;
 
-/** `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css. */
-const curve = (name, symbol, colour, width, dash = []) => ({ name, symbol, colour, width, dash });
+/**
+ * `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css; `only`
+ * is the class of what belongs to one rig or to two.
+ */
+const curve = (name, symbol, colour, width, dash = [], { only = "" } = {}) => ({ name, symbol, colour, width, dash, only });
 const setpoints = (names, colour) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED));
 
 const coordinate = (axis) => ({
@@ -22,13 +25,18 @@ const coordinate = (axis) => ({
   ],
 });
 
+/** Always in sight. */
 export const PLOTS = [
   {
     title: "error",
     unit: "mm",
-    least: 1,
+    least: 2,
     zero: true,
-    curves: [curve("error", null, "end-effector", 1.6), curve("second_error", null, "second", 1.6, DASHED)],
+    curves: [
+      curve("error", [["e"]], "force", 1.8),
+      curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only" }),
+      curve("second_error", ["second"], "ink", 1.6, DASHED, { only: "two-only" }),
+    ],
   },
   coordinate("x"),
   coordinate("y"),
@@ -48,16 +56,6 @@ export const PLOTS = [
     ]),
   },
   {
-    title: "pneumatic stiffness",
-    unit: "N/m",
-    least: 1000,
-    zero: true,
-    curves: [
-      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
-      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
-    ],
-  },
-  {
     title: "rendered stiffness",
     unit: "N/m",
     least: 1000,
@@ -72,11 +70,38 @@ export const PLOTS = [
   },
 ];
 
-export const NAMES = PLOTS.flatMap((plot) => plot.curves.map(({ name }) => name));
+/** Beside the pictures of the physics. */
+export const DEEPER = [
+  {
+    title: "power",
+    unit: "W",
+    least: 2,
+    curves: [curve("power", [["P"]], "force", 1.8)],
+  },
+  {
+    title: "pneumatic stiffness",
+    unit: "N/m",
+    least: 1000,
+    zero: true,
+    curves: [
+      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
+      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
+    ],
+  },
+];
 
-/** One row of the history, in the units of the plots. */
-export function rowOf(frame) {
-  const row = {};
+/** Name of a curve -> its unit. */
+export const UNITS = Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit])));
+
+/** One row of the history, in the units of the plots; `rms` is the running one of the error, mm: two rigs show an error each. */
+export function rowOf(frame, rms) {
+  const [vx, vy] = frame.velocity;
+  const row = {
+    error: frame.error_mm,
+    error_rms: frame.second ? NaN : rms,
+    second_error: frame.second?.error_mm ?? NaN,
+    power: frame.force[0] * vx + frame.force[1] * vy,
+  };
   ["x", "y"].forEach((axis, i) => {
     row[`position_${axis}`] = MM * frame.position[i];
     row[`target_${axis}`] = MM * frame.target[i];
@@ -87,8 +112,6 @@ export function rowOf(frame) {
     row[`pneumatic_${i + 1}`] = frame.pneumatic[i];
     row[`pneumatic_setpoint_${i + 1}`] = frame.pneumatic_setpoint[i];
   });
-  row.error = frame.error_mm;
-  row.second_error = frame.second?.error_mm ?? NaN;
   ["P1", "N1", "P2", "N2"].forEach((name, i) => {
     row[name] = BAR * frame.pressures[i];
   });

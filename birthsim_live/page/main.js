@@ -1,7 +1,8 @@
 // Puts the page together: what comes from the server, what is drawn when, and what the keys do.
 
-import { Connection } from "./connection.js";
-import { NAMES, rowOf } from "./curves.js";
+import { About } from "./about.js";
+import { DEEPER, PLOTS, UNITS, rowOf } from "./curves.js";
+import { Files } from "./files.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
 import { Hand } from "./hand.js";
@@ -11,10 +12,13 @@ import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
+import { Physics } from "./physics/panel.js";
 import { Plots } from "./plots.js";
 import { Readouts } from "./readouts.js";
 import { Rigs } from "./rigs.js";
 import { Settings } from "./settings.js";
+import { Source } from "./source.js";
+import { explain } from "./terms.js";
 import { Transport } from "./transport.js";
 
 const byId = (id) => document.getElementById(id);
@@ -25,21 +29,25 @@ const byId = (id) => document.getElementById(id);
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
  * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures.
  */
-const send = (message) => connection.send(message);
+const send = (message) => source.send(message);
 const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [] };
 window.birthsim = rig;
 
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
-const history = new History(NAMES, 512, 0.025);
-const plots = new Plots(byId("plots"), history);
+const names = Object.keys(UNITS);
+const recent = new History(names, 512, 0.025);
+const whole = new History(names, 2048, 0.025);
+const physics = new Physics(byId("physics"), byId("open-physics"));
+const plots = new Plots([[PLOTS, byId("plots")], [DEEPER, byId("deeper")]], recent);
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
 const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
 const link = new Link();
-const transport = new Transport(send, (name) => connection.address(name));
+const about = new About();
+const transport = new Transport(send, (name) => source.address(name));
 const enabled = () => rig.connected && rig.hello.mode === "live";
 const hand = new Hand({
   send,
@@ -48,11 +56,11 @@ const hand = new Hand({
     rig.monitor.sent(id, time);
   },
 });
-const rigs = new Rigs(hand, history, { frame: () => rig.frame, enabled });
+const rigs = new Rigs(hand, { frame: () => rig.frame, enabled });
 rig.scenes = rigs.scenes;
 new Keys(hand, enabled);
 
-const connection = new Connection({
+const source = new Source({
   closed: (seconds) => {
     rig.connected = false;
     hand.release();
@@ -69,8 +77,13 @@ const connection = new Connection({
     rig.hello = message;
     rig.connected = true;
     rig.frame = null;
-    history.clear();
+    recent.clear();
+    plots.show(recent);
     rigs.setUp(message);
+    physics.setUp(message);
+    explain(message.words.figures);
+    about.setUp(message.words);
+    byId("back").hidden = !source.player;
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
@@ -84,10 +97,23 @@ const connection = new Connection({
     rigs.setPath(points);
     magnifier.setPath(points);
   },
+  history: ({ frames }) => {
+    const replay = rig.hello.mode === "replay";
+    const history = replay ? whole : recent;
+    history.clear();
+    rigs.clear();
+    for (const frame of frames.map(withNumbers)) {
+      rigs.note(frame);
+      history.push(frame.time, rowOf(frame, rigs.rms[0].value));
+    }
+    if (replay) plots.show(whole, rig.hello.state.duration);
+  },
   frame: (message) => {
-    rig.frame = withNumbers(message);
+    const frame = (rig.frame = withNumbers(message));
     rig.monitor.received += 1;
-    history.push(message.time, rowOf(rig.frame));
+    rigs.push(frame);
+    if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms[0].value));
+    for (const part of [magnifier, physics]) part.push(frame);
     hand.stay();
   },
   error: ({ message }) => notices.show(message),
@@ -114,7 +140,10 @@ function showSettings(values) {
   if (!values) return;
   rig.settings = values;
   rigs.show(values);
-  if (rig.hello.mode !== "live") return;
+  if (rig.hello.mode !== "live") {
+    transport.showSettings(values);
+    return;
+  }
   settings.show(values);
   guide.show(values);
   link.show(values);
@@ -148,18 +177,21 @@ function draw(now) {
   if (!frame || !state || !rigs.scenes[0].pen) return;
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
-    rigs.draw(frame);
     magnifier.draw(frame, rigs.scenes[0].pen.scale);
+    rigs.draw(frame, magnifier.window);
     rig.monitor.drew(frame);
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
   }
   transport.step(frame);
   rigs.step(frame, now);
   gauges.step(frame.pressures, now);
-  plots.step(now);
-  if (rig.connected) readouts.step(frame, state, now);
+  physics.step(frame, now);
+  plots.step(frame.time, now);
+  if (rig.connected) readouts.step(frame, rigs.rms[0].value, state, now);
 }
 
+new Files({ history: () => plots.shown.history, open: (file) => source.open(file) });
+byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);
   if (!wish) return;

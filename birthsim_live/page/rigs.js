@@ -2,46 +2,69 @@
 
 import { Drag } from "./drag.js";
 import { stiffness } from "./readouts.js";
+import { RunningRms } from "./rms.js";
 import { Scene } from "./scene.js";
+import { formula } from "./symbols.js";
 
 const RATE = 8; // updates of the captions per second: faster, digits cannot be read
-const SPAN = 2; // s of the running root mean square
-
-const SIDES = [
-  { place: "rig", error: "error" },
-  { place: "second-rig", error: "second_error" },
-];
+const PLACES = ["rig", "second-rig"];
+const CURVES = ["error", "second_error"];
 
 const digits = (value, places) => (Number.isFinite(value) ? value.toFixed(places) : "–");
 
 export class Rigs {
   /** `hand` is this window's; `frame()` is the newest frame, `enabled()` says whether there is a rig to hold. */
-  constructor(hand, history, { frame, enabled }) {
+  constructor(hand, { frame, enabled }) {
     this.hand = hand;
-    this.history = history;
     this.last = 0;
-    this.frames = [() => frame(), () => frame()?.second];
-    this.scenes = SIDES.map(({ place }, k) => {
-      const canvas = document.getElementById(place);
+    this.rms = PLACES.map(() => new RunningRms());
+    const canvases = PLACES.map((place) => document.getElementById(place));
+    const frames = [() => frame(), () => frame()?.second];
+    this.scenes = canvases.map((canvas, k) => {
       const scene = new Scene(canvas, { magnified: k === 0 });
-      new Drag(canvas, { scene, hand, enabled, frame: this.frames[k] });
+      new Drag(canvas, { scene, hand, enabled, frame: frames[k] });
       return scene;
     });
-    this.captions = SIDES.map(({ place }) => [...document.getElementById(place).parentElement.querySelectorAll("b, i")]);
+    this.captions = canvases.map((canvas) => [...canvas.parentElement.querySelectorAll("b, i")]);
   }
 
   setUp({ geometry, air, choices }) {
     this.titles = Object.fromEntries(choices.controller.map(({ name, title }) => [name, title]));
     for (const scene of this.scenes) scene.setUp(geometry, air);
+    this.clear();
+  }
+
+  /** Forget the past. */
+  clear() {
+    for (const rms of this.rms) rms.clear();
   }
 
   setPath(points) {
     for (const scene of this.scenes) scene.setPath(points);
   }
 
-  /** The names of both. */
+  /** The names of both, above the pictures and in the plot of the error. */
   show({ controller, compare }) {
-    [controller, compare].forEach((name, k) => this.write(k, 0, this.titles[name] ?? name));
+    const names = [controller, compare].map((name) => this.titles[name] ?? name ?? "");
+    names.forEach((name, k) => this.write(k, 0, name));
+    const alone = !this.titles[compare];
+    CURVES.forEach((curve, k) => {
+      const parts = alone ? [["e"]] : [names[k]];
+      document.querySelector(`[data-curve=${curve}] .symbol`).replaceWith(formula(parts));
+    });
+  }
+
+  /** Take note of a frame. */
+  push(frame) {
+    this.note(frame);
+    this.scenes[0].push(frame);
+    if (frame.second) this.scenes[1].push(frame.second);
+  }
+
+  /** Take note of what a frame adds to the running errors. */
+  note({ time, error_mm: error, second }) {
+    this.rms[0].push(time, error);
+    this.rms[1].push(time, second?.error_mm ?? NaN);
   }
 
   /** The hint of what to do has been followed. */
@@ -49,11 +72,12 @@ export class Rigs {
     for (const scene of this.scenes) scene.cue = false;
   }
 
-  draw(frame) {
+  /** `window` is the width of what the magnifier shows, m. */
+  draw(frame, window) {
     const two = frame.second ? "2" : "1";
     if (document.body.dataset.rigs !== two) document.body.dataset.rigs = two;
-    this.scenes[0].draw(frame, this.hand.held);
-    if (frame.second) this.scenes[1].draw(frame.second, this.hand.held);
+    this.scenes[0].draw(frame, this.hand.held, window);
+    if (frame.second) this.scenes[1].draw(frame.second, this.hand.held, window);
   }
 
   /** Called with each frame of the screen: the captions of two. */
@@ -62,7 +86,7 @@ export class Rigs {
     this.last = now;
     [frame, frame.second].forEach((one, k) => {
       this.write(k, 1, digits(one.error_mm, 2));
-      this.write(k, 2, digits(this.running(SIDES[k].error), 2));
+      this.write(k, 2, digits(this.rms[k].value, 2));
       const felt = stiffness(one);
       this.write(k, 3, felt ? Number(felt[0].toPrecision(3)).toLocaleString("en") : "–");
     });
@@ -71,13 +95,5 @@ export class Rigs {
   write(side, part, words) {
     const element = this.captions[side][part];
     if (element.textContent !== words) element.textContent = words;
-  }
-
-  /** Root mean square of a series over the last seconds. */
-  running(name) {
-    const times = this.history.view("time");
-    const first = times.findIndex((time) => time >= this.history.newest - SPAN);
-    const values = this.history.view(name).subarray(Math.max(first, 0)).filter(Number.isFinite);
-    return Math.sqrt(values.reduce((sum, value) => sum + value * value, 0) / values.length);
   }
 }

@@ -221,6 +221,5 @@ def numbers_of_the_page() -> dict[str, float]:
         "least_time": bridge.LEAST_TIME, "pace": bridge.PACE, "negligible": bridge.NEGLIGIBLE,
         "setpoint_transition": setpoints.TRANSITION, "hand_transition": hand.TRANSITION,
         "drag_limit": hand.DRAG_LIMIT, "patience": hand.PATIENCE, "drag_damping": hand.DRAG_DAMPING,
-        "least_force": frames.LEAST_FORCE, "least_given": frames.LEAST_GIVEN,
         "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
     }  # fmt: skip

@@ -1,20 +1,9 @@
 // Takes a session down and makes the file that birthsim-replay plays (birthsim_live/rig/recording.py has the format).
 
+import { crc32 } from "../crc32.js";
 import { NO_ROW, rowOf } from "./frames.js";
 
 const ROWS = 512; // in a chunk
-
-const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
-  let c = n;
-  for (let k = 0; k < 8; k += 1) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
-  return c;
-});
-
-function crc32(bytes) {
-  let c = 0xffffffff;
-  for (const byte of bytes) c = TABLE[(c ^ byte) & 255] ^ (c >>> 8);
-  return (c ^ 0xffffffff) >>> 0;
-}
 
 /** A chunk that says `said` and holds `rows`. */
 async function packed(said, rows) {
