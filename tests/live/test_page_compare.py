@@ -98,7 +98,7 @@ def test_keys_push_both_with_one_force_pause_and_reset_both(pair):
     assert pair.value("birthsim.frame.second.time === birthsim.frame.time")
 
 
-def test_both_are_recorded_and_replayed(chromium, pair, tmp_path, pictures):
+def test_both_are_recorded_replayed_by_command_and_opened_on_the_page(chromium, pair, tmp_path, pictures):
     page = pair.page
     page.locator("#record").click()
     pair.wait("birthsim.state.recording !== null")
@@ -115,14 +115,26 @@ def test_both_are_recorded_and_replayed(chromium, pair, tmp_path, pictures):
     forces = recording.second[:, SLICES["drag_force"]][:, 0]
     assert np.isfinite(forces).all()
     pulled = recording.interval * float(np.argmax(forces))
-    with Server("replay", file) as replay, Window(chromium, replay.url) as viewer:
+
+    def second_at_the_pull(viewer):
         viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
         viewer.wait(f"birthsim.state.paused && {BESIDE}")
         viewer.page.locator("#scrub").fill(str(pulled))
-        viewer.wait(f"Math.abs(birthsim.frame.time - {pulled}) < 0.05 && birthsim.frame.second.force[0] > 10")
+        viewer.wait(f"Math.abs(birthsim.frame.time - {pulled}) < 0.02 && birthsim.frame.second.force[0] > 10")
         assert viewer.value(NAMES) == ["admittance backstepping", "backstepping"]
+        return viewer.frame()["second"]
+
+    with Server("replay", file) as replay, Window(chromium, replay.url) as viewer:
+        played = second_at_the_pull(viewer)
         viewer.page.screenshot(path=pictures / "compare_replay.png")
         assert viewer.complaints == []
+    page.set_input_files("#choose", file)
+    pair.wait("birthsim.hello.mode === 'replay'")
+    opened = second_at_the_pull(pair)
+    for name in ("position", "force", "pressures", "target"):
+        assert opened[name] == pytest.approx(played[name], rel=1e-6, abs=1e-9)
+    page.locator("#back").click()
+    pair.wait(f"birthsim.hello.mode === 'live' && {BESIDE}")
 
 
 @pytest.mark.parametrize(("width", "height"), [(320, 640), (768, 1024), (1280, 800), (1366, 768)])
