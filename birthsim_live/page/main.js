@@ -188,7 +188,7 @@ function draw(now) {
   if (rig.connected) readouts.step(frame, rms.value, state, now);
 }
 
-new Files({ history: () => plots.shown.history, open: (file) => source.open(file) });
+new Files({ plots, open: (file) => source.open(file) });
 byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);

@@ -177,6 +177,11 @@ export class Plots {
     Object.assign(this.shown, { history, duration });
   }
 
+  /** Redraw all of them, those out of sight too. */
+  redraw() {
+    for (const plot of this.plots) plot.redraw();
+  }
+
   /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. `time`, s, is the frame's. */
   step(time, now) {
     this.shown.now = time;
