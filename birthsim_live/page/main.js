@@ -27,10 +27,10 @@ const byId = (id) => document.getElementById(id);
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
- * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
+ * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig, `plots` its curves.
  */
 const send = (message) => source.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null, plots: null };
 window.birthsim = rig;
 
 const scene = new Scene(byId("rig"));
@@ -43,6 +43,7 @@ const whole = new History(names, 2048, 0.025);
 const rms = new RunningRms();
 const physics = new Physics(byId("physics"), byId("open-physics"));
 const plots = new Plots([[PLOTS, byId("plots")], [DEEPER, byId("deeper")]], recent);
+rig.plots = plots;
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
@@ -185,7 +186,8 @@ function draw(now) {
   gauges.step(frame.pressures, now);
   physics.step(frame, now);
   plots.step(frame.time, now);
-  if (rig.connected) readouts.step(frame, rms.value, state, now);
+  const running = rig.hello.mode === "live" ? rms.value : whole.at("error_rms", frame.time);
+  if (rig.connected) readouts.step(frame, running, state, now);
 }
 
 new Files({ plots, open: (file) => source.open(file) });
