@@ -9,9 +9,9 @@ const BAR = 1e-5;
 
 /**
  * `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css; `only`
- * is the class of what belongs to one rig or to two.
+ * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers.
  */
-const curve = (name, symbol, colour, width, dash = [], { only = "" } = {}) => ({ name, symbol, colour, width, dash, only });
+const curve = (name, symbol, colour, width, dash = [], { only = "", unless } = {}) => ({ name, symbol, colour, width, dash, only, unless });
 const setpoints = (names, colour) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED));
 
 const coordinate = (axis) => ({
@@ -34,7 +34,7 @@ export const PLOTS = [
     zero: true,
     curves: [
       curve("error", [["e"]], "force", 1.8),
-      curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only" }),
+      curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only", unless: "second_error" }),
       curve("second_error", ["second"], "ink", 1.6, DASHED, { only: "two-only" }),
     ],
   },
@@ -90,16 +90,23 @@ export const DEEPER = [
   },
 ];
 
-/** Name of a curve -> its unit. */
-export const UNITS = Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit])));
+/** Running errors of both rigs. */
+export const RMS = ["error_rms", "second_rms"];
 
-/** One row of the history, in the units of the plots; `rms` is the running one of the error, mm: two rigs show an error each. */
+/** Name of a curve -> its unit. */
+export const UNITS = {
+  ...Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit]))),
+  second_rms: "mm",
+};
+
+/** One row of the history, in the units of the plots; `rms` are the running errors of both rigs (rms.js). */
 export function rowOf(frame, rms) {
   const [vx, vy] = frame.velocity;
   const row = {
     error: frame.error_mm,
-    error_rms: frame.second ? NaN : rms,
+    error_rms: rms[0].value,
     second_error: frame.second?.error_mm ?? NaN,
+    second_rms: frame.second ? rms[1].value : NaN,
     power: frame.force[0] * vx + frame.force[1] * vy,
   };
   ["x", "y"].forEach((axis, i) => {

@@ -23,13 +23,14 @@ function save(content, name) {
 }
 
 export class Files {
-  /** `history()` is what the plots show, `open(file)` plays a recording. */
-  constructor({ history, open }) {
+  /** `plots` are those of the page, `open(file)` plays a recording. */
+  constructor({ plots, open }) {
     const menu = byId("files");
     const opener = document.querySelector("[popovertarget=files]");
-    menu.addEventListener("beforetoggle", () => {
+    menu.addEventListener("toggle", ({ newState }) => {
+      if (newState !== "open") return;
       const { left, bottom } = opener.getBoundingClientRect();
-      menu.style.left = `${left}px`;
+      menu.style.left = `${Math.max(0, Math.min(left, innerWidth - menu.offsetWidth - 4))}px`;
       menu.style.top = `${bottom + 4}px`;
     });
     const act = (id, doing) =>
@@ -37,8 +38,11 @@ export class Files {
         menu.hidePopover();
         doing();
       });
-    act("save-csv", () => save(new Blob([csvOf(history())], { type: "text/csv" }), "birthsim.csv"));
-    act("save-png", async () => save(await pictureOf(document.querySelector("main")), "birthsim.png"));
+    act("save-csv", () => save(new Blob([csvOf(plots.shown.history)], { type: "text/csv" }), "birthsim.csv"));
+    act("save-png", async () => {
+      plots.redraw();
+      save(await pictureOf(document.querySelector("main")), "birthsim.png");
+    });
     const choice = byId("choose");
     act("open-recording", () => choice.click());
     choice.addEventListener("change", () => {

@@ -1,7 +1,7 @@
 // Puts the page together: what comes from the server, what is drawn when, and what the keys do.
 
 import { About } from "./about.js";
-import { DEEPER, PLOTS, UNITS, rowOf } from "./curves.js";
+import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
 import { Files } from "./files.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
@@ -27,10 +27,11 @@ const byId = (id) => document.getElementById(id);
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
- * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures.
+ * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures,
+ * `plots` the curves.
  */
 const send = (message) => source.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [] };
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [], plots: null };
 window.birthsim = rig;
 
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
@@ -40,6 +41,7 @@ const recent = new History(names, 512, 0.025);
 const whole = new History(names, 2048, 0.025);
 const physics = new Physics(byId("physics"), byId("open-physics"));
 const plots = new Plots([[PLOTS, byId("plots")], [DEEPER, byId("deeper")]], recent);
+rig.plots = plots;
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
@@ -104,7 +106,7 @@ const source = new Source({
     rigs.clear();
     for (const frame of frames.map(withNumbers)) {
       rigs.note(frame);
-      history.push(frame.time, rowOf(frame, rigs.rms[0].value));
+      history.push(frame.time, rowOf(frame, rigs.rms));
     }
     if (replay) plots.show(whole, rig.hello.state.duration);
   },
@@ -112,7 +114,7 @@ const source = new Source({
     const frame = (rig.frame = withNumbers(message));
     rig.monitor.received += 1;
     rigs.push(frame);
-    if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms[0].value));
+    if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms));
     for (const part of [magnifier, physics]) part.push(frame);
     hand.stay();
   },
@@ -183,14 +185,15 @@ function draw(now) {
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
   }
   transport.step(frame);
-  rigs.step(frame, now);
   gauges.step(frame.pressures, now);
   physics.step(frame, now);
   plots.step(frame.time, now);
-  if (rig.connected) readouts.step(frame, rigs.rms[0].value, state, now);
+  const running = rigs.rms.map(({ value }, k) => (rig.hello.mode === "live" ? value : whole.at(RMS[k], frame.time)));
+  rigs.step(frame, running, now);
+  if (rig.connected) readouts.step(frame, running[0], state, now);
 }
 
-new Files({ history: () => plots.shown.history, open: (file) => source.open(file) });
+new Files({ plots, open: (file) => source.open(file) });
 byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);

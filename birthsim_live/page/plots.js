@@ -121,10 +121,12 @@ class Plot {
   }
 
   redraw() {
-    const column = ({ name, only }) => {
+    const column = ({ name, only, unless }) => {
       const values = this.history.view(name);
+      if (!only && !name.startsWith("rendered")) return values;
       // uPlot leaves a gap where a value is null, and typed arrays have none.
-      return only || name.startsWith("rendered") ? Array.from(values, (value) => (Number.isNaN(value) ? null : value)) : values;
+      const other = unless && this.history.view(unless);
+      return Array.from(values, (value, k) => (Number.isNaN(value) || Number.isFinite(other?.[k]) ? null : value));
     };
     const data = [this.history.view("time"), ...this.definition.curves.map(column)];
     this.chart.setData(data);
@@ -175,6 +177,11 @@ export class Plots {
   /** Show the last seconds of a history, or, with a `duration`, s, all of it. */
   show(history, duration = null) {
     Object.assign(this.shown, { history, duration });
+  }
+
+  /** Redraw all of them, those out of sight too. */
+  redraw() {
+    for (const plot of this.plots) plot.redraw();
   }
 
   /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. `time`, s, is the frame's. */

@@ -80,13 +80,13 @@ export class Rigs {
     if (frame.second) this.scenes[1].draw(frame.second, this.hand.held, window);
   }
 
-  /** Called with each frame of the screen: the captions of two. */
-  step(frame, now) {
+  /** Called with each frame of the screen: the captions of two, `rms` their running errors, mm. */
+  step(frame, rms, now) {
     if (!frame.second || now - this.last < 1e3 / RATE) return;
     this.last = now;
     [frame, frame.second].forEach((one, k) => {
       this.write(k, 1, digits(one.error_mm, 2));
-      this.write(k, 2, digits(this.rms[k].value, 2));
+      this.write(k, 2, digits(rms[k], 2));
       const felt = stiffness(one);
       this.write(k, 3, felt ? Number(felt[0].toPrecision(3)).toLocaleString("en") : "–");
     });

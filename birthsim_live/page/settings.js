@@ -94,7 +94,7 @@ export class Settings {
     this.scenarioForce.checked = settings.scenario_force;
     const own = settings.stiffness_source === "scenario";
     this.source.disabled = own;
-    this.source.textContent = own ? "these are the scenario's" : "back to the scenario's setpoints";
+    this.source.textContent = own ? "these are the scenario's setpoints" : "back to the scenario's setpoints";
     for (const name of SETPOINTS) this.fields[name].element.classList.toggle("given", own);
     this.fields.damping.enable(settings.damping_applies, "this controller has no damping to set");
   }

@@ -42,6 +42,7 @@ export class Source {
       this.connection.send({ type: "release" });
       this.player?.stop();
       this.player = new Player(recording, hello, this.handlers);
+      this.player.start();
     } catch (error) {
       this.handlers.error(error);
     }

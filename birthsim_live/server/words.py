@@ -26,8 +26,8 @@ FIGURES = {
     "forces in the cylinders": "What the air pushes with, and the friction that holds the piston back.",
     "stiffness at the head": "Each direction has a stiffness. The ellipse is asked for; the dot is what the hand feels now, "
     "and outside the ellipse that is too stiff.",
-    "work": "What the hand has put in since it took hold, and how much of it the spring that is asked for would store. "
-    "Friction and damping took the rest; where it is negative, the air gave it.",
+    "work": "What the hand has put in since it took hold, and how much of it the spring that is asked for would store. The "
+    "rig took the rest, by friction and damping; where that is negative, it gave: a moving target carries the hand along.",
 }
 """Figure, plot or picture -> what it shows."""
 

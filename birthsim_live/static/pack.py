@@ -102,7 +102,8 @@ def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[
     return {
         "birthsim": birthsim_env.__version__,
         "hello": hello,
-        "settings": opening_settings(rig, policies).model_dump(),
+        "settings": hello["defaults"],
+        "opens": {"controller": opening_settings(rig, policies).controller},
         "stiffnesses": STIFFNESSES,
         "period": period,
         "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},

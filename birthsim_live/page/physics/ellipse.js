@@ -5,8 +5,8 @@ import * as pen from "../pen.js";
 import { Pen } from "../pen.js";
 import { Trail } from "../trail.js";
 
-const ROOM = 1.7; // so many times the larger stiffness is shown
-const MARGIN = 6; // px
+const ROOM = 1.4; // so many times the larger stiffness is shown
+const MARGIN = 3; // px
 
 /**
  * Force over displacement as a vector, N/m, or null where there is hardly any of them. For a stiffness K the vectors of all

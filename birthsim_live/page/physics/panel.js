@@ -8,7 +8,7 @@ import { drawValves } from "./valves.js";
 import { Work } from "./work.js";
 
 const RATE = 20; // redraws per second
-const FIGURES = [["power", "power of the hand", "W"], ["work", "work of the hand", "J"], ["stored", "the spring stores", "J"], ["rest", "friction and damping took", "J"]];
+const FIGURES = [["power", "power of the hand", "W"], ["work", "work of the hand", "J"], ["stored", "the spring stores", "J"], ["rest", "the rig took", "J"]];
 
 const signed = (value) => (Number.isFinite(value) ? `${value < -0.005 ? "−" : ""}${Math.abs(value).toFixed(2)}` : "–");
 

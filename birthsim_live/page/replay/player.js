@@ -8,12 +8,15 @@ const NONE = { settings: {}, path: [], lost: null, second_lost: null };
 export class Player {
   /** `hello` is the greeting of the page's own rig, whose shape is drawn; `handlers` are those of a connection. */
   constructor(recording, hello, handlers) {
-    Object.assign(this, { recording, geometry: hello.geometry, handlers, position: 0, paused: false, speed: 1, frames: 0 });
+    Object.assign(this, { recording, hello, handlers, position: 0, paused: false, speed: 1, frames: 0 });
     this.told = {};
+  }
+
+  start() {
     this.last = performance.now();
-    const news = this.news();
-    handlers.hello({ ...hello, mode: "replay", settings: news.settings.settings, state: news.state });
-    handlers.history({ frames: this.whole() });
+    const { settings, state } = this.news();
+    this.handlers.hello({ ...this.hello, mode: "replay", settings: settings.settings, state });
+    this.handlers.history({ frames: this.whole() });
     this.step(this.last);
   }
 
@@ -97,7 +100,7 @@ export class Player {
       if (held) place += size;
       return [name, values];
     }));
-    return frameOf({ ...now, time: [time] }, this.geometry);
+    return frameOf({ ...now, time: [time] }, this.hello.geometry);
   }
 
   whole() {
