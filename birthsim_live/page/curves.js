@@ -35,7 +35,7 @@ export const PLOTS = [
     curves: [
       curve("error", [["e"]], "force", 1.8),
       curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only", unless: "second_error" }),
-      curve("second_error", ["second"], "ink", 1.6, DASHED, { only: "two-only" }),
+      curve("second_error", ["second"], "beside", 1.6, DASHED, { only: "two-only" }),
     ],
   },
   coordinate("x"),
