@@ -9,6 +9,7 @@ import { formula } from "./symbols.js";
 const RATE = 8; // updates of the captions per second: faster, digits cannot be read
 const PLACES = ["rig", "second-rig"];
 const CURVES = ["error", "second_error"];
+const NOTHING = "nothing"; // to compare with
 
 const digits = (value, places) => (Number.isFinite(value) ? value.toFixed(places) : "–");
 
@@ -44,12 +45,11 @@ export class Rigs {
   }
 
   /** The names of both, above the pictures and in the plot of the error. */
-  show({ controller, compare }) {
-    const names = [controller, compare].map((name) => this.titles[name] ?? name ?? "");
+  show({ controller = "", compare = NOTHING }) {
+    const names = [controller, compare].map((name) => this.titles[name] ?? name);
     names.forEach((name, k) => this.write(k, 0, name));
-    const alone = !this.titles[compare];
     CURVES.forEach((curve, k) => {
-      const parts = alone ? [["e"]] : [names[k]];
+      const parts = compare === NOTHING ? [["e"]] : [names[k]];
       document.querySelector(`[data-curve=${curve}] .symbol`).replaceWith(formula(parts));
     });
   }
