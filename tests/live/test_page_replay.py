@@ -126,6 +126,8 @@ def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, 
         last = viewer.value("['time', 'force_x'].map((name) => birthsim.plots.shown.history.view(name).at(-1))")
         row = recording.rows[round(last[0] / recording.interval)]
         assert last[1] == pytest.approx(row[SLICES["drag_force"]][0], rel=1e-5)
+        # From its end it would play on from wherever it is put.
+        viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
         viewer.page.locator("#scrub").fill("0.4")
         viewer.wait("Math.abs(birthsim.frame.time - 0.4) < 0.02")
         shown = "Number(document.querySelector('[data-figure=error] small').textContent.match(/[\\d.]+/)[0])"
