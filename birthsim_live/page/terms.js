@@ -26,17 +26,23 @@ function open(button, name) {
   box.showPopover();
   opener = button;
   button.setAttribute("aria-expanded", "true");
-  const place = button.getBoundingClientRect();
-  const { width, height } = box.getBoundingClientRect();
-  const below = place.bottom + GAP;
-  box.style.left = `${Math.max(GAP, Math.min(place.left, innerWidth - width - GAP))}px`;
-  box.style.top = `${below + height < innerHeight ? below : Math.max(GAP, place.top - GAP - height)}px`;
+  place();
 }
 
-// It closes at Escape, at a click elsewhere, and when the page scrolls away from under it.
+function place() {
+  if (!opener) return;
+  const name = opener.getBoundingClientRect();
+  const { width, height } = box.getBoundingClientRect();
+  const below = name.bottom + GAP;
+  box.style.left = `${Math.max(GAP, Math.min(name.left, innerWidth - width - GAP))}px`;
+  box.style.top = `${below + height < innerHeight ? below : Math.max(GAP, name.top - GAP - height)}px`;
+}
+
+// It closes at Escape and at a click elsewhere.
 box.addEventListener("toggle", ({ newState }) => {
   if (newState === "open") return;
   opener?.removeAttribute("aria-expanded");
   opener = null;
 });
-addEventListener("scroll", () => opener && box.hidePopover(), { passive: true });
+addEventListener("scroll", place, { passive: true });
+addEventListener("resize", place);

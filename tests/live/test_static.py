@@ -10,6 +10,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from agents.policy.seeds import SHIPPED
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -85,7 +86,8 @@ def built(tmp_path_factory):
     """The folder, made by the command."""
     need_linker()
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
-    done = run("live", "--static", folder)
+    own = shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
+    done = run("live", "--static", folder, "--policy", own)
     assert done.returncode == 0, done.stderr
     assert f"written to {folder}" in done.stdout
     return folder
@@ -140,6 +142,7 @@ def test_the_folder_is_small_and_the_rig_moves_soon(chromium, built, address):
 
 def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(window):
     offered = window.value("birthsim.hello.choices.controller.filter(({ missing }) => !missing).map(({ name }) => name)")
+    offered = [name for name in offered if not name.endswith("own")]  # a copy of one that is shipped
     assert {"backstepping", "admittance-backstepping", "lqr", "residual:circle", "residual:circle_lab"} <= set(offered)
     pushed = {"scenario_force": True}
     cases = [{"scenario": name, "sensors": sensors} for name in SCENARIOS for sensors in SENSORS]
@@ -196,6 +199,10 @@ def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path, compare):
     with page.expect_download() as download:
         page.locator("#download").click()
     download.value.save_as(tmp_path / "circle.rec")
+    page.locator("#choose").set_input_files(tmp_path / "circle.rec")
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
+    page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live'")
     recording = load_recording(tmp_path / "circle.rec")
     begun = int(np.argmin(recording.rows[:, 0]))
     rows = np.hstack([recording.rows, recording.second])[begun:]
@@ -226,6 +233,14 @@ def test_one_hand_pulls_both_heads_and_keys_push_both(chromium, address):
         window.wait("birthsim.frame.second.force[1] === 0")
         window.page.locator("select[name=compare]").select_option("nothing")
         window.wait("birthsim.frame.second === null && document.body.dataset.rigs === '1'")
+        assert window.complaints == []
+
+
+def test_a_policy_of_ones_own_opens_the_page(chromium, address):
+    with Window(chromium, address) as window:
+        window.wait("birthsim.settings.controller.endsWith('own') && birthsim.frame.lost === null")
+        window.wait("document.querySelector('select[name=controller]').selectedOptions[0].text.includes('own')")
+        window.live(0.2)
         assert window.complaints == []
 
 
