@@ -45,7 +45,7 @@ class Past:
 
 def plotted(frame: dict[str, Any]) -> dict[str, Any]:
     """What plots need of a frame, and of the rig beside it the error."""
-    second = frame["second"]
+    second = frame.get("second")
     return {**{name: frame[name] for name in PLOTTED}, "second": second and {"error_mm": second["error_mm"]}}
 
 
