@@ -54,6 +54,7 @@ export class Guide {
       this.list.options[k].disabled = Boolean(controller) && !known.includes(controller);
     });
     this.list.options[LESSONS.length].disabled = true;
+    this.lesson = null;
   }
 
   /** The settings of a lesson: those that the page opens with, but for its own. */

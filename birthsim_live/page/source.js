@@ -4,15 +4,13 @@ import { Connection } from "./connection.js";
 import { Player, isDrawn } from "./replay/player.js";
 import { readRecording } from "./replay/file.js";
 
-const KEPT = ["settings", "state", "path"]; // what must be known again after a recording
-
 export class Source {
   /** `handlers` as of a connection. */
   constructor(handlers) {
     this.handlers = handlers;
     this.player = null;
     this.known = new Map();
-    const all = ["closed", "failed", "hello", "history", ...KEPT, "frame", "error"];
+    const all = ["closed", "failed", "hello", "history", "settings", "state", "path", "frame", "error"];
     this.connection = new Connection(Object.fromEntries(all.map((kind) => [kind, (message) => this.receive(kind, message)])));
   }
 
@@ -54,7 +52,9 @@ export class Source {
     this.player = null;
     const { known, handlers } = this;
     const hello = known.get("hello");
-    handlers.hello({ ...hello, settings: known.get("settings").settings, state: known.get("state") });
-    for (const kind of ["path", "closed", "failed"]) if (known.has(kind)) handlers[kind](known.get(kind));
+    handlers.hello({ ...hello, settings: known.get("settings")?.settings ?? hello.settings, state: known.get("state") ?? hello.state });
+    // What a rig did before is older than what it has done meanwhile; what a recording holds is not.
+    const kept = ["path", ...(hello.mode === "replay" ? ["history"] : []), "closed", "failed"];
+    for (const kind of kept) if (known.has(kind)) handlers[kind](known.get(kind));
   }
 }

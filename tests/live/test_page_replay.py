@@ -58,6 +58,7 @@ def drop(window, content, name="pull.rec"):
 
 
 def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures):
+    lesson = window.value("document.querySelector('#guide').value")
     drop(window, file.read_bytes())
     window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'pull.rec'")
     assert window.value("window.shaded && document.querySelector('#drop').hidden")
@@ -81,6 +82,7 @@ def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures)
     window.page.locator("#back").click()
     window.wait("birthsim.hello.mode === 'live' && birthsim.frame.real_time !== null")
     assert window.page.locator("#settings").is_visible()
+    assert window.value("document.querySelector('#guide').value") == lesson
     window.hold(across=30)
     window.wait("birthsim.frame.force[0] > 5")
     window.page.mouse.up()

@@ -116,5 +116,5 @@ export class Player {
 /** Whether the page can draw the rig of a recording: it has the shape of its own rig. */
 export function isDrawn({ header: { rig } }, { geometry }) {
   const own = ["d3", "d6", "k1", "k2", "gamma3"].every((name) => Math.abs(rig.geometry[name] - geometry[name]) < 1e-9);
-  return own && [1, 2].every((k) => Math.abs(rig[`cylinder${k}`].stroke / 2 - geometry[`half_stroke${k}`]) < 1e-9);
+  return own && [1, 2].every((k) => Math.abs(rig[`cylinder${k}`]?.stroke / 2 - geometry[`half_stroke${k}`]) < 1e-9);
 }
