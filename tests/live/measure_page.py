@@ -65,9 +65,9 @@ def row(run, report):
 
 
 def picture(window, path):
-    """A screenshot with something to see: the first lesson, a pull, and the plots full."""
-    window.page.locator("#guide").select_option("Feel the friction")
-    window.wait("birthsim.settings.controller === 'backstepping' && birthsim.frame.pointer === null")
+    """A screenshot with something to see: two rigs under one hand, a pull, and the plots full."""
+    window.page.locator("#guide").select_option("What the force sensor buys")
+    window.wait("birthsim.frame.second !== null && birthsim.frame.pointer === null")
     window.page.locator("#reset").click()
     window.wait("birthsim.frame.time < 1")
     window.page.locator("#reset").blur()
