@@ -21,6 +21,7 @@ from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
 from birthsim_live.server import live_hub
 from birthsim_live.server.live_hub import LiveHub
+from tests.console import run
 from tests.live.test_live_server import SOCKET, client, of, say, until
 
 RIG = Parameters()
@@ -193,6 +194,15 @@ def test_a_recording_of_one_rig_of_before_is_still_played(tmp_path: Path) -> Non
     assert recording.second.shape == (5, COLUMNS)
     assert Player(recording).frame()["second"] is None
     assert [one.topic for one in read_log(path).series] == ["/rig"]
+
+
+def test_a_command_that_compares_with_nobody_is_refused() -> None:
+    done = run("live", "--port", "0", "--compare", "nobody")
+    assert done.returncode == 2
+    assert "compare = 'nobody'; allowed: nothing, backstepping" in done.stderr.splitlines()[-1]
+    done = run("live", "--static", "page", "--compare", "pid")
+    assert done.returncode == 2
+    assert done.stderr.endswith("--compare pid beside --static; allowed: ?compare=pid in a link\n")
 
 
 def test_windows_choose_a_comparison_by_a_setting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
