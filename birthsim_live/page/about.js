@@ -7,6 +7,8 @@ export class About {
     const dialog = byId("about");
     byId("open-about").addEventListener("click", () => dialog.showModal());
     byId("close-about").addEventListener("click", () => dialog.close());
+    // The rig behind it gets no keys.
+    dialog.addEventListener("keydown", (event) => event.stopPropagation());
     // A click beside it closes it, too.
     dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   }

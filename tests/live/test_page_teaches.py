@@ -145,6 +145,10 @@ def test_about_names_paper_licence_and_version(window):
     for part in (window.value("birthsim.hello.words.version"), PAPER["words"], "MIT licence", "docs/live.md"):
         assert part in words
     assert window.page.locator("#paper-link").get_attribute("href") == PAPER["address"]
+    window.live(1.0)
+    window.page.keyboard.press("r")  # behind a dialog nothing is reset
+    window.live(0.1)
+    assert window.frame()["time"] > 1.0
     window.page.keyboard.press("Escape")
     assert not window.page.locator("#about").is_visible()
 
