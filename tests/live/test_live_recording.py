@@ -95,7 +95,8 @@ def test_playing_goes_on_to_the_end_and_between_rows(file: tuple[Path, list[dict
 def test_a_file_from_before_friction_and_flows_plays_without_them(tmp_path: Path) -> None:
     rows = np.random.default_rng(0).uniform(-0.05, 0.05, (3, COLUMNS - 6))
     header = {
-        "format": "birthsim-recording-2", "birthsim": "0", "rig": RIG.to_dict(), "columns": list(FIELDS)[:-2], "interval": 0.004,
+        "format": "birthsim-recording-2", "birthsim": "0", "rig": RIG.to_dict(), "columns": list(FIELDS)[:-2],
+        "interval": 0.004,
     }  # fmt: skip
     (tmp_path / "old.rec").write_bytes(packed(header) + packed({"events": []}, rows))
     found = load_recording(tmp_path / "old.rec")
