@@ -93,7 +93,7 @@ export class Scene {
       drawRig(world, pose, geometry, frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere))));
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
-    this.trail.draw(world, pen.END_EFFECTOR, Math.max(1.6, 2.2 * unit));
+    this.trail.draw(world, pen.INK, 1.6 * unit);
     this.drawWindow(frame.compliant, window / 2);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
