@@ -116,7 +116,7 @@ def controller_choices(policies: Sequence[str] = ()) -> list[dict[str, str]]:
             {
                 "name": f"{RESIDUAL}:{policy}",
                 "title": f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})",
-                "about": f"A policy that was trained to correct its law: {policy}.",
+                "about": f"A law and a trained policy that corrects it: {policy}.",
             }
             for policy in dict.fromkeys([*shipped_names(), *policies])
         ]

@@ -39,7 +39,7 @@ CHOICES = {
     "sensors": {
         "ideal": "Every quantity is known exactly and at once.",
         "lab": "A tracker that samples, is late and noisy, and noisy pressure cells.",
-        "honest": "The same, with every error that data sheets and cables bring; the hand's force, too.",
+        "honest": "Tracker, cells and force sensor with every error that data sheets name.",
     },
     "scenario": {name: scenario.about for name, scenario in SCENARIOS.items()},
 }
