@@ -132,7 +132,8 @@ def test_both_are_recorded_replayed_by_command_and_opened_on_the_page(chromium, 
     pair.wait("birthsim.hello.mode === 'replay'")
     opened = second_at_the_pull(pair)
     for name in ("position", "force", "pressures", "target"):
-        assert opened[name] == pytest.approx(played[name], rel=1e-6, abs=1e-9)
+        # The server rounds forces to six digits.
+        assert opened[name] == pytest.approx(played[name], rel=5e-6, abs=1e-9)
     page.locator("#back").click()
     pair.wait(f"birthsim.hello.mode === 'live' && {BESIDE}")
 
