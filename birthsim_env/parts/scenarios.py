@@ -21,13 +21,14 @@ Parts = tuple[Trajectory, UserForce, StiffnessSchedule]
 
 @dataclass(frozen=True)
 class Scenario:
-    """One experiment: its duration in s, the makers of its parts, and the version in its id."""
+    """One experiment: its duration in s, the makers of its parts, the version in its id, and what one meets in it."""
 
     title: str
     duration: float
     nominal: Callable[[], Parts]
     varied: Callable[[], Parts]
     version: int = 1
+    about: str = ""
 
 
 def _degrees(low: float, high: float) -> tuple[float, float]:
@@ -122,13 +123,31 @@ def _vacuum_varied() -> Parts:
 
 
 SCENARIOS = {
-    "circle": Scenario("Circle under pushes (Fig. 4)", 16.0, _circle, _circle_varied),
-    "probe": Scenario("Stiffness test: hold and be pushed", 7.0, _probe, _probe_varied, version=2),
-    "descent": Scenario("Fetal descent under contractions", 24.0, _descent, _descent_varied),
-    "forceps": Scenario("Forceps traction", 15.0, _forceps, _forceps_varied),
-    "dystocia": Scenario("Dystocia: the head draws back and stiffens", 16.0, _dystocia, _dystocia_varied),
-    "vacuum": Scenario("Vacuum extraction", 24.0, _vacuum, _vacuum_varied, version=0),
-}
+    "circle": Scenario(
+        "Circle under pushes (Fig. 4)", 16.0, _circle, _circle_varied,
+        about="The head runs round a circle under pushes; after 8 s the stiffness doubles.",
+    ),
+    "probe": Scenario(
+        "Stiffness test: hold and be pushed", 7.0, _probe, _probe_varied, version=2,
+        about="The head stands still and gives way to whoever pulls it.",
+    ),
+    "descent": Scenario(
+        "Fetal descent under contractions", 24.0, _descent, _descent_varied,
+        about="The head descends through the birth canal while contractions push it.",
+    ),
+    "forceps": Scenario(
+        "Forceps traction", 15.0, _forceps, _forceps_varied,
+        about="Two pulls of 175 N, as with forceps, at a head held with 4000 N/m.",
+    ),
+    "dystocia": Scenario(
+        "Dystocia: the head draws back and stiffens", 16.0, _dystocia, _dystocia_varied,
+        about="The head draws back and stiffens; three pulls follow, up to 163 N.",
+    ),
+    "vacuum": Scenario(
+        "Vacuum extraction", 24.0, _vacuum, _vacuum_varied, version=0,
+        about="A vacuum cup pulls three times, up to 241 N, while the head comes forward.",
+    ),
+}  # fmt: skip
 
 
 def environment_id(scenario: str, kind: str = "") -> str:

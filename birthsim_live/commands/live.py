@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.server.addresses import listen
 
@@ -20,6 +21,7 @@ def main() -> None:
     )
     add_address(parser, 8000)
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    parser.add_argument("--compare", metavar="CONTROLLER", help="open with a second rig under this controller beside the first")
     parser.add_argument(
         "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
     )
@@ -29,12 +31,22 @@ def main() -> None:
         metavar="FOLDER",
         help="write the page with its rig into this new folder, for any web server, and end",
     )
+    parser.add_argument(
+        "--policy",
+        nargs="+",
+        default=[],
+        metavar="DIR",
+        help="policies to choose from besides those that are shipped: folders that birthsim-train wrote; the page opens with "
+        "the first, which may be a shipped name",
+    )
     run(parser, _live)
 
 
 def _live(arguments: argparse.Namespace) -> None:
     if arguments.static is not None:
-        _build(arguments.static, arguments.parameters)
+        if arguments.compare is not None:
+            raise ValueError(f"--compare {arguments.compare} beside --static; allowed: ?compare={arguments.compare} in a link")
+        _build(arguments.static, arguments.parameters, arguments.policy)
         return
     need_server()
     # After that: both need pydantic, which comes with the extra only.
@@ -44,14 +56,29 @@ def _live(arguments: argparse.Namespace) -> None:
 
     with listen(arguments.host, arguments.port) as listening:
         rig = load_parameters(arguments.parameters)
-        session = Session(rig, opening_settings(rig))
+        _check(arguments.policy, rig)
+        session = Session(rig, opening_settings(rig, arguments.policy), policies=arguments.policy)
+        if arguments.compare is not None:
+            session.change({"compare": arguments.compare})
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
         hub = LiveHub(session, arguments.record_dir)
         serve(hub, listening, arguments.host, "birthsim-live", arguments.record_dir)
 
 
-def _build(folder: Path, parameters: str | None) -> None:
+def _check(policies: Sequence[str], rig: Parameters) -> None:
+    """``ValueError`` that names a policy which is none, or the extra that policies need."""
+    if not policies:
+        return
+    try:
+        from agents.policy.controller import ResidualController
+    except ImportError as error:
+        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+    for policy in policies:
+        ResidualController(rig, policy=policy)
+
+
+def _build(folder: Path, parameters: str | None, policies: Sequence[str]) -> None:
     try:
         # They need pydantic and safetensors, which come with extras only.
         from birthsim_live.static.build import build_page
@@ -59,7 +86,9 @@ def _build(folder: Path, parameters: str | None) -> None:
         raise ValueError(
             f"{error}; the page without a server needs extras: pip install 'birthsim[live,agents,build]'"
         ) from error
-    size = build_page(folder, load_parameters(parameters))
+    rig = load_parameters(parameters)
+    _check(policies, rig)
+    size = build_page(folder, rig, policies)
     print(f"written to {folder}: {size / 1e6:.2f} MB; python -m http.server -d {folder} shows it at http://127.0.0.1:8000")
 
 

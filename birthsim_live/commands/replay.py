@@ -31,7 +31,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     with listen(arguments.host, arguments.port) as listening:
         recording = load_recording(arguments.file)
         title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
-        serve(ReplayHub(Player(recording)), listening, arguments.host, title)
+        serve(ReplayHub(Player(recording), arguments.file.name), listening, arguments.host, title)
 
 
 if __name__ == "__main__":

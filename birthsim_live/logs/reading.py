@@ -34,6 +34,8 @@ FIELDS = {
     "stiffness": ("N/m", "setpoint of the Cartesian stiffness", _PLANE),
     "pneumatic": ("N/m", "pneumatic stiffness of the cylinder", _CYLINDERS),
     "pneumatic_setpoint": ("N/m", "setpoint of the pneumatic stiffness", _CYLINDERS),
+    "friction": ("N", "friction on the piston, positive where it holds back a motion outwards", _CYLINDERS),
+    "flows": ("kg/s", "air that flows into the chamber, out of it where negative", _CHAMBERS),
 }
 """Field of a recording -> unit, meaning, and what its columns' names end with."""
 
@@ -59,17 +61,29 @@ def read_log(path: Path) -> Log:
 
 def _recording(path: Path) -> Log:
     recording = load_recording(path)
-    columns, values = {}, {}
-    for name, (unit, meaning, ends) in FIELDS.items():
-        for end, column in zip(ends, recording.rows[:, SLICES[name]].T, strict=True):
-            columns[name + end] = Column(unit, meaning + end.replace("_", ", "))
-            values[name + end] = np.ascontiguousarray(column)
+    columns = {
+        name + end: Column(unit, meaning + end.replace("_", ", "))
+        for name, (unit, meaning, ends) in FIELDS.items()
+        for end in ends
+    }
     times: Array = recording.interval * np.arange(len(recording.rows), dtype=np.float64)
+    series = [_rig("/rig", times, recording.rows)]
+    there = np.isfinite(recording.second[:, SLICES["time"]][:, 0])
+    if there.any():
+        series.append(_rig("/second_rig", times[there], recording.second[there]))
     events = [
         Event(float(times[event["row"]]), kind, event[kind]) for event in recording.events for kind in EVENTS if kind in event
     ]
     about = {"rig": recording.rig.to_dict(), "interval": recording.interval}
-    return Log(columns, [Series("/rig", times, values)], events, about)
+    return Log(columns, series, events, about)
+
+
+def _rig(topic: str, times: Array, rows: Array) -> Series:
+    values = {}
+    for name, (_, _, ends) in FIELDS.items():
+        for end, column in zip(ends, rows[:, SLICES[name]].T, strict=True):
+            values[name + end] = np.ascontiguousarray(column)
+    return Series(topic, times, values)
 
 
 def _evaluation(content: Any) -> Log:

@@ -7,8 +7,11 @@ const DOTTED = [2, 3];
 const MM = 1e3;
 const BAR = 1e-5;
 
-/** `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css. */
-const curve = (name, symbol, colour, width, dash = []) => ({ name, symbol, colour, width, dash });
+/**
+ * `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css; `only`
+ * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers.
+ */
+const curve = (name, symbol, colour, width, dash = [], { only = "", unless } = {}) => ({ name, symbol, colour, width, dash, only, unless });
 const setpoints = (names, colour) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED));
 
 const coordinate = (axis) => ({
@@ -22,7 +25,19 @@ const coordinate = (axis) => ({
   ],
 });
 
+/** Always in sight. */
 export const PLOTS = [
+  {
+    title: "error",
+    unit: "mm",
+    least: 2,
+    zero: true,
+    curves: [
+      curve("error", [["e"]], "force", 1.8),
+      curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only", unless: "second_error" }),
+      curve("second_error", ["second"], "beside", 1.6, DASHED, { only: "two-only" }),
+    ],
+  },
   coordinate("x"),
   coordinate("y"),
   {
@@ -41,16 +56,6 @@ export const PLOTS = [
     ]),
   },
   {
-    title: "pneumatic stiffness",
-    unit: "N/m",
-    least: 1000,
-    zero: true,
-    curves: [
-      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
-      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
-    ],
-  },
-  {
     title: "rendered stiffness",
     unit: "N/m",
     least: 1000,
@@ -65,11 +70,45 @@ export const PLOTS = [
   },
 ];
 
-export const NAMES = PLOTS.flatMap((plot) => plot.curves.map(({ name }) => name));
+/** Beside the pictures of the physics. */
+export const DEEPER = [
+  {
+    title: "power",
+    unit: "W",
+    least: 2,
+    curves: [curve("power", [["P"]], "force", 1.8)],
+  },
+  {
+    title: "pneumatic stiffness",
+    unit: "N/m",
+    least: 1000,
+    zero: true,
+    curves: [
+      ...[1, 2].map((i) => curve(`pneumatic_${i}`, [["K", `pneu${i}`]], CYLINDER[i - 1], 2)),
+      ...setpoints(["pneumatic_setpoint_1", "pneumatic_setpoint_2"], "ink"),
+    ],
+  },
+];
 
-/** One row of the history, in the units of the plots. */
-export function rowOf(frame) {
-  const row = {};
+/** Running errors of both rigs. */
+export const RMS = ["error_rms", "second_rms"];
+
+/** Name of a curve -> its unit. */
+export const UNITS = {
+  ...Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit]))),
+  second_rms: "mm",
+};
+
+/** One row of the history, in the units of the plots; `rms` are the running errors of both rigs (rms.js). */
+export function rowOf(frame, rms) {
+  const [vx, vy] = frame.velocity;
+  const row = {
+    error: frame.error_mm,
+    error_rms: rms[0].value,
+    second_error: frame.second?.error_mm ?? NaN,
+    second_rms: frame.second ? rms[1].value : NaN,
+    power: frame.force[0] * vx + frame.force[1] * vy,
+  };
   ["x", "y"].forEach((axis, i) => {
     row[`position_${axis}`] = MM * frame.position[i];
     row[`target_${axis}`] = MM * frame.target[i];

@@ -15,15 +15,15 @@ const LESSONS = [
   },
   {
     name: "What the force sensor buys",
-    says: "This law measures the hand's force and moves the rig to where the spring would be. Pull again: the dot stays on the diamond.",
-    settings: { controller: "admittance-backstepping" },
-    look: ".magnified",
+    says: "The first law measures the hand's force and moves the rig to where the spring would be; the second is the paper's. Pull either head: only the first dot stays on its diamond.",
+    settings: { controller: "admittance-backstepping", compare: "backstepping" },
+    look: ".rigs",
   },
   {
     name: "What learning adds",
-    says: "A trained policy corrects the paper's law on a rig that is heavier and rougher than the law believes. Choose the controller backstepping: the error grows about fourfold.",
-    settings: { scenario: "circle", controller: "residual:circle", scenario_force: true, mass: 4, friction: 1.5 },
-    look: "[data-figure='error']",
+    says: "Both rigs are heavier and rougher than their law believes. A trained policy corrects the first; the paper's law alone errs about four times as much.",
+    settings: { scenario: "circle", controller: "residual:circle", compare: "backstepping", scenario_force: true, mass: 4, friction: 1.5 },
+    look: "[data-plot='error']",
   },
   {
     name: "Forceps pull",
@@ -34,7 +34,7 @@ const LESSONS = [
 ];
 const OWN = { name: "Your own settings", says: "Pull the head: the difference between dot and diamond is the error.", look: ".felt" };
 
-const BASE = ["scenario", "controller", "valves", "sensors", "scenario_force", "damping", "mass", "friction"];
+const BASE = ["scenario", "controller", "compare", "valves", "sensors", "scenario_force", "damping", "mass", "friction"];
 
 export class Guide {
   /** `change(settings)` asks the rig. */
@@ -54,6 +54,7 @@ export class Guide {
       this.list.options[k].disabled = Boolean(controller) && !known.includes(controller);
     });
     this.list.options[LESSONS.length].disabled = true;
+    this.lesson = null;
   }
 
   /** The settings of a lesson: those that the page opens with, but for its own. */

@@ -41,6 +41,11 @@ export class History {
     this.start = 0;
   }
 
+  /** The newest value of a series at a time; NaN before the first. */
+  at(name, time) {
+    return this.view(name)[this.view("time").findLastIndex((one) => one <= time)] ?? NaN;
+  }
+
   /** The kept values of one series, without a copy. */
   view(name) {
     return this.columns[name].subarray(this.start, this.end);

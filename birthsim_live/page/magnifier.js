@@ -1,17 +1,13 @@
-// Surroundings of the compliant target, where millimetres can be seen (birthsim_env/drawing/panel.py).
+// The error, large: the end effector seen from the compliant target, which stands in the middle (birthsim_env/drawing/panel.py).
 
 import * as pen from "./pen.js";
 import { Axis, Pen, finite } from "./pen.js";
 import { Sheet } from "./sheet.js";
+import { Trail } from "./trail.js";
 
 const WINDOWS = [0.02, 0.04, 0.08, 0.16]; // widths the magnifier may show, m
-
-/** Width of the window around `centre`, m: the smallest that holds the `others` too. */
-export function windowAround(centre, others) {
-  const offsets = others.flatMap(([x, y]) => [Math.abs(x - centre[0]), Math.abs(y - centre[1])]).filter(Number.isFinite);
-  const offset = Math.max(0, ...offsets);
-  return WINDOWS.find((window) => offset <= 0.42 * window) ?? WINDOWS.at(-1);
-}
+const EDGE = 0.42; // of the width: so far from the middle is the end effector still well inside
+const CALM = 0.3; // of the next smaller width: as near must it be for that to be shown
 
 export class Magnifier {
   /** `heading` is the element that says how many times larger the picture is. */
@@ -19,6 +15,8 @@ export class Magnifier {
     this.heading = heading;
     this.path = [];
     this.times = "";
+    this.window = WINDOWS[0];
+    this.trail = new Trail();
     this.sheet = new Sheet(canvas, { opaque: true });
   }
 
@@ -26,13 +24,27 @@ export class Magnifier {
     this.path = points;
   }
 
+  /** Take note of a frame: the trail holds errors, m. */
+  push({ time, position, compliant }) {
+    this.trail.push(time, [position[0] - compliant[0], position[1] - compliant[1]]);
+  }
+
+  /** The window grows at once, and shrinks only where the error fits well: else it would flap. */
+  fit({ compliant, position }) {
+    const offset = Math.max(...[0, 1].map((k) => Math.abs(position[k] - compliant[k])).filter(Number.isFinite), 0);
+    const least = WINDOWS.find((window) => offset <= EDGE * window) ?? WINDOWS.at(-1);
+    const calm = WINDOWS.find((window) => offset <= CALM * window) ?? WINDOWS.at(-1);
+    this.window = Math.max(least, Math.min(this.window, calm));
+  }
+
   /** `mainScale` is that of the main view, px/m. */
   draw(frame, mainScale) {
     this.sheet.check();
+    this.fit(frame);
     const { width, height, context } = this.sheet;
     if (!width) return;
     const { target, compliant, position } = frame;
-    const window = windowAround(compliant, [target, position]);
+    const { window } = this;
     const centre = [compliant, position, target].find(finite) ?? [0, 0];
     const scale = Math.min(width, height) / window;
     const world = new Pen(context, [width / 2 - scale * centre[0], height / 2 + scale * centre[1]], scale);
@@ -41,12 +53,16 @@ export class Magnifier {
     context.fillRect(0, 0, width, height);
     this.drawGrid(world, centre, step);
     world.line(this.path, pen.PATH, 2);
-    world.line([compliant, position], pen.GREY, 1.2);
+    if (finite(compliant)) this.trail.draw(world, pen.GREY, 1.5, compliant);
+    world.line([compliant, position], pen.FORCE, 1.5);
     pen.targetMarker(world, target, 9);
     pen.compliantMarker(world, compliant, 7.8);
     pen.endEffectorMarker(world, position, 4.2);
     for (const [place, colour] of [[target, pen.TARGET], [position, pen.END_EFFECTOR]]) this.pointOut(world, centre, place, colour);
     this.drawScale(world, step);
+    if (Number.isFinite(frame.error_mm)) {
+      world.text(`error ${frame.error_mm.toFixed(1)} mm`, [width - 8, 14], { align: "right", colour: pen.FORCE, weight: 700 });
+    }
     this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
   }
 

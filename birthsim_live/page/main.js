@@ -1,19 +1,24 @@
 // Puts the page together: what comes from the server, what is drawn when, and what the keys do.
 
-import { Connection } from "./connection.js";
-import { NAMES, rowOf } from "./curves.js";
-import { Drag, keyOfTheRig } from "./drag.js";
+import { About } from "./about.js";
+import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
+import { Files } from "./files.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
+import { Hand } from "./hand.js";
 import { History } from "./history.js";
+import { Keys, keyOfTheRig } from "./keys.js";
 import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
+import { Physics } from "./physics/panel.js";
 import { Plots } from "./plots.js";
 import { Readouts } from "./readouts.js";
-import { Scene } from "./scene.js";
+import { Rigs } from "./rigs.js";
 import { Settings } from "./settings.js";
+import { Source } from "./source.js";
+import { explain } from "./terms.js";
 import { Transport } from "./transport.js";
 
 const byId = (id) => document.getElementById(id);
@@ -21,48 +26,52 @@ const byId = (id) => document.getElementById(id);
 /**
  * What the page knows, for tests and for the curious:
  * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
- * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y])` the
- * place of a point (m) on the screen in CSS px from the corner of the window, `scene` the picture of the rig.
+ * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
+ * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures,
+ * `plots` the curves.
  */
-const send = (message) => connection.send(message);
-const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scene: null };
+const send = (message) => source.send(message);
+const rig = { frame: null, settings: null, state: null, hello: null, connected: false, monitor: new Monitor(), send, pixel, scenes: [], plots: null };
 window.birthsim = rig;
 
-const scene = new Scene(byId("rig"));
-rig.scene = scene;
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
 const gauges = new Gauges(byId("gauges"));
-const history = new History(NAMES, 512, 0.025);
-const plots = new Plots(byId("plots"), history);
+const names = Object.keys(UNITS);
+const recent = new History(names, 512, 0.025);
+const whole = new History(names, 2048, 0.025);
+const physics = new Physics(byId("physics"), byId("open-physics"));
+const plots = new Plots([[PLOTS, byId("plots")], [DEEPER, byId("deeper")]], recent);
+rig.plots = plots;
 const readouts = new Readouts(byId("readouts"), byId("status"), byId("spoken"));
 const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
 const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
 const link = new Link();
-const transport = new Transport(send, (name) => connection.address(name));
-const drag = new Drag(byId("rig"), {
-  scene,
+const about = new About();
+const transport = new Transport(send, (name) => source.address(name));
+const enabled = () => rig.connected && rig.hello.mode === "live";
+const hand = new Hand({
   send,
-  frame: () => rig.frame,
-  stiffness: () => rig.settings.drag_stiffness,
-  enabled: () => rig.connected && rig.hello.mode === "live",
   sent: (id, time) => {
-    scene.cue = false;
+    rigs.cued();
     rig.monitor.sent(id, time);
   },
 });
+const rigs = new Rigs(hand, { frame: () => rig.frame, enabled });
+rig.scenes = rigs.scenes;
+new Keys(hand, enabled);
 
-const connection = new Connection({
+const source = new Source({
   closed: (seconds) => {
     rig.connected = false;
-    drag.release();
+    hand.release();
     banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
     readouts.say("offline", "connection lost");
   },
   failed: ({ message }) => {
     rig.connected = false;
-    drag.release();
+    hand.release();
     banner("offline", `The rig cannot be shown: ${message}`);
     readouts.say("offline", "no rig");
   },
@@ -70,8 +79,13 @@ const connection = new Connection({
     rig.hello = message;
     rig.connected = true;
     rig.frame = null;
-    history.clear();
-    scene.setUp(message.geometry, message.air);
+    recent.clear();
+    plots.show(recent);
+    rigs.setUp(message);
+    physics.setUp(message);
+    explain(message.words.figures);
+    about.setUp(message.words);
+    byId("back").hidden = !source.player;
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
@@ -82,14 +96,27 @@ const connection = new Connection({
   settings: (message) => showSettings(message.settings),
   state: (message) => showState(message),
   path: ({ points }) => {
-    scene.setPath(points);
+    rigs.setPath(points);
     magnifier.setPath(points);
   },
+  history: ({ frames }) => {
+    const replay = rig.hello.mode === "replay";
+    const history = replay ? whole : recent;
+    history.clear();
+    rigs.clear();
+    for (const frame of frames.map(withNumbers)) {
+      rigs.note(frame);
+      history.push(frame.time, rowOf(frame, rigs.rms));
+    }
+    if (replay) plots.show(whole, rig.hello.state.duration);
+  },
   frame: (message) => {
-    rig.frame = withNumbers(message);
+    const frame = (rig.frame = withNumbers(message));
     rig.monitor.received += 1;
-    history.push(message.time, rowOf(rig.frame));
-    drag.follow(rig.frame);
+    rigs.push(frame);
+    if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms));
+    for (const part of [magnifier, physics]) part.push(frame);
+    hand.stay();
   },
   error: ({ message }) => notices.show(message),
 });
@@ -108,13 +135,17 @@ function setUpSettings(message) {
 function withNumbers(frame) {
   const number = (value) => value ?? NaN;
   const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
-  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm) };
+  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm), second: frame.second && withNumbers(frame.second) };
 }
 
 function showSettings(values) {
   if (!values) return;
   rig.settings = values;
-  if (rig.hello.mode !== "live") return;
+  rigs.show(values);
+  if (rig.hello.mode !== "live") {
+    transport.showSettings(values);
+    return;
+  }
   settings.show(values);
   guide.show(values);
   link.show(values);
@@ -132,9 +163,10 @@ function banner(id, words) {
   element.hidden = !words;
 }
 
-function pixel(point) {
-  const [x, y] = scene.pen.pixel(point);
-  const box = byId("rig").getBoundingClientRect();
+function pixel(point, k = 0) {
+  const { pen, sheet } = rigs.scenes[k];
+  const [x, y] = pen.pixel(point);
+  const box = sheet.canvas.getBoundingClientRect();
   return [box.left + x, box.top + y];
 }
 
@@ -144,20 +176,25 @@ let drawn = null;
 function draw(now) {
   requestAnimationFrame(draw);
   const { frame, state } = rig;
-  if (!frame || !state || !scene.pen) return;
+  if (!frame || !state || !rigs.scenes[0].pen) return;
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
-    scene.draw(frame, drag.held);
-    magnifier.draw(frame, scene.pen.scale);
+    magnifier.draw(frame, rigs.scenes[0].pen.scale);
+    rigs.draw(frame, magnifier.window);
     rig.monitor.drew(frame);
-    banner("lost", frame.lost ? `${frame.lost} Press R to reset.` : "");
+    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
   }
   transport.step(frame);
   gauges.step(frame.pressures, now);
-  plots.step(now);
-  if (rig.connected) readouts.step(frame, state, now);
+  physics.step(frame, now);
+  plots.step(frame.time, now);
+  const running = rigs.rms.map(({ value }, k) => (rig.hello.mode === "live" ? value : whole.at(RMS[k], frame.time)));
+  rigs.step(frame, running, now);
+  if (rig.connected) readouts.step(frame, running[0], state, now);
 }
 
+new Files({ plots, open: (file) => source.open(file) });
+byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);
   if (!wish) return;

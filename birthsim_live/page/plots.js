@@ -1,9 +1,9 @@
 // Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
 
 import uPlot from "./vendor/uPlot.esm.js";
-import { PLOTS } from "./curves.js";
 import { FONT, colour } from "./pen.js";
 import { formula } from "./symbols.js";
+import { term } from "./terms.js";
 
 const WINDOW = 8; // s
 const RATE = 15; // redraws of each plot per second, where the machine bears it
@@ -48,9 +48,10 @@ function extremes(columns) {
 }
 
 class Plot {
-  constructor(definition, history, parent) {
+  /** `shown` is what all plots show: { history, duration, now }, the latter two of a whole recording. */
+  constructor(definition, shown, parent) {
     this.definition = definition;
-    this.history = history;
+    this.shown = shown;
     this.visible = true;
     this.range = calmRange(definition.least, definition.zero);
     const figure = document.createElement("figure");
@@ -84,12 +85,19 @@ class Plot {
         { ...axis, size: 20, gap: 2, space: 45, values: (_, splits) => splits.map((s) => `${s} s`) },
         { ...axis, size: 46, gap: 4, space: 24, values: (_, splits) => splits.map((value) => String(Math.round(1e6 * value) / 1e6)) },
       ],
+      hooks: { draw: [(chart) => this.drawNow(chart)] },
       series: [{}, ...this.definition.curves.map(({ colour: name, width, dash }) => ({ stroke: () => colour(name), width, dash, points: { show: false } }))],
     };
   }
 
+  get history() {
+    return this.shown.history;
+  }
+
+  /** The whole of a recording, or the last seconds. */
   timeRange() {
-    const newest = this.history.newest;
+    if (this.shown.duration) return [0, this.shown.duration];
+    const { newest } = this.history;
     return newest > WINDOW ? [newest - WINDOW, newest] : [0, WINDOW];
   }
 
@@ -99,17 +107,26 @@ class Plot {
     return this.range(low, follow ? 1.5 * high : high);
   }
 
+  /** Where a recording is now. */
+  drawNow({ ctx: context, bbox, valToPos }) {
+    if (!this.shown.duration) return;
+    const x = Math.round(valToPos(this.shown.now, "x", true));
+    context.fillStyle = colour("accent");
+    context.fillRect(x - 1, bbox.top, 2, bbox.height);
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.place;
     if (width && height) this.chart.setSize({ width, height });
   }
 
   redraw() {
-    const gaps = this.definition.follow !== undefined;
-    const column = ({ name }) => {
+    const column = ({ name, only, unless }) => {
       const values = this.history.view(name);
+      if (!only && !name.startsWith("rendered")) return values;
       // uPlot leaves a gap where a value is null, and typed arrays have none.
-      return gaps && name.startsWith("rendered") ? Array.from(values, (value) => (Number.isNaN(value) ? null : value)) : values;
+      const other = unless && this.history.view(unless);
+      return Array.from(values, (value, k) => (Number.isNaN(value) || Number.isFinite(other?.[k]) ? null : value));
     };
     const data = [this.history.view("time"), ...this.definition.curves.map(column)];
     this.chart.setData(data);
@@ -121,7 +138,7 @@ function heading({ title, unit, curves }) {
   const caption = document.createElement("figcaption");
   const name = document.createElement("span");
   name.className = "title";
-  name.textContent = `${title} `;
+  name.append(term(title), " ");
   const inUnit = document.createElement("small");
   inUnit.textContent = unit;
   name.append(inUnit);
@@ -129,9 +146,10 @@ function heading({ title, unit, curves }) {
   return caption;
 }
 
-function key({ symbol, colour: name, width, dash }) {
+function key({ name: curve, symbol, colour: name, width, dash, only }) {
   const item = document.createElement("span");
-  item.className = "key";
+  item.className = `key ${only}`;
+  item.dataset.curve = curve;
   const space = "http://www.w3.org/2000/svg";
   const swatch = document.createElementNS(space, "svg");
   swatch.setAttribute("viewBox", "0 0 18 8");
@@ -146,16 +164,29 @@ function key({ symbol, colour: name, width, dash }) {
 }
 
 export class Plots {
-  constructor(parent, history) {
-    this.plots = PLOTS.map((definition) => new Plot(definition, history, parent));
+  /** `places`: pairs of definitions and the element that they belong into. */
+  constructor(places, history) {
+    this.shown = { history, duration: null, now: 0 };
+    this.plots = places.flatMap(([definitions, parent]) => definitions.map((definition) => new Plot(definition, this.shown, parent)));
     this.next = 0;
     this.due = 0;
     this.share = 1;
     this.last = performance.now();
   }
 
-  /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. */
-  step(now) {
+  /** Show the last seconds of a history, or, with a `duration`, s, all of it. */
+  show(history, duration = null) {
+    Object.assign(this.shown, { history, duration });
+  }
+
+  /** Redraw all of them, those out of sight too. */
+  redraw() {
+    for (const plot of this.plots) plot.redraw();
+  }
+
+  /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. `time`, s, is the frame's. */
+  step(time, now) {
+    this.shown.now = time;
     const visible = this.plots.filter((plot) => plot.visible);
     const gap = now - this.last;
     this.last = now;

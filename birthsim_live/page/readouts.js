@@ -1,18 +1,19 @@
 // Figures under the rig, and the line that says how the machine keeps up.
 
+import { LEAST_FORCE, LEAST_GIVEN } from "./frame.js";
 import { formula } from "./symbols.js";
+import { term } from "./terms.js";
 
 const RATE = 8; // updates per second: faster, digits cannot be read
 const WRITTEN_GAP = 2000; // ms between changes of the status line
 const SPOKEN_GAP = 10000; // ms between words on how the machine keeps up: a busy one falls behind again and again
 const PACES = ["well", "slow"];
 const KEEPS_UP = 0.98;
-const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
-const LEAST_GIVEN = 1e-4;
 
 const signed = (value, digits) =>
   Number.isFinite(value) ? `${value < 0 || Object.is(Math.round(value * 10 ** digits), -0) ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
 const pair = (values, digits, factor = 1) => values.map((value) => signed(factor * value, digits)).join("  ");
+const plain = (value) => (Number.isFinite(value) ? value.toFixed(2) : "–");
 const difference = (a, b) => [a[0] - b[0], a[1] - b[1]];
 
 /**
@@ -39,7 +40,7 @@ const FIGURES = [
   ["user force", [["F", "us,x"], ", ", ["F", "us,y"]], "N", (frame) => pair(frame.force, 1)],
   ["displacement", [["x", "c"], " − ", ["x", "t"], ", ", ["y", "c"], " − ", ["y", "t"]], "mm", (frame) => pair(difference(frame.position, frame.target), 1, 1e3)],
   ["force over stiffness", [["F", "us"], "/", ["K", "cl"]], "mm", (frame) => pair(difference(frame.compliant, frame.target), 1, 1e3)],
-  ["error", [], "mm", (frame) => (Number.isFinite(frame.error_mm) ? frame.error_mm.toFixed(2) : "–")],
+  ["error", [], "", (frame, rms) => [plain(frame.error_mm), ` mm, RMS ${plain(rms)}`]],
 ];
 
 export class Readouts {
@@ -52,14 +53,14 @@ export class Readouts {
     this.told = { kind: null, at: -Infinity };
     this.values = FIGURES.map(([title, symbol, unit], i) => {
       const box = document.createElement("div");
-      const term = document.createElement("dt");
-      term.append(`${title} `, formula(symbol));
+      const name = document.createElement("dt");
+      name.append(term(title), " ", formula(symbol));
       const value = document.createElement("dd");
       const digits = document.createElement("span");
       const inUnit = document.createElement("small");
       inUnit.textContent = ` ${unit}`;
       value.append(digits, inUnit);
-      box.append(term, value);
+      box.append(name, value);
       box.dataset.figure = title;
       if (i === 0) box.className = "felt";
       list.append(box);
@@ -67,11 +68,12 @@ export class Readouts {
     });
   }
 
-  step(frame, state, now) {
+  /** `rms` of the error, mm. */
+  step(frame, rms, state, now) {
     if (now - this.last < 1e3 / RATE) return;
     this.last = now;
     FIGURES.forEach(([, , , words], i) => {
-      [words(frame)].flat().forEach((text, k) => {
+      [words(frame, rms)].flat().forEach((text, k) => {
         if (this.values[i][k].textContent !== text) this.values[i][k].textContent = text;
       });
     });

@@ -2,9 +2,9 @@
 
 import * as pen from "./pen.js";
 import { Pen } from "./pen.js";
-import { windowAround } from "./magnifier.js";
 import { chamberNames, drawGround, drawRig, extent, noteOf, poseOf } from "./rig.js";
 import { Sheet } from "./sheet.js";
+import { Trail } from "./trail.js";
 
 const MARGIN = 10;
 const STRIP = 8; // px below the rig, for scale bar and notes
@@ -14,10 +14,13 @@ const STILL = matchMedia("(prefers-reduced-motion: reduce)");
 const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
 
 export class Scene {
-  constructor(canvas) {
+  /** `magnified`: a frame shows what the magnifier does, and until somebody has pulled a hint shows what to do. */
+  constructor(canvas, { magnified }) {
     this.geometry = null;
     this.path = [];
-    this.cue = true; // shows what to do until somebody has done it
+    this.trail = new Trail();
+    this.magnified = magnified;
+    this.cue = magnified;
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
     pen.onNightfall(() => this.layOut());
   }
@@ -70,8 +73,16 @@ export class Scene {
     return Math.max(1.1 * this.geometry.head.radius * this.pen.scale, coarse ? 34 : 18);
   }
 
-  /** `held` is the offset, m, from end effector to the place where this window holds it, or null. */
-  draw(frame, held) {
+  /** Take note of a frame: the trail holds the way of the end effector. */
+  push({ time, position }) {
+    this.trail.push(time, position);
+  }
+
+  /**
+   * `held` is the offset, m, from end effector to the place where this window holds it, or null; `window` the width, m, of
+   * what the magnifier shows.
+   */
+  draw(frame, held, window) {
     if (!this.pen) return;
     this.sheet.check();
     const { pen: world, unit, geometry } = this;
@@ -84,7 +95,8 @@ export class Scene {
       drawRig(world, pose, geometry, frame.pressures.map((p) => pen.airColour((p - atmosphere) / (supply - atmosphere))));
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
-    this.drawWindow(frame);
+    this.trail.draw(world, pen.INK, 1.6 * unit);
+    if (this.magnified) this.drawWindow(frame.compliant, window / 2);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);
@@ -98,9 +110,7 @@ export class Scene {
   }
 
   /** Frame of what the magnifier shows. */
-  drawWindow(frame) {
-    const half = windowAround(frame.compliant, [frame.target, frame.position]) / 2;
-    const [x, y] = frame.compliant;
+  drawWindow([x, y], half) {
     this.pen.line([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half], [x - half, y - half]], pen.GREY, 0.8);
   }
 

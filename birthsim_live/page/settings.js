@@ -2,7 +2,7 @@
 
 import { NumberField } from "./slider.js";
 
-const LISTS = { scenario: "Scenario", controller: "Controller", valves: "Valves", sensors: "Sensors" };
+const LISTS = { scenario: "Scenario", controller: "Controller", compare: "Compare", valves: "Valves", sensors: "Sensors" };
 const GROUPS = {
   "Rendered stiffness": { Kclx: ["along x ", ["K", "clx"]], Kcly: ["along y ", ["K", "cly"]] },
   "Pneumatic stiffness": { Kpneu1: ["cylinder 1 ", ["K", "pneu1"]], Kpneu2: ["cylinder 2 ", ["K", "pneu2"]] },
@@ -25,7 +25,10 @@ export class Settings {
     this.fields = {};
     const lists = group("Experiment");
     for (const [name, title] of Object.entries(LISTS)) lists.append(this.list(name, title, choices[name]));
-    lists.append(this.ownHand());
+    this.about = document.createElement("p");
+    this.about.className = "chosen";
+    this.about.id = "chosen";
+    lists.append(this.about, this.ownHand());
     this.form.append(lists);
     for (const [title, names] of Object.entries(GROUPS)) {
       const box = group(title);
@@ -43,16 +46,26 @@ export class Settings {
     label.className = "list";
     const select = document.createElement("select");
     select.name = name;
-    for (const choice of choices) {
-      const { name: value, title: words = value, missing } = typeof choice === "string" ? { name: choice } : choice;
-      const option = new Option(missing ? `${words} (${missing})` : words.replaceAll("_", " "), value);
+    select.setAttribute("aria-describedby", "chosen");
+    for (const { name: value, title: words, about, missing } of choices) {
+      const option = new Option(missing ? `${words} (${missing})` : words, value);
       option.disabled = Boolean(missing);
+      option.title = about;
       select.add(option);
     }
     select.addEventListener("change", () => this.change({ [name]: select.value }));
+    for (const type of ["focus", "pointerenter"]) select.addEventListener(type, () => this.tell(name));
     label.append(title, select);
     this.lists[name] = select;
     return label;
+  }
+
+  /** Say what is chosen in a list. */
+  tell(name) {
+    this.told = name;
+    const { options, selectedIndex } = this.lists[name];
+    const words = options[selectedIndex]?.title ?? "";
+    if (this.about.textContent !== words) this.about.textContent = words;
   }
 
   ownHand() {
@@ -76,6 +89,7 @@ export class Settings {
 
   show(settings) {
     for (const name in this.lists) this.lists[name].value = settings[name];
+    this.tell(this.told ?? "controller");
     for (const name in this.fields) this.fields[name].show(settings[name]);
     this.scenarioForce.checked = settings.scenario_force;
     const own = settings.stiffness_source === "scenario";

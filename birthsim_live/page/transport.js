@@ -1,4 +1,4 @@
-// Pause, reset, slow motion, recording, and the scrubber of a replay.
+// Pause, reset, slow motion, recording; of a replay its file, settings and scrubber.
 
 const byId = (id) => document.getElementById(id);
 
@@ -58,8 +58,18 @@ export class Transport {
       speed.add(new Option(`1 : ${Number((1 / state.speed).toPrecision(3))}`, state.speed));
     }
     speed.value = state.speed;
-    if (this.replay) this.scrub.max = this.duration = state.duration;
-    else this.showRecording(state);
+    if (this.replay) {
+      this.scrub.max = this.duration = state.duration;
+      byId("file").textContent = state.file;
+    } else this.showRecording(state);
+  }
+
+  /** The settings of a replay at its present instant, in words. */
+  showSettings(settings) {
+    const words = ["scenario", "controller", "valves", "sensors"].filter((name) => settings[name]).map((name) => settings[name].replaceAll("_", " "));
+    const numbers = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"].filter((name) => settings[name]).map((name) => `${name} ${settings[name]} N/m`);
+    const rig = settings.mass ? [`mass ${settings.mass} kg`, `friction × ${settings.friction}`] : [];
+    byId("played").textContent = [...words, ...numbers, ...rig].join(" · ");
   }
 
   showRecording({ recording, last_recording: last }) {

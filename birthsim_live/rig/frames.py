@@ -14,6 +14,7 @@ from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Simulation
+from birthsim_live.rig import inside
 from birthsim_live.rig.hand import Hands
 
 FIELDS = {
@@ -32,6 +33,8 @@ FIELDS = {
     "stiffness": 2,
     "pneumatic": 2,
     "pneumatic_setpoint": 2,
+    "friction": 2,
+    "flows": 4,
 }
 """Name -> how many numbers, SI units; a pointer that is not there is NaN."""
 
@@ -48,13 +51,15 @@ def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
     now, plant, rows = simulation, simulation.plant, np.empty((ROWS, 1))
     rig = plant.lane_parameters
     describe(now.time, now.since_jump, plant.state, now.motion, now.reference.rows, now.force, now.impacts, rig, rows)
-    info = single_info(rows)
+    info, within = single_info(rows), np.empty((inside.ROWS, 1))
+    inside.look_inside(plant.state, rig, within)
     hold = hands.hold
-    pointer = (math.nan, math.nan) if hold is None else hold.position
+    pointer = (math.nan, math.nan) if hold is None else hold.pointer(plant.end_effector()[:2, 0], hands.stiffness)
     parts: Sequence[Any] = (
         info["time"], episode_time, info["piston_position"], info["position"], info["velocity"], info["target"],
         info["compliant_target"], hands.scenario_now, hands.drag_now, pointer, info["pressure"], info["opening"],
         info["stiffness_setpoint"], info["pneumatic_stiffness"], info["pneumatic_stiffness_setpoint"],
+        within[:, 0],
     )  # fmt: skip
     return np.concatenate([np.atleast_1d(part) for part in parts])
 

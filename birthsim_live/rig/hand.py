@@ -28,24 +28,53 @@ TRANSITION = 0.1
 
 def drag_force(pointer: Array, position: Array, velocity: Array, stiffness: float) -> Array:
     """Force of the person's hand, N: spring and damper from ``position`` to ``pointer``, m, no more than ``DRAG_LIMIT``."""
-    pull = stiffness * (pointer - position) - DRAG_DAMPING * velocity
+    return limited(stiffness * (pointer - position) - DRAG_DAMPING * velocity)
+
+
+def limited(pull: Array) -> Array:
+    """A force (2,), N, shortened to ``DRAG_LIMIT`` where it is larger."""
     size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])  # as the page without a server: hypot rounds otherwise
     return np.asarray(pull * (DRAG_LIMIT / size) if size > DRAG_LIMIT else pull)
 
 
 @dataclass(frozen=True)
 class Hold:
-    """The pointer is at ``position`` (2,), m, since the drag ``id``."""
+    """The person's hand is at ``position`` (2,), m, since the message ``id``: several rigs feel one place of the hand."""
 
     position: Array
     id: int
+
+    def force(self, position: Array, velocity: Array, stiffness: float) -> Array:
+        """What an end effector feels, N, (2,)."""
+        return drag_force(self.position, position, velocity, stiffness)
+
+    def pointer(self, position: Array, stiffness: float) -> Array:
+        """Where the spring from an end effector ends, m, (2,)."""
+        return self.position
+
+
+@dataclass(frozen=True)
+class Push:
+    """The person's hand pushes with ``newtons`` (2,) since the message ``id``: several rigs feel one force."""
+
+    newtons: Array
+    id: int
+
+    def force(self, position: Array, velocity: Array, stiffness: float) -> Array:
+        """What an end effector feels, N, (2,)."""
+        return limited(self.newtons)
+
+    def pointer(self, position: Array, stiffness: float) -> Array:
+        """Where a spring with this force would end, m, (2,)."""
+        return np.asarray(position + self.newtons / stiffness)
 
 
 class Hands(UserForce):
     """The scenario's force, where it is wanted, and the person's, on one lane.
 
-    ``hold`` is where the person's hand is, or None, and may be set from another thread; ``stiffness``, N/m, is that of its
-    spring. ``scenario_now`` and ``drag_now`` (2,) are the two forces as last asked for, N, the latter with drag ``used``.
+    ``hold`` is what the person's hand does, or None, and may be set from another thread; ``stiffness``, N/m, is that of its
+    spring. ``scenario_now`` and ``drag_now`` (2,) are the two forces as last asked for, N, the latter of the hold ``felt``;
+    ``used`` is the last hold's id.
     """
 
     closed_loop = True
@@ -54,7 +83,8 @@ class Hands(UserForce):
         self._force, self.wanted, self.stiffness = force, wanted, stiffness
         self.jump_rate = force.jump_rate
         self.begins = 0.0
-        self.hold: Hold | None = None
+        self.hold: Hold | Push | None = None
+        self.felt: Hold | Push | None = None
         self.used: int | None = None
         self.scenario_now: Array = np.zeros(2)
         self.drag_now: Array = np.zeros(2)
@@ -75,11 +105,11 @@ class Hands(UserForce):
         if self._fade is not None and not self._fade.over(now):
             forces[0, :, 0] += self._fade.sample(now)[0]
         self.scenario_now = forces[0, :, 0].copy()
-        hold = self.hold
+        hold = self.felt = self.hold
         if hold is None:
             self.drag_now = np.zeros(2)
         else:
-            self.drag_now, self.used = drag_force(hold.position, position[:, 0], velocity[:, 0], self.stiffness), hold.id
+            self.drag_now, self.used = hold.force(position[:, 0], velocity[:, 0], self.stiffness), hold.id
             forces[0, :, 0] += self.drag_now
         return forces
 

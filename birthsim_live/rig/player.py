@@ -5,6 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Any
 
+import numpy as np
+
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.frames import SLICES, frame_of
 from birthsim_live.rig.recording import EVENTS, Recording
@@ -47,17 +49,24 @@ class Player:
 
     def row(self) -> Array:
         """The present instant, between two rows on a straight line; its time is that of the recording."""
-        k, part = self._place()
-        rows = self.recording.rows
-        here, there = rows[k], rows[min(k + 1, len(rows) - 1)]
-        # A pointer that is not there (NaN) before or after is not there between.
-        row: Array = here + part * (there - here) if part > ROUNDING else here.copy()
-        row[SLICES["time"]] = self.position
-        return row
+        return self._between(self.recording.rows)
 
     def frame(self) -> dict[str, Any]:
         """The present instant as the page shows it."""
-        return {**frame_of(self.row(), self.recording.rig), "pointer_id": None, "lost": self.event("lost")}
+        second = self._between(self.recording.second)
+        there = bool(np.isfinite(second[SLICES["episode_time"]]).all())
+        return {**self._shown(self.row(), "lost"), "second": self._shown(second, "second_lost") if there else None}
+
+    def _shown(self, row: Array, lost: str) -> dict[str, Any]:
+        return {**frame_of(row, self.recording.rig), "pointer_id": None, "lost": self.event(lost)}
+
+    def _between(self, rows: Array) -> Array:
+        k, part = self._place()
+        here, there = rows[k], rows[min(k + 1, len(rows) - 1)]
+        # A pointer that is not there (NaN) before or after is not there between, and neither is a second rig.
+        row: Array = here + part * (there - here) if part > ROUNDING else here.copy()
+        row[SLICES["time"]] = self.position
+        return row
 
     def _place(self) -> tuple[int, float]:
         """The row before the present instant, and how far it is to the next."""

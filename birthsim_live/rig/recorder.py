@@ -14,11 +14,14 @@ import numpy as np
 import birthsim_env
 from baselines.work.files import whole_file
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_live.rig.frames import FIELDS
+from birthsim_live.rig.frames import COLUMNS, FIELDS
 from birthsim_live.rig.recording import FORMAT, packed
 
 if TYPE_CHECKING:
     from birthsim_live.rig.session import Session
+
+NO_SECOND = np.full(COLUMNS, np.nan)
+"""Columns of a second rig that is not there."""
 
 EVERY = 4
 """Control periods between rows."""
@@ -42,7 +45,7 @@ class Recorder:
         self._rig, self._interval = session.rig, EVERY * session.period
         self._rows: list[Array] = []
         self._events: list[dict[str, Any]] = []
-        self._known: dict[str, Any] = {}
+        self._known: dict[str, Any] = {"second_lost": None}
         self._paths, self._periods, self._count, self._length = -1, 0, 0, 0
         self._notes, self._disk = threading.Lock(), threading.Lock()
         self._file: FileIO | None = None
@@ -69,8 +72,10 @@ class Recorder:
                 if self._paths != session.paths:
                     self._paths = session.paths
                     self._note("path", session.path())
+                second = session.second
                 self._note("lost", session.lost)
-                self._rows.append(session.row())
+                self._note("second_lost", None if second is None else second.lost)
+                self._rows.append(np.concatenate([session.row(), NO_SECOND if second is None else second.row()]))
                 self._count += 1
         self._periods += 1
 

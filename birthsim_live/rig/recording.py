@@ -1,10 +1,12 @@
 """A recording: rows of numbers and what was set, in one file of chunks, each readable without those that follow.
 
 A chunk is its length and the CRC-32 of its content, four bytes each, little-endian, and then its content, compressed by zlib:
-a line of JSON, and rows (T, COLUMNS) of float64 to the end. ``frames.FIELDS`` names the columns.
+a line of JSON, and rows of float64 to the end: (T, 2 COLUMNS), first the rig, then the one beside it, NaN while there is none.
+Files of format 2 have one rig.
 
-first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, s between rows; no rows
-others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost"}, the row counted from the file's first
+first chunk   {"format", "birthsim", "rig", "columns", "interval"}: version, rig, names as in ``FIELDS``, s between rows
+others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost" | "second_lost"}, the row counted from the
+              file's first
 
 A process that is killed leaves whole chunks, and perhaps a part of one at the end, which readers leave out.
 """
@@ -26,26 +28,34 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.frames import COLUMNS, FIELDS
 
-FORMAT = "birthsim-recording-2"
+FORMAT = "birthsim-recording-3"
+
+RIGS = {"birthsim-recording-2": 1, FORMAT: 2}
+"""Format -> how many rigs a row holds."""
 
 SUFFIX = ".rec"
 
 LARGEST = 2**27
 """Bytes, unpacked, that a file may hold."""
 
-EVENTS = ("settings", "path", "lost")
+EVENTS = ("settings", "path", "lost", "second_lost")
+
+FIRST_COLUMNS = list(FIELDS)[: list(FIELDS).index("friction")]
+"""What older files hold; they play with NaN in place of the rest."""
 
 _HEAD = struct.Struct("<II")
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What a file holds: the rig, rows (T, COLUMNS) every ``interval`` s, and events in the order of their rows."""
+    """What a file holds: the rig, rows (T, COLUMNS) every ``interval`` s, events in the order of their rows, and the rows of
+    the rig beside it (T, COLUMNS), NaN where there is none."""
 
     rig: Parameters
     rows: Array
     interval: float
     events: list[dict[str, Any]]
+    second: Array
 
     @property
     def duration(self) -> float:
@@ -54,7 +64,7 @@ class Recording:
 
 
 def packed(said: dict[str, Any], rows: Array | None = None) -> bytes:
-    """A chunk that says ``said`` and holds ``rows`` (T, COLUMNS)."""
+    """A chunk that says ``said`` and holds ``rows`` (T, 2 COLUMNS)."""
     content = json.dumps(said).encode() + b"\n" + (b"" if rows is None else rows.astype("<f8").tobytes())
     content = zlib.compress(content, 1)
     return _HEAD.pack(len(content), zlib.crc32(content)) + content
@@ -68,7 +78,7 @@ def load_recording(path: str | Path) -> Recording:
             raise ValueError("no chunk is whole")
         header = chunks[0][0]
         events = [event for said, _ in chunks[1:] for event in said["events"]]
-        return _checked(np.concatenate([rows for _, rows in chunks]), header, events)
+        return _checked(np.concatenate([numbers for _, numbers in chunks]), header, events)
     except OSError as error:
         raise ValueError(f"recording = {str(path)!r} cannot be read: {error.strerror or error}") from error
     except Exception as error:
@@ -79,7 +89,7 @@ def load_recording(path: str | Path) -> Recording:
 
 
 def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
-    """What the chunks say, and their rows; the last one is left out where it is not whole."""
+    """What the chunks say, and the numbers of their rows; the last one is left out where it is not whole."""
     place, claimed = 0, 0
     while place + _HEAD.size <= len(content):
         length, digest = _HEAD.unpack_from(content, place)
@@ -95,13 +105,19 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
         if claimed > LARGEST:
             raise ValueError(f"it holds more than {LARGEST} bytes; allowed: up to {LARGEST}")
         said, _, rows = raw.partition(b"\n")
-        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64).reshape(-1, COLUMNS)
+        yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64)
 
 
-def _checked(rows: Array, header: Any, events: list[Any]) -> Recording:
-    if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("columns") != list(FIELDS):
+def _checked(numbers: Array, header: Any, events: list[Any]) -> Recording:
+    columns = header.get("columns") if isinstance(header, dict) else None
+    if columns not in (list(FIELDS), FIRST_COLUMNS) or header.get("format") not in RIGS:
         found = header.get("format") if isinstance(header, dict) else header
-        raise ValueError(f"format {found!r}; allowed: {FORMAT!r}")
+        raise ValueError(f"format {found!r}; allowed: {', '.join(map(repr, RIGS))}")
+    rigs, held = RIGS[header["format"]], sum(FIELDS[name] for name in columns)
+    several = numbers.reshape(-1, rigs, held)
+    rows, second = np.full((2, len(several), COLUMNS), math.nan)
+    rows[:, :held] = several[:, 0]
+    second[:, :held] = several[:, 1] if rigs == 2 else math.nan
     if len(rows) == 0:
         raise ValueError("no rows; allowed: at least one")
     interval = header["interval"]
@@ -113,9 +129,9 @@ def _checked(rows: Array, header: Any, events: list[Any]) -> Recording:
     for event in events:
         kinds = [kind for kind in EVENTS if kind in event]
         if len(event) != 2 or len(kinds) != 1 or not last <= event["row"] < len(rows) or not _fits(kinds[0], event[kinds[0]]):
-            raise ValueError(f"event {str(event)[:80]}; allowed: a row in order, and settings, a path or lost")
+            raise ValueError(f"event {str(event)[:80]}; allowed: a row in order, and {', '.join(EVENTS)}")
         last = event["row"]
-    return Recording(Parameters.from_dict(header["rig"]), rows, interval, events)
+    return Recording(Parameters.from_dict(header["rig"]), rows, interval, events, second)
 
 
 def _fits(kind: str, value: Any) -> bool:

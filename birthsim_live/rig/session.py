@@ -1,10 +1,10 @@
-"""One rig that a person plays with: no web and no clock, only control periods one after the other."""
+"""A rig that a person plays with, and one beside it to compare: no web, no clock, only control periods one after the other."""
 
 from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from birthsim_live.rig.hand import Hands
 from birthsim_live.rig.recorder import Recorder
 from birthsim_live.rig.sensing import ExchangeableSensors
 from birthsim_live.rig.setpoints import Setpoints
-from birthsim_live.rig.settings import STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
+from birthsim_live.rig.settings import NOTHING, STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
 
 PATH_POINTS = 400
 
@@ -38,21 +38,32 @@ class Session:
     """A rig under a controller, a scenario and hands; settings change while it moves.
 
     Arguments: ``rig`` as its owner describes it, which is what the controller believes; ``settings`` to start with;
-    ``seed`` of the world, episode after episode.
+    ``seed`` of the world, episode after episode; ``policies``, folders, are choices beside those that are shipped;
+    ``controller`` where that of the settings has been built already.
 
     ``settings`` is what is set; ``lost`` says why the rig stands still, or is None; ``hands.hold`` is the person's pointer;
-    ``paths`` counts the changes of the target's path; ``recorder`` takes every instant, where there is one. Time runs on
-    through every change; only ``reset`` starts it anew.
+    ``paths`` counts the changes of the target's path; ``recorder`` takes every instant, where there is one. ``second`` is the
+    rig beside it, under the controller ``settings.compare``: it has the same world, settings and hand, and lives through the
+    same control periods. Time runs on through every change but one: what is compared starts anew, so that both rigs have
+    one past. ``reset`` starts anew whatever is set.
     """
 
-    def __init__(self, rig: Parameters, settings: Settings | None = None, seed: int = 0) -> None:
-        self.rig, self.choices = rig, Choices(rig)
+    def __init__(
+        self,
+        rig: Parameters,
+        settings: Settings | None = None,
+        seed: int = 0,
+        policies: Sequence[str] = (),
+        controller: Controller | None = None,
+    ) -> None:
+        self.rig, self.choices = rig, Choices(rig, policies)
         self.settings = settings or default_settings(rig)
         self.period = rig.electronics.control_period
         self.lost: str | None = None
         self.paths = 0
         self.recorder: Recorder | None = None
-        self.controller = build_controller(self.settings.controller, rig)
+        self.second: Session | None = None
+        self.controller = controller or build_controller(self.settings.controller, rig)
         self._seed, self._episode = seed, 0
         now = self.settings
         self.duration = SCENARIOS[now.scenario].duration
@@ -65,6 +76,8 @@ class Session:
             1, rig, {}, self._course, self.hands, self._setpoints, now.sensors, self._actuation, periods=1
         )
         self._simulation.sensors = self._sensors
+        if now.compare != NOTHING:
+            self.second = self._beside(None)
         self.reset()
 
     @property
@@ -87,7 +100,8 @@ class Session:
         shown = self.settings.model_dump()
         if self.settings.stiffness_source == "scenario":
             shown.update(self._scenario_setpoints())
-        return {**shown, "damping_applies": has_damping(self.controller)}
+        rigs = [self] if self.second is None else [self, self.second]
+        return {**shown, "damping_applies": any(has_damping(one.controller) for one in rigs)}
 
     def reset(self) -> None:
         """Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay."""
@@ -99,12 +113,17 @@ class Session:
         self._simulation.begin(lane, [self._seed], np.zeros(1, dtype=np.int64), self.duration)
         self.controller.reset()
         self.paths += 1
+        if self.second is not None:
+            self.second.hands.hold = self.hands.felt
+            self.second.reset()
 
-    def change(self, changes: Mapping[str, Any], controller: Controller | None = None) -> None:
-        """Apply settings; the rig keeps its state and its motion.
+    def change(
+        self, changes: Mapping[str, Any], controller: Controller | None = None, compared: Controller | None = None
+    ) -> None:
+        """Apply settings; the rig keeps its state and its motion, unless another pair of controllers is to be compared.
 
-        ``controller`` is the one that ``changes`` ask for, where it has been built already. Raises ``ValueError`` naming what
-        is not allowed; nothing is changed then.
+        ``controller`` and ``compared`` are those that ``changes`` ask for as ``controller`` and ``compare``, where they have
+        been built already. Raises ``ValueError`` naming what is not allowed; nothing is changed then.
         """
         changes = self.choices.checked(changes)
         before, after = self.settings, merged(self.settings, changes, self._scenario_setpoints())
@@ -127,13 +146,34 @@ class Session:
         if after.scenario_force != before.scenario_force:
             self.hands.want(after.scenario_force, now)
         self.hands.stiffness = after.drag_stiffness
+        self._compare(before, changes, compared)
+
+    def _compare(self, before: Settings, changes: Mapping[str, Any], controller: Controller | None) -> None:
+        """Let the second rig follow the settings, come or go."""
+        now = self.settings
+        if now.compare == NOTHING:
+            self.second = None
+        elif self.second is None or now.compare != before.compare:
+            self.second = self._beside(controller)
+        else:
+            self.second.change({name: value for name, value in changes.items() if name not in ("controller", "compare")})
+        if self.second is not None and (now.controller, now.compare) != (before.controller, before.compare):
+            self.reset()
+
+    def _beside(self, controller: Controller | None) -> Session:
+        """A rig with the same settings under the controller to compare with."""
+        own = self.settings.model_copy(update={"controller": self.settings.compare, "compare": NOTHING})
+        return Session(self.rig, own, self._seed, self.choices.policies, controller)
 
     def advance(self, periods: int, until: float = math.inf) -> int:
         """Run at least one and up to ``periods`` control periods, none begun after ``until`` (``time.perf_counter``, s); how
-        many have run. Where the rig is or gets lost none run."""
+        many have run. Where a rig is or gets lost none run."""
         done = 0
-        while done < periods and self.lost is None and (done == 0 or clock.perf_counter() < until):
+        while done < periods and not self.halted and (done == 0 or clock.perf_counter() < until):
             self._advance_one()
+            if self.second is not None and self.lost is None:
+                self.second.hands.hold = self.hands.felt
+                self.second._advance_one()
             done += 1
             if self.recorder is not None:
                 self.recorder.take(self)
@@ -174,11 +214,17 @@ class Session:
 
     @property
     def halted(self) -> bool:
-        """True where only another setting or ``reset`` makes it go on."""
-        return self.lost is not None
+        """True where only ``reset`` makes it go on: both rigs stand still where one is lost."""
+        return self.lost is not None or (self.second is not None and self.second.lost is not None)
 
     def frame(self) -> dict[str, Any]:
-        """The present instant as the page shows it."""
+        """The present instant as the page shows it; ``second`` is that of the rig beside it, or None."""
+        if self.second is None:
+            return {**self._shown(), "second": None}
+        self.second.hands.hold = self.hands.hold  # in a pause too
+        return {**self._shown(), "second": self.second._shown()}
+
+    def _shown(self) -> dict[str, Any]:
         return {**frame_of(self.row(), self.rig), "pointer_id": self.hands.used, "lost": self.lost}
 
     def row(self) -> Array:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
+from baselines import about
 from baselines.registry import CONTROLLERS, controller_names
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import SCENARIOS
@@ -20,6 +22,10 @@ STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
 
 RESIDUAL = "residual"
 """Controller whose policies are choices of their own: ``residual:circle``."""
+
+
+NOTHING = "nothing"
+"""What a rig is compared with where no second one is beside it."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +63,13 @@ class Strict(BaseModel):
 
 
 class Settings(Strict):
-    """What is set. Numbers are those of ``sliders``; ``scenario_force`` keeps or drops the scenario's own hand, and
-    ``stiffness_source`` says whether the stiffness setpoints are the scenario's or the sliders'."""
+    """What is set. Numbers are those of ``sliders``; ``compare`` is the controller of a second rig beside the first;
+    ``scenario_force`` keeps or drops the scenario's own hand, and ``stiffness_source`` says whether the stiffness setpoints
+    are the scenario's or the sliders'."""
 
     scenario: str = "probe"
     controller: str = "admittance-backstepping"
+    compare: str = NOTHING
     valves: str = "two_valves"
     sensors: str = "ideal"
     scenario_force: bool = False
@@ -81,16 +89,18 @@ def default_settings(rig: Parameters) -> Settings:
     return Settings(mass=rig.mechanics.mass)
 
 
-def opening_settings(rig: Parameters) -> Settings:
-    """What a visitor of the page meets: the paper's law, whose error under a pull can be seen."""
-    return default_settings(rig).model_copy(update={"controller": "backstepping"})
+def opening_settings(rig: Parameters, policies: Sequence[str] = ()) -> Settings:
+    """What a visitor of the page meets: the first of ``policies``, or the paper's law, whose error under a pull can be seen."""
+    controller = f"{RESIDUAL}:{policies[0]}" if policies else "backstepping"
+    return default_settings(rig).model_copy(update={"controller": controller})
 
 
-def controller_choices() -> list[dict[str, str]]:
-    """Every controller of the registry, and every policy that comes with the package: name, title, and what is ``missing``."""
+def controller_choices(policies: Sequence[str] = ()) -> list[dict[str, str]]:
+    """Every controller of the registry, every policy that comes with the package, and ``policies`` (folders): name, title,
+    what it is (``about``), and what is ``missing``."""
     choices = []
     for name in controller_names():
-        choice = {"name": name, "title": name.replace("-", " ")}
+        choice = {"name": name, "title": name.replace("-", " "), "about": about.CONTROLLERS.get(name, "")}
         if name == "nonlinear-mpc" and importlib.util.find_spec("casadi") is None:
             choice["missing"] = "pip install 'birthsim[mpc]'"
         if name != RESIDUAL or name in CONTROLLERS:
@@ -102,18 +112,29 @@ def controller_choices() -> list[dict[str, str]]:
         except ImportError:
             choices.append({**choice, "missing": "pip install 'birthsim[agents]'"})
             continue
-        choices += [{"name": f"{RESIDUAL}:{policy}", "title": f"{RESIDUAL} ({policy})"} for policy in shipped_names()]
+        choices += [
+            {
+                "name": f"{RESIDUAL}:{policy}",
+                "title": f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})",
+                "about": f"A law and a trained policy that corrects it: {policy}.",
+            }
+            for policy in dict.fromkeys([*shipped_names(), *policies])
+        ]
     return choices
 
 
 class Choices:
-    """What can be set on a rig: ``sliders``, ``controllers`` and ``words``, name -> allowed words."""
+    """What can be set on a rig: ``sliders``, ``controllers`` (``policies`` are folders of such) and ``words``, name -> allowed
+    words."""
 
-    def __init__(self, rig: Parameters) -> None:
-        self.sliders, self.controllers = sliders(rig), controller_choices()
+    def __init__(self, rig: Parameters, policies: Sequence[str] = ()) -> None:
+        self.policies = policies
+        self.sliders, self.controllers = sliders(rig), controller_choices(policies)
+        known = tuple(choice["name"] for choice in self.controllers if "missing" not in choice)
         self.words: dict[str, tuple[str, ...]] = {
             "scenario": tuple(SCENARIOS),
-            "controller": tuple(choice["name"] for choice in self.controllers if "missing" not in choice),
+            "controller": known,
+            "compare": (NOTHING, *known),
             "valves": VALVE_LAYOUTS,
             "sensors": tuple(SENSORS),
         }

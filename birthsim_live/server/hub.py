@@ -15,10 +15,12 @@ from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.clock import Clock, Source
 from birthsim_live.rig.hand import DRAG_LIMIT
-from birthsim_live.rig.settings import Choices, opening_settings
+from birthsim_live.rig.settings import NOTHING, Choices, opening_settings
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client
+from birthsim_live.server.past import Past
 from birthsim_live.server.shapes import shapes
+from birthsim_live.server.words import CHOICES, described, words
 
 T = TypeVar("T")
 
@@ -36,6 +38,7 @@ class Hub(ABC):
         self._surroundings = surroundings(rig, choices)
         self._clients: set[Client] = set()
         self._told: dict[str, Any] = {}
+        self._past = Past()
         self._loop: asyncio.AbstractEventLoop | None = None
 
     async def open(self) -> None:
@@ -55,9 +58,9 @@ class Hub(ABC):
         """Tell a new client everything, and from then on the news."""
         loop = asyncio.get_running_loop()
         # From the clock's thread, like all news: what changes meanwhile comes after, not before.
-        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, client, self.news()))
+        await self.ask(lambda: loop.call_soon_threadsafe(self._welcome, client, self.news(), self.past()))
 
-    def _welcome(self, client: Client, news: dict[str, dict[str, Any]]) -> None:
+    def _welcome(self, client: Client, news: dict[str, dict[str, Any]], past: dict[str, Any]) -> None:
         if client.closed:
             return
         hello = {"type": "hello", "protocol": protocol.VERSION, "mode": self.mode, **self._surroundings}
@@ -65,6 +68,7 @@ class Hub(ABC):
         client.tell("hello", protocol.encode(hello))
         for kind, message in news.items():
             client.tell(kind, protocol.encode(message))
+        client.tell("history", protocol.encode(past))
         self._clients.add(client)
 
     def leave(self, client: Client) -> None:
@@ -104,7 +108,12 @@ class Hub(ABC):
     def news(self) -> dict[str, dict[str, Any]]:
         """In the clock's thread: kind -> message, of all that a client must know beside the frames."""
 
+    def past(self) -> dict[str, Any]:
+        """In the clock's thread: news of what plots show of the time before."""
+        return self._past.message()
+
     def _from_clock(self, frame: dict[str, Any]) -> None:
+        self._past.take(frame)
         texts = []
         for kind, message in self.news().items():
             if self._told.get(kind) != message:
@@ -132,10 +141,9 @@ def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
     pivot1 = [g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3)]
     return {
         "choices": {
-            "scenario": choices.words["scenario"],
             "controller": choices.controllers,
-            "valves": choices.words["valves"],
-            "sensors": choices.words["sensors"],
+            "compare": [{"name": NOTHING, "title": NOTHING, "about": "One rig alone."}, *choices.controllers],
+            **{name: described(choices.words[name], about) for name, about in CHOICES.items()},
         },
         "defaults": opening_settings(rig).model_dump(),
         "ranges": {name: asdict(slider) for name, slider in choices.sliders.items()},
@@ -152,7 +160,9 @@ def surroundings(rig: Parameters, choices: Choices) -> dict[str, Any]:
             **shapes(rig),
         },
         "air": {"supply": air.supply_pressure, "atmosphere": air.atmospheric_pressure},
+        "areas": [area for one in (rig.cylinder1, rig.cylinder2) for area in (one.area_p, one.area_n)],
         "drag_limit": DRAG_LIMIT,
+        "words": words(),
     }
 
 

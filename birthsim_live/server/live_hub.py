@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from baselines.controller import Controller
 from baselines.work.files import LEFTOVERS, remove_leftovers
 from birthsim_live.rig.clock import LOG
 from birthsim_live.rig.controllers import build_controller
-from birthsim_live.rig.hand import PATIENCE, Hold
+from birthsim_live.rig.hand import PATIENCE, Hold, Push
 from birthsim_live.rig.recorder import Recorder
 from birthsim_live.rig.recording import SUFFIX
 from birthsim_live.rig.session import Session
-from birthsim_live.rig.settings import combined
+from birthsim_live.rig.settings import NOTHING, combined
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client
 from birthsim_live.server.hub import Hub
@@ -75,8 +76,9 @@ class LiveHub(Hub):
     async def act(self, client: Client, message: protocol.Message) -> None:
         match message:
             case protocol.Drag(position=position, id=identity):
-                self._holder, self._heard = client, time.monotonic()
-                self._session.hands.hold = Hold(np.array(position), identity)
+                self._hold(client, Hold(np.array(position), identity))
+            case protocol.Push(force=force, id=identity):
+                self._hold(client, Push(np.array(force), identity))
             case protocol.Release():
                 self._release(client)
             case protocol.Set(settings=settings):
@@ -121,6 +123,10 @@ class LiveHub(Hub):
             self._release(self._holder)
         super()._publish(texts, frame)
 
+    def _hold(self, client: Client, hold: Hold | Push) -> None:
+        self._holder, self._heard = client, time.monotonic()
+        self._session.hands.hold = hold
+
     def _release(self, client: Client) -> None:
         if self._holder is client:
             self._holder = self._session.hands.hold = None
@@ -153,12 +159,19 @@ class LiveHub(Hub):
                 self._idle.set()
 
     async def _change(self, changes: dict[str, Any]) -> None:
-        session, name = self._session, changes.get("controller")
-        controller = None
-        if name is not None and name != session.settings.controller:
+        session, built = self._session, []
+        for role, now in (("controller", session.settings.controller), ("compare", session.settings.compare)):
+            name = changes.get(role, now)
             # Some take a while to build; the rig runs on with the one it has.
-            controller = await asyncio.to_thread(build_controller, name, session.rig)
-        await self.ask(lambda: session.change(changes, controller))
+            new = name not in (now, NOTHING)
+            built.append(await asyncio.to_thread(build_controller, name, session.rig) if new else None)
+        await self.ask(lambda: self._apply(changes, *built))
+
+    def _apply(self, changes: dict[str, Any], controller: Controller | None, compared: Controller | None) -> None:
+        time = self._session.time
+        self._session.change(changes, controller, compared)
+        if self._session.time < time:  # what is compared starts anew
+            self.clock.restart()
 
     async def _begin_recording(self, path: Path) -> None:
         recorder = await self.ask(lambda: self._put_recorder(path))

@@ -9,6 +9,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
 
 from birthsim_live.rig.clock import SLOWEST
+from birthsim_live.rig.hand import DRAG_LIMIT
 from birthsim_live.rig.settings import Strict, refusal, within
 
 VERSION = 1
@@ -20,6 +21,7 @@ FARTHEST = 10.0
 """m; assumed: no pointer is further from the rig's origin."""
 
 Coordinate = Annotated[float, within(-FARTHEST, FARTHEST, "m")]
+Newtons = Annotated[float, within(-DRAG_LIMIT, DRAG_LIMIT, "N")]
 Count = Annotated[int, Field(ge=0, lt=2**53)]
 
 
@@ -28,6 +30,14 @@ class Drag(Strict):
 
     type: Literal["drag"] = "drag"
     position: tuple[Coordinate, Coordinate]
+    id: Count
+
+
+class Push(Strict):
+    """The person's hand pushes with ``force``, N; ``id`` as of drags."""
+
+    type: Literal["push"] = "push"
+    force: tuple[Newtons, Newtons]
     id: Count
 
 
@@ -85,7 +95,7 @@ class Ping(Strict):
     id: Count
 
 
-Message = Drag | Release | Set | Pause | Speed | Reset | Record | Seek | Ping
+Message = Drag | Push | Release | Set | Pause | Speed | Reset | Record | Seek | Ping
 
 KINDS = ", ".join(kind.__name__.lower() for kind in get_args(Message))
 

@@ -1,4 +1,4 @@
-"""The hub of a recording: pause, slow motion, seek."""
+"""The hub of a recording: it waits for its first viewer; pause, slow motion, seek."""
 
 from __future__ import annotations
 
@@ -9,16 +9,30 @@ from birthsim_live.rig.settings import Choices
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client
 from birthsim_live.server.hub import Hub
+from birthsim_live.server.past import whole
 
 
 class ReplayHub(Hub):
-    """All clients see one recording."""
+    """All clients see one recording, the file ``name``."""
 
     mode = "replay"
 
-    def __init__(self, player: Player) -> None:
+    def __init__(self, player: Player, name: str) -> None:
         super().__init__(player, player.recording.rig, Choices(player.recording.rig))
-        self._player = player
+        self._player, self._name = player, name
+        self._whole = whole(player)
+        self._waits = self.clock.paused = True
+
+    async def join(self, client: Client) -> None:
+        """Tell a new client everything; with the first one the recording begins."""
+        await super().join(client)
+        if self._waits:
+            self._waits = False
+            await self.ask(lambda: self.pause(False))
+
+    def past(self) -> dict[str, Any]:
+        """The whole recording."""
+        return self._whole
 
     def pause(self, paused: bool) -> None:
         """Stand still or go on; from the end on, from the start."""
@@ -43,6 +57,7 @@ class ReplayHub(Hub):
             "last_recording": None,
             "dragging": player.frame()["pointer"] is not None,
             "duration": player.recording.duration,
+            "file": self._name,
         }
         return {
             "settings": {"type": "settings", "settings": player.event("settings") or {}},

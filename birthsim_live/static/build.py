@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,9 @@ POLICY = (
 """The page may load its own files and nothing else; WebAssembly counts as a kind of eval."""
 
 
-def build_page(folder: Path, rig: Parameters) -> int:
-    """Write the page of ``rig`` into ``folder``, which must be new or empty; its bytes.
+def build_page(folder: Path, rig: Parameters, policies: Sequence[str] = ()) -> int:
+    """Write the page of ``rig`` into ``folder``, which must be new or empty; its bytes. ``policies`` are choices besides those
+    that are shipped, and the first of them is what it opens with.
 
     Raises ``ValueError`` for a folder with something in it, a rig that the page cannot show, an old LLVM and a missing linker.
     """
@@ -36,14 +38,14 @@ def build_page(folder: Path, rig: Parameters) -> int:
     require_llvm()
     require_linker()
     packer = Packer()
-    rig_pack, policies = pack(rig, packer), packed_policies(rig, packer)
+    rig_pack, stored = pack(rig, packer, policies), packed_policies(rig, packer, policies)
     with tempfile.TemporaryDirectory() as place:
         made = Path(place) / "page"
         shutil.copytree(PAGE, made / "static", ignore=shutil.ignore_patterns("index.html"))
         shutil.copytree(OVER, made / "static", dirs_exist_ok=True)
         (made / "index.html").write_text(_closed((PAGE / "index.html").read_text()))
         (made / "rig" / "policies").mkdir(parents=True)
-        for name, content in {"pack.json": rig_pack, **policies}.items():
+        for name, content in {"pack.json": rig_pack, **stored}.items():
             (made / "rig" / name).write_text(_text(content))
         _write_code(packer.functions, Path(place), made / "rig" / "loop.wasm")
         shutil.copytree(made, folder, dirs_exist_ok=True)

@@ -7,6 +7,8 @@ their bytes, little-endian, so that every bit arrives. The files of ``static/pag
 from __future__ import annotations
 
 import base64
+import re
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -36,7 +38,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig import bridge, clock, frames, hand, recorder, recording, setpoints
 from birthsim_live.rig.controllers import build_controller, has_damping
 from birthsim_live.rig.session import HIGHEST, LOWEST, PATH_POINTS
-from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices
+from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices, opening_settings
 from birthsim_live.server.hub import surroundings
 from birthsim_live.static import stages
 
@@ -80,8 +82,9 @@ def packed(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()).decode()
 
 
-def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
-    """All that a rig in the browser is made of; the functions of its stages are the packer's.
+def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[str, Any]:
+    """All that a rig in the browser is made of; the functions of its stages are the packer's. It opens with the first of
+    ``policies`` (folders or shipped names), where there is one.
 
     Raises ``ValueError`` for a rig with options of ``physics.options``.
     """
@@ -89,7 +92,7 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
         raise ValueError(
             "the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed without a server: none"
         )
-    choices, period = Choices(rig), rig.electronics.control_period
+    choices, period = Choices(rig, policies), rig.electronics.control_period
     controllers = {one["name"]: one for one in choices.controllers}
     made = {name: law for name in controllers if (law := controller(name, rig, packer)) is not None}
     for name, one in controllers.items():
@@ -100,16 +103,20 @@ def pack(rig: Parameters, packer: Packer) -> dict[str, Any]:
         "birthsim": birthsim_env.__version__,
         "hello": hello,
         "settings": hello["defaults"],
+        "opens": {"controller": opening_settings(rig, policies).controller},
         "stiffnesses": STIFFNESSES,
         "period": period,
         "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},
-        "info": {name: [part.start, part.stop - part.start] for name, part in info.SLICES.items()},
+        "info": {
+            **{name: [part.start, part.stop - part.start] for name, part in info.SLICES.items()},
+            "friction": [info.ROWS, 2], "flows": [info.ROWS + 2, 4],
+        },
         "rig": rig_numbers(rig),
         "range": {"low": packed(LOWEST), "high": packed(HIGHEST), "names": at.STATE_NAMES},
         "stages": {
             "plant": packer.stage(plant_stage(Plant(rig), period)),
             "begin": packer.stage(Stage(stages.begin, parameter_column(rig))),
-            "show": packer.stage(Stage(stages.show, memory=np.zeros((info.ROWS, 1)))),
+            "show": packer.stage(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
             "valves": {name: packer.stage(ValveActuation(name).stages(1, False)[0]) for name in VALVE_LAYOUTS},
         },
         "scenarios": {name: scenario(name, packer) for name in SCENARIOS},
@@ -195,13 +202,13 @@ def residual(policy: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
 
 def policy_file(policy: str) -> str:
     """Where the stage of a policy is, below the folder of the rig."""
-    return f"policies/{policy}.json"
+    return f"policies/{re.sub(r'[^A-Za-z0-9_-]+', '.', policy)}.json"
 
 
-def packed_policies(rig: Parameters, packer: Packer) -> dict[str, dict[str, Any]]:
-    """File -> the stage of every policy that comes with the package, of several seeds the best."""
+def packed_policies(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """File -> the stage of every policy that comes with the package and of ``policies``, of several seeds the best."""
     files = {}
-    for name in shipped_names():
+    for name in (*shipped_names(), *policies):
         stored = load_policy(best_policy(name))
         periods, law = policy_periods(stored.settings.policy_period, rig), ResidualLaw(rig, stored.settings)
         stage = policy_stage(stored.network, periods, stored.settings.size, law.shown.shape[0], parameter_column(rig), 1)
@@ -215,6 +222,5 @@ def numbers_of_the_page() -> dict[str, float]:
         "least_time": bridge.LEAST_TIME, "pace": bridge.PACE, "negligible": bridge.NEGLIGIBLE,
         "setpoint_transition": setpoints.TRANSITION, "hand_transition": hand.TRANSITION,
         "drag_limit": hand.DRAG_LIMIT, "patience": hand.PATIENCE, "drag_damping": hand.DRAG_DAMPING,
-        "least_force": frames.LEAST_FORCE, "least_given": frames.LEAST_GIVEN,
         "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
     }  # fmt: skip

@@ -23,6 +23,10 @@ from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, V1, V2, Y1, 
 from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_live.rig import inside
+from birthsim_live.rig.inside import look_inside
+
+SHOWN = ROWS + inside.ROWS
 
 
 @kernel
@@ -42,11 +46,12 @@ def begin(world: int, seen: int, memory: int, constants: int, tables: int, lane:
 
 @kernel
 def show(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Writes the fields of ``info`` into its memory (ROWS, N)."""
-    w, s, rows = block(world, WORLD), block(seen, SEEN), block(memory, ROWS)
+    """Writes the fields of ``info``, and below them those of ``inside``, into its memory (SHOWN, N)."""
+    w, s, rows = block(world, WORLD), block(seen, SEEN), block(memory, SHOWN)
     describe(
         s[TIME, :n], w[SINCE_JUMP, :n], w[STATE : STATE + STATES, :n], w[MOTION : MOTION + 4, :n],
         s[REFERENCE : REFERENCE + 15, :n], w[FORCE : FORCE + 2, :n], w[IMPACT : IMPACT + 2, :n], w[:PARAMETERS, :n],
-        rows[:, :n],
+        rows[:ROWS, :n],
     )  # fmt: skip
+    look_inside(w[STATE : STATE + STATES, :n], w[:PARAMETERS, :n], rows[ROWS:, :n])
     return 0

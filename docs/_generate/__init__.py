@@ -10,6 +10,7 @@ from _generate.api import api
 from _generate.commands import commands
 from _generate.environments import environments
 from _generate.metrics import metrics
+from _generate.page import page
 from _generate.pictures import pictures
 from _generate.rig import rig
 from _generate.root_pages import PAGES, root_page
@@ -21,6 +22,7 @@ PARTS = {
     "commands.md": commands,
     "environments.md": environments,
     "metrics.md": metrics,
+    "page.md": page,
     "rig.md": rig,
     **{f"{page}.md": partial(root_page, name) for name, page in PAGES.items()},
 }

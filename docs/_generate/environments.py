@@ -48,6 +48,7 @@ def _section(scenario: str) -> str:
     name = environment_id(scenario)
     facts = {
         "experiment": _experiment(name),
+        "what one meets": SCENARIOS[scenario].about,
         "duration": f"{SCENARIOS[scenario].duration:g} s, {round(SCENARIOS[scenario].duration / 0.01)} steps of 10 ms",
         **_spaces(name),
         **{f"{kind}, law inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},

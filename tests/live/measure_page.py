@@ -1,8 +1,8 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
 ``python -m tests.live.measure_page`` starts a server, drags the end effector around for some seconds, several times, and
-prints a table; ``--static FOLDER`` does so with a folder of ``birthsim-live --static``; ``--picture FILE`` also writes the
-screenshot of docs/live.md.
+prints a table; ``--static FOLDER`` does so with a folder of ``birthsim-live --static``, ``--compare CONTROLLER`` with two rigs;
+``--picture FILE`` also writes the screenshot of docs/live.md.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ def row(run, report):
 
 
 def picture(window, path):
-    """A screenshot with something to see: the first lesson, a pull, and the plots full."""
-    window.page.locator("#guide").select_option("Feel the friction")
-    window.wait("birthsim.settings.controller === 'backstepping' && birthsim.frame.pointer === null")
+    """A screenshot with something to see: two rigs under one hand, a pull, and the plots full."""
+    window.page.locator("#guide").select_option("What the force sensor buys")
+    window.wait("birthsim.frame.second !== null && birthsim.frame.pointer === null")
     window.page.locator("#reset").click()
     window.wait("birthsim.frame.time < 1")
     window.page.locator("#reset").blur()
@@ -94,6 +94,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=15.0, help="length of a run (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="how many (default: %(default)s)")
     parser.add_argument("--static", metavar="FOLDER", help="the page without a server, in this folder")
+    parser.add_argument("--compare", metavar="CONTROLLER", default="nothing", help="with a second rig beside the first")
     parser.add_argument("--picture", help="write a screenshot, 1280x800, to this PNG")
     arguments = parser.parse_args()
     if lack := browser.missing():
@@ -106,7 +107,8 @@ def main():
         sync_playwright() as playwright,
     ):
         chromium = browser.launch(playwright)
-        with Window(chromium, url + CALM) as window:
+        with Window(chromium, f"{url}{CALM}&compare={arguments.compare}") as window:
+            window.wait(f"birthsim.settings.compare === '{arguments.compare}'")
             first = window.wait("birthsim.monitor.first")
             rows = [row(k + 1, drag(window, arguments.seconds)) for k in range(arguments.runs)]
             if arguments.picture:

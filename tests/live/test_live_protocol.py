@@ -20,6 +20,7 @@ SETPOINTS = dict(zip(STIFFNESSES, (1500.0, 2500.0, 4000.0, 2000.0), strict=True)
 
 GOOD = [
     ({"type": "drag", "position": [0.5, -1], "id": 3}, protocol.Drag(position=(0.5, -1.0), id=3)),
+    ({"type": "push", "force": [0, -20.5], "id": 4}, protocol.Push(force=(0.0, -20.5), id=4)),
     ({"type": "release"}, protocol.Release()),
     ({"type": "set", "settings": {"Kclx": 3}}, protocol.Set(settings={"Kclx": 3})),
     ({"type": "pause", "paused": True}, protocol.Pause(paused=True)),
@@ -35,7 +36,7 @@ BAD = [
     ("", "no JSON"),
     ("{", "no JSON"),
     ("[1]", r"message = \[1\]"),
-    ("{}", "no known type; allowed: drag, release"),
+    ("{}", "no known type; allowed: drag, push, release"),
     ('{"type":"drop"}', "no known type"),
     ('{"type":["drag"]}', "no known type"),
     ('{"type":"drag","position":[0,NaN],"id":1}', "position.1 = nan; allowed: a finite number"),
@@ -43,6 +44,7 @@ BAD = [
     ('{"type":"drag","position":[0,1e999],"id":1}', "position.1 = inf"),
     ('{"type":"drag","position":[0,1' + 4000 * "0" + '],"id":1}', r"position.1 = 1000*\.\.\.; allowed: a finite number"),
     ('{"type":"drag","position":[0,1' + 9000 * "0" + '],"id":1}', "no JSON"),
+    ('{"type":"push","force":[0,101],"id":1}', "push.force.1 = 101; allowed: -100 to 100 N"),
     ('{"type":"drag","position":[0],"id":1}', "drag.position.1 is missing"),
     ('{"type":"drag","position":[0,true],"id":1}', "position.1 = True; allowed: a valid number"),
     ('{"type":"drag","position":[0,0],"id":-1}', "drag.id = -1; allowed: greater than or equal to 0"),
@@ -136,7 +138,8 @@ def test_settings_are_refused_by_name(changes: dict[str, Any], words: str) -> No
 def test_what_is_not_installed_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     choices = Choices(Parameters())
-    assert {"name": "nonlinear-mpc", "title": "nonlinear mpc", "missing": "pip install 'birthsim[mpc]'"} in choices.controllers
+    missing = {choice["name"]: choice.get("missing") for choice in choices.controllers}
+    assert missing["nonlinear-mpc"] == "pip install 'birthsim[mpc]'"
     with pytest.raises(ValueError, match=r"'nonlinear-mpc'; allowed: after pip install 'birthsim\[mpc\]'"):
         choices.checked({"controller": "nonlinear-mpc"})
 

@@ -92,6 +92,21 @@ def test_playing_goes_on_to_the_end_and_between_rows(file: tuple[Path, list[dict
     assert player.event("lost") is None
 
 
+def test_a_file_from_before_friction_and_flows_plays_without_them(tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).uniform(-0.05, 0.05, (3, COLUMNS - 6))
+    header = {
+        "format": "birthsim-recording-2", "birthsim": "0", "rig": RIG.to_dict(), "columns": list(FIELDS)[:-2],
+        "interval": 0.004,
+    }  # fmt: skip
+    (tmp_path / "old.rec").write_bytes(packed(header) + packed({"events": []}, rows))
+    found = load_recording(tmp_path / "old.rec")
+    assert np.array_equal(found.rows[:, :-6], rows)
+    assert np.isnan(found.rows[:, -6:]).all()
+    frame = Player(found).frame()
+    assert frame["friction"] == [None, None]
+    assert frame["flows"] == [None] * 4
+
+
 def test_a_loss_is_recorded(tmp_path: Path) -> None:
     session = Session(RIG)
     session.state[6] = 3e6
@@ -122,7 +137,7 @@ def rewritten(path: Path, folder: Path, change: Any) -> Path:
         "format": recording.FORMAT, "birthsim": "0", "rig": whole.rig.to_dict(), "columns": list(FIELDS),
         "interval": whole.interval,
     }  # fmt: skip
-    parts = {"header": header, "events": whole.events, "rows": whole.rows}
+    parts = {"header": header, "events": whole.events, "rows": np.hstack([whole.rows, whole.second])}
     change(parts)
     copy = folder / "changed.rec"
     copy.write_bytes(packed(parts["header"]) + packed({"events": parts["events"]}, parts["rows"]))
@@ -150,8 +165,8 @@ DAMAGES = {
     "a path that is none": events({"row": 0, "path": [[1]]}),
     "settings that are none": events({"row": 0, "settings": {"Kclx": [1]}}),
     "an event of another kind": events({"row": 0, "script": "x"}),
-    "rows of another size": lambda parts: parts.update(rows=np.zeros((3, COLUMNS + 1))),
-    "no rows": lambda parts: parts.update(rows=np.zeros((0, COLUMNS)), events=[]),
+    "rows of another size": lambda parts: parts.update(rows=np.zeros((3, 2 * COLUMNS + 1))),
+    "no rows": lambda parts: parts.update(rows=np.zeros((0, 2 * COLUMNS)), events=[]),
     "a header that is none": lambda parts: parts.update(header=3),
 }
 
@@ -192,7 +207,7 @@ def test_what_is_written_is_read_while_the_recording_goes_on(tmp_path: Path) -> 
     whole = running.path.read_bytes()
     torn = tmp_path / "torn.rec"
     for cut in (1, 7, 9, 30):
-        torn.write_bytes(whole + packed({"events": []}, np.ones((9, COLUMNS)))[:cut])
+        torn.write_bytes(whole + packed({"events": []}, np.ones((9, 2 * COLUMNS)))[:cut])
         assert len(load_recording(torn).rows) == 41
     running.finish()
     assert running.path.read_bytes() == whole
@@ -254,5 +269,6 @@ def test_a_name_that_is_taken_costs_no_row(tmp_path: Path) -> None:
 
 def test_a_recording_is_a_value() -> None:
     rows = np.zeros((3, COLUMNS))
-    assert Recording(RIG, rows, 0.004, []).duration == pytest.approx(0.008)
-    assert Player(Recording(RIG, rows, 0.004, [])).event("settings") is None
+    one = Recording(RIG, rows, 0.004, [], np.full_like(rows, np.nan))
+    assert one.duration == pytest.approx(0.008)
+    assert Player(one).event("settings") is None

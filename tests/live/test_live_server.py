@@ -20,12 +20,13 @@ from starlette.websockets import WebSocketDisconnect
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.frames import FIELDS, SLICES
 from birthsim_live.rig.player import Player
-from birthsim_live.rig.recording import load_recording
+from birthsim_live.rig.recording import Recording, load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.server import live_hub, protocol
 from birthsim_live.server.addresses import is_loopback, listen
 from birthsim_live.server.app import create_app
 from birthsim_live.server.live_hub import LiveHub
+from birthsim_live.server.past import PLOTTED, Past
 from birthsim_live.server.replay_hub import ReplayHub
 from tests.console import PATIENCE, call, run
 
@@ -69,9 +70,11 @@ def test_a_window_is_told_everything_and_then_sees_frames(live: TestClient) -> N
     with live.websocket_connect(SOCKET) as ws:
         hello = json.loads(ws.receive_text())
         assert (hello["type"], hello["protocol"], hello["mode"]) == ("hello", 1, "live")
-        assert [json.loads(ws.receive_text())["type"] for _ in range(3)] == ["settings", "state", "path"]
+        assert [json.loads(ws.receive_text())["type"] for _ in range(4)] == ["settings", "state", "path", "history"]
         assert hello["settings"]["controller"] == "admittance-backstepping"
-        assert {"name": "residual:circle", "title": "residual (circle)"} in hello["choices"]["controller"]
+        titles = {choice["name"]: choice["title"] for choice in hello["choices"]["controller"]}
+        assert titles["residual:circle"] == "residual (circle)"
+        assert all(choice["about"] for choices in hello["choices"].values() for choice in choices)
         assert set(hello["ranges"]) <= set(hello["settings"])
         assert len(hello["geometry"]["workspace"]) == 66
         assert {"pivot1", "half_stroke1", "bounds", "barrels", "head"} <= set(hello["geometry"])
@@ -79,6 +82,26 @@ def test_a_window_is_told_everything_and_then_sees_frames(live: TestClient) -> N
         assert set(FIELDS) | {"linkage", "force", "rendered", "error_mm", "pointer_id", "lost", "behind"} <= set(first)
         assert second["n"] > first["n"]
         assert second["time"] >= first["time"]
+
+
+def test_a_window_that_joins_sees_the_time_before(live: TestClient) -> None:
+    with live.websocket_connect(SOCKET) as first:
+        assert until(first, lambda m: m["type"] == "frame" and m["time"] > 0.3)
+        with live.websocket_connect(SOCKET) as second:
+            times = [frame["time"] for frame in until(second, of("history"))["frames"]]
+            assert times[0] < 0.05
+            assert times[-1] > 0.2
+            assert (np.diff(times) > 0.02).all()
+
+
+def test_the_past_is_ten_seconds_and_forgets_what_a_reset_undoes() -> None:
+    past, frame = Past(), dict.fromkeys(PLOTTED, 0.0)
+    for k in range(2000):
+        past.take({**frame, "time": 0.01 * k})
+    times = [one["time"] for one in past.message()["frames"]]
+    assert times[-1] - times[0] == pytest.approx(10.0, abs=0.05)
+    past.take({**frame, "time": 0.0})
+    assert [one["time"] for one in past.message()["frames"]] == [0.0]
 
 
 def test_a_window_that_falls_silent_lets_go(live: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,22 +198,35 @@ def test_recording_download_and_replay(live: TestClient, tmp_path: Path) -> None
     for foreign in ("../secret.rec", "..%2fsecret.rec", "none.rec", "one.txt"):
         assert live.get(f"/recordings/{foreign}").status_code == 404
     recording = load_recording(tmp_path / name)
-    with client(ReplayHub(Player(recording))) as replay, replay.websocket_connect(SOCKET) as ws:
-        hello = until(ws, of("hello"))
-        assert hello["mode"] == "replay"
-        assert hello["state"]["duration"] == recording.duration
-        assert hello["settings"]["scenario"] == "probe"
-        end = until(ws, of("state", paused=True))  # it plays to its end by itself
-        assert end["duration"] == recording.duration
-        say(ws, "pause", paused=True)
-        say(ws, "seek", time=0.0)
-        assert until(ws, lambda m: m["type"] == "frame" and m["time"] == 0.0)["pointer"] is None
-        row = int(np.argmax(recording.rows[:, SLICES["drag_force"]][:, 0]))
-        say(ws, "seek", time=row * recording.interval)
-        assert until(ws, lambda m: m["type"] == "frame" and m["pointer"])["drag_force"][0] > 5
-        for kind, fields in (("reset", {}), ("record", {"on": True}), ("set", {"settings": {}})):
-            say(ws, kind, **fields)
-            assert f"{kind} in a replay; allowed: pause, speed, seek" in until(ws, of("error"))["message"]
+    player = Player(recording)
+    hub = ReplayHub(player, "one.rec")
+    with client(hub) as replay:
+        assert replay.get("/").status_code == 200  # it is served, and nobody has come to see it
+        assert hub.clock.paused
+        assert player.position == 0.0
+        with replay.websocket_connect(SOCKET) as ws:
+            _is_played(ws, recording)
+
+
+def _is_played(ws: WebSocketTestSession, recording: Recording) -> None:
+    hello = until(ws, of("hello"))
+    whole = until(ws, of("history"))["frames"]
+    assert whole[-1]["time"] == pytest.approx(recording.duration)
+    assert hello["state"]["file"] == "one.rec"
+    assert hello["mode"] == "replay"
+    assert hello["state"]["duration"] == recording.duration
+    assert hello["settings"]["scenario"] == "probe"
+    end = until(ws, of("state", paused=True))  # it plays to its end by itself
+    assert end["duration"] == recording.duration
+    say(ws, "pause", paused=True)
+    say(ws, "seek", time=0.0)
+    assert until(ws, lambda m: m["type"] == "frame" and m["time"] == 0.0)["pointer"] is None
+    row = int(np.argmax(recording.rows[:, SLICES["drag_force"]][:, 0]))
+    say(ws, "seek", time=row * recording.interval)
+    assert until(ws, lambda m: m["type"] == "frame" and m["pointer"])["drag_force"][0] > 5
+    for kind, fields in (("reset", {}), ("record", {"on": True}), ("set", {"settings": {}})):
+        say(ws, kind, **fields)
+        assert f"{kind} in a replay; allowed: pause, speed, seek" in until(ws, of("error"))["message"]
 
 
 def test_a_running_recording_is_finished_when_the_server_ends(tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def test_screenshots_have_no_sideways_scrolling_and_no_text_cut_off(chromium, se
             ".filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"
         )
         assert cut == []
-        assert window.value("document.querySelectorAll('.plot canvas').length") == 6
+        assert window.value("document.querySelectorAll('#plots .plot canvas').length") == 6
         assert window.complaints == []
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.frames import FIELDS, SLICES
+from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES
 from birthsim_live.rig.recorder import EVERY
 from birthsim_live.rig.recording import FORMAT, packed
 from birthsim_live.rig.session import Session
@@ -140,7 +140,8 @@ def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
     for _ in range(200):
         session.advance(EVERY)
         rows.append(session.row())
-    lost = np.array(rows)
+    lost = np.full((len(rows), 2 * COLUMNS), np.nan)
+    lost[:, :COLUMNS] = rows
     for name in ("joints", "position", "velocity", "pressures", "compliant"):
         lost[100:150, SLICES[name]] = np.nan
     header = {

@@ -26,11 +26,11 @@ def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, tmp_path
         assert window.value(LESSON) == "Feel the friction"
         assert window.value("birthsim.settings.controller") == "backstepping"
         assert window.value("location.search") == ""
-        assert window.value("birthsim.scene.cue")
+        assert window.value("birthsim.scenes[0].cue")
         assert window.value(FELT).startswith("–")
         window.page.screenshot(path=pictures / "opens.png")
         window.hold(across=50)
-        assert not window.value("birthsim.scene.cue")
+        assert not window.value("birthsim.scenes[0].cue")
         window.wait(f"/^2,[1-9]\\d0 N.m, asked for 2,000$/.test({FELT})")
         window.page.screenshot(path=pictures / "pulled.png")
         window.page.mouse.up()
@@ -41,9 +41,9 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
     wanted = {
         "Feel the friction": {"controller": "backstepping", "mass": 3, "stiffness_source": "scenario"},
         "Halve the stiffness": {"controller": "backstepping", "Kclx": 1000, "Kcly": 1000, "stiffness_source": "sliders"},
-        "What the force sensor buys": {"controller": "admittance-backstepping", "stiffness_source": "scenario"},
-        "What learning adds": {"controller": "residual:circle", "scenario": "circle", "mass": 4, "friction": 1.5},
-        "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1},
+        "What the force sensor buys": {"controller": "admittance-backstepping", "compare": "backstepping"},
+        "What learning adds": {"controller": "residual:circle", "compare": "backstepping", "scenario": "circle", "mass": 4},
+        "Forceps pull": {"scenario": "forceps", "scenario_force": True, "friction": 1, "compare": "nothing"},
     }
     window.page.locator("#guide").select_option("Feel the friction")
     places = set()
@@ -58,7 +58,10 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
     window.page.locator("select[name=controller]").select_option("lqr")
     window.wait(f"{LESSON} === 'Your own settings'")
     window.page.locator("select[name=controller]").select_option("admittance-backstepping")
+    window.page.locator("select[name=compare]").select_option("backstepping")
     window.wait(f"{LESSON} === 'What the force sensor buys'")
+    window.page.locator("#guide").select_option("Feel the friction")
+    window.wait("birthsim.frame.second === null")
 
 
 def test_the_settings_are_a_link(chromium, server):

@@ -10,11 +10,12 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from agents.policy.seeds import SHIPPED
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_live.rig.frames import COLUMNS
-from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.hand import Hold, Push
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
@@ -36,16 +37,19 @@ ROWS = """async (cases) => {
   const read = async (name) => await fetch(new URL(`rig/${name}`, location));
   const [pack, code] = [await (await read("pack.json")).json(), await (await read("loop.wasm")).arrayBuffer()];
   const found = [];
-  for (const { settings, periods, pointer } of cases) {
+  const policyOf = async (name) => {
+    const file = pack.controllers[name]?.policy?.file;
+    return file && (await (await read(file)).json());
+  };
+  for (const { settings, periods, hold } of cases) {
     const session = new Session(pack, await Machine.of(code));
-    const file = pack.controllers[settings.controller]?.policy?.file;
-    session.change(settings, file && (await (await read(file)).json()));
+    session.change(settings, await policyOf(settings.controller), await policyOf(settings.compare));
     session.reset();
-    if (pointer) session.hands.hold = { position: pointer, id: 1 };
+    if (hold) session.hands.hold = { ...hold, id: 1 };
     const rows = [];
     for (let k = 0; k < periods; k += 1) {
       session.advance(1, Infinity);
-      rows.push(...rowOf(session));
+      rows.push(...rowOf(session), ...(session.second ? rowOf(session.second) : []));
     }
     const bytes = new Uint8Array(Float64Array.from(rows).buffer);
     let text = "";
@@ -54,7 +58,7 @@ ROWS = """async (cases) => {
   }
   return found;
 }"""
-"""Rows of every period of sessions with settings, beside the one that is shown."""
+"""Rows of every period of sessions with settings, and of the rigs beside theirs."""
 
 
 SILENT = """async () => {
@@ -82,7 +86,8 @@ def built(tmp_path_factory):
     """The folder, made by the command."""
     need_linker()
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
-    done = run("live", "--static", folder)
+    own = shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
+    done = run("live", "--static", folder, "--policy", own)
     assert done.returncode == 0, done.stderr
     assert f"written to {folder}" in done.stdout
     return folder
@@ -109,17 +114,20 @@ def same(found, expected):
     return bool(np.all((found == expected) | (np.isnan(found) & np.isnan(expected))))
 
 
-def rows_of(settings, periods, pointer=None):
-    """Rows of every period of a session in Python, (periods, COLUMNS); a hand at ``pointer``, m, pulls from the start."""
+def rows_of(settings, periods, hold=None):
+    """Rows of every period of a session in Python, (periods, COLUMNS for each rig); a hand that does ``hold`` acts from the
+    start."""
     rig = load_parameters(None)
     session = Session(rig, opening_settings(rig))
     session.change(settings)
     session.reset()
-    session.hands.hold = Hold(np.array(pointer), 1) if pointer else None
-    rows = np.empty((periods, COLUMNS))
+    for kind, value in (hold or {}).items():
+        session.hands.hold = {"position": Hold, "force": Push}[kind](np.array(value, dtype=float), 1)
+    rigs = [session, session.second] if session.second else [session]
+    rows = np.empty((periods, len(rigs) * COLUMNS))
     for row in rows:
         session.advance(1)
-        row[:] = session.row()
+        row[:] = np.concatenate([rig.row() for rig in rigs])
     return rows
 
 
@@ -134,6 +142,7 @@ def test_the_folder_is_small_and_the_rig_moves_soon(chromium, built, address):
 
 def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(window):
     offered = window.value("birthsim.hello.choices.controller.filter(({ missing }) => !missing).map(({ name }) => name)")
+    offered = [name for name in offered if not name.endswith("own")]  # a copy of one that is shipped
     assert {"backstepping", "admittance-backstepping", "lqr", "residual:circle", "residual:circle_lab"} <= set(offered)
     pushed = {"scenario_force": True}
     cases = [{"scenario": name, "sensors": sensors} for name in SCENARIOS for sensors in SENSORS]
@@ -142,11 +151,16 @@ def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python
     ]
     cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
     several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
-    several += [{"settings": {}, "periods": PERIODS, "pointer": place} for place in ([0.56, 0.02], [0.7, -0.2])]
+    holds = [{"position": [0.56, 0.02]}, {"position": [0.7, -0.2]}, {"force": [20, -5]}, {"force": [90, 90]}]
+    several += [{"settings": {}, "periods": PERIODS, "hold": hold} for hold in holds]
+    pairs = [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")]
+    for controller, compare in pairs:
+        settings = {"controller": controller, "compare": compare, "scenario": "circle", "sensors": "lab", "mass": 4.0}
+        several.append({"settings": {**settings, **pushed}, "periods": PERIODS, "hold": holds[0]})
     texts = window.page.evaluate(ROWS, several)
     for one, text in zip(several, texts, strict=True):
-        found = np.frombuffer(base64.b64decode(text)).reshape(-1, COLUMNS)
-        assert same(found, rows_of(**one)), one["settings"]
+        found = np.frombuffer(base64.b64decode(text)).reshape(PERIODS, -1)
+        assert same(found, rows_of(**one)), one
 
 
 def test_displacement_is_force_over_stiffness(window):
@@ -163,8 +177,11 @@ def test_displacement_is_force_over_stiffness(window):
     window.wait(f"birthsim.monitor.report().drawn > {drawn + 20} && birthsim.frame.real_time > 0.5")
 
 
-def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
+@pytest.mark.parametrize("compare", ["nothing", "backstepping"])
+def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path, compare):
     page = window.page
+    page.locator("select[name=compare]").select_option(compare)
+    window.wait(f"birthsim.settings.compare === '{compare}'")
     page.locator("select[name=scenario]").select_option("circle")
     page.locator("input[name=scenario_force]").check()
     window.wait("birthsim.settings.scenario === 'circle' && birthsim.settings.scenario_force")
@@ -182,15 +199,49 @@ def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path):
     with page.expect_download() as download:
         page.locator("#download").click()
     download.value.save_as(tmp_path / "circle.rec")
+    page.locator("#choose").set_input_files(tmp_path / "circle.rec")
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
+    page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live'")
     recording = load_recording(tmp_path / "circle.rec")
     begun = int(np.argmin(recording.rows[:, 0]))
-    rows = recording.rows[begun:]
+    rows = np.hstack([recording.rows, recording.second])[begun:]
     assert len(rows) > 300
     instants = np.round(rows[:, 0] / 0.001).astype(int)
-    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2]}
+    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2], "compare": compare}
     expected = rows_of(settings, int(instants[-1]))
     moved = instants > 0
-    assert same(rows[moved], expected[instants[moved] - 1])
+    assert same(rows[moved, : expected.shape[1]], expected[instants[moved] - 1])
+    assert np.isfinite(rows[moved, COLUMNS]).all() == (compare != "nothing")
+
+
+def test_one_hand_pulls_both_heads_and_keys_push_both(chromium, address):
+    with Window(chromium, f"{address}?controller=admittance-backstepping&compare=residual:circle") as window:
+        window.wait("birthsim.frame.second !== null && document.body.dataset.rigs === '2'")
+        x, y = window.value("birthsim.pixel(birthsim.frame.second.position, 1)")
+        window.page.mouse.move(x, y)
+        window.page.mouse.down()
+        window.page.mouse.move(x + 40, y, steps=6)
+        window.wait("birthsim.frame.second.force[0] > 5 && birthsim.frame.force[0] > 5")
+        frame = window.frame()
+        assert frame["pointer"] == frame["second"]["pointer"]
+        window.page.mouse.up()
+        window.wait("birthsim.frame.pointer === null && birthsim.frame.second.pointer === null")
+        window.page.keyboard.down("ArrowDown")
+        window.wait("birthsim.frame.force[1] === -20 && birthsim.frame.second.force[1] === -20")
+        window.page.keyboard.up("ArrowDown")
+        window.wait("birthsim.frame.second.force[1] === 0")
+        window.page.locator("select[name=compare]").select_option("nothing")
+        window.wait("birthsim.frame.second === null && document.body.dataset.rigs === '1'")
+        assert window.complaints == []
+
+
+def test_a_policy_of_ones_own_opens_the_page(chromium, address):
+    with Window(chromium, address) as window:
+        window.wait("birthsim.settings.controller.endsWith('own') && birthsim.frame.lost === null")
+        window.wait("document.querySelector('select[name=controller]').selectedOptions[0].text.includes('own')")
+        window.live(0.2)
+        assert window.complaints == []
 
 
 def test_every_choice_runs_in_the_window(window):

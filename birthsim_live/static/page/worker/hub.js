@@ -14,6 +14,7 @@ export class Hub {
     this.clock = new Clock(this.session, frameOf, (frame) => this.onFrame(frame));
     this.told = {};
     this.lastRecording = null;
+    this.policies = {};
     this.setting = Promise.resolve();
   }
 
@@ -26,7 +27,7 @@ export class Hub {
   async receive(message) {
     try {
       const act = this[`on_${message.type}`];
-      if (!act) throw new Error(`${message.type} without a server; allowed: drag, release, set, pause, speed, reset, record, ping`);
+      if (!act) throw new Error(`${message.type} without a server; allowed: drag, push, release, set, pause, speed, reset, record, ping`);
       await act.call(this, message);
       this.clock.touch();
     } catch (error) {
@@ -35,7 +36,15 @@ export class Hub {
   }
 
   on_drag({ position, id }) {
-    this.session.hands.hold = { position, id };
+    this.hold({ position, id });
+  }
+
+  on_push({ force, id }) {
+    this.hold({ force, id });
+  }
+
+  hold(hold) {
+    this.session.hands.hold = hold;
     this.heard = performance.now();
   }
 
@@ -61,13 +70,21 @@ export class Hub {
   on_set({ settings }) {
     const changes = checked(settings, this.pack);
     const set = async () => {
-      const file = this.pack.controllers[changes.controller]?.policy?.file;
-      const known = file && this.session.laws[changes.controller];
-      this.session.change(changes, file && !known ? await this.fetched(file) : null);
+      const policies = [await this.policyOf(changes.controller), await this.policyOf(changes.compare)];
+      const { time } = this.session;
+      this.session.change(changes, ...policies);
+      if (this.session.time < time) this.clock.pace.restart(); // what is compared starts anew
     };
     const done = this.setting.then(set);
     this.setting = done.catch(() => {});
     return done;
+  }
+
+  /** The stage of a controller's policy, where it has one. */
+  async policyOf(controller) {
+    const file = this.pack.controllers[controller]?.policy?.file;
+    if (file) this.policies[file] ??= await this.fetched(file);
+    return this.policies[file];
   }
 
   async on_reset() {

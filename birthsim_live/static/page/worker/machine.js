@@ -16,16 +16,22 @@ export function doublesOf(text) {
 export class Machine {
   /** `code` of the stages. */
   static async of(code) {
-    const memory = new WebAssembly.Memory({ initial: PAGES });
-    const { instance } = await WebAssembly.instantiate(code, { env: { memory } });
-    return new Machine(instance.exports, memory);
+    return new Machine(await WebAssembly.compile(code));
   }
 
-  constructor(exports, memory) {
+  constructor(module) {
+    const memory = new WebAssembly.Memory({ initial: PAGES });
+    const { exports } = new WebAssembly.Instance(module, { env: { memory } });
+    this.module = module;
     this.exports = exports;
     this.buffer = memory.buffer;
     this.free = exports.__heap_base.value;
     this.nothing = { place: 0n };
+  }
+
+  /** The same code with a memory of its own. */
+  another() {
+    return new Machine(this.module);
   }
 
   /** Address of so many bytes that nothing else uses. */

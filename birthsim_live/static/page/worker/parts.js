@@ -125,11 +125,17 @@ export class Setpoints {
   }
 }
 
+/** A force that is shortened to `most` where it is larger. */
+function limited([x, y], most) {
+  const size = Math.sqrt(x * x + y * y);
+  return size > most ? [x * (most / size), y * (most / size)] : [x, y];
+}
+
 /** The scenario's force, where it is wanted, and the person's: a spring from the end effector to the pointer. */
 export class Hands {
   constructor(rig, force, wanted, stiffness) {
     Object.assign(this, { rig, source: force, wanted, stiffness });
-    this.hold = null; // { position, id }
+    this.hold = null; // { position, id } of a hand at a place, { force, id } of one that pushes
     this.used = null;
     this.scenarioNow = [0, 0];
     this.dragNow = [0, 0];
@@ -153,7 +159,7 @@ export class Hands {
     this.scenarioNow = forces;
     this.dragNow = [0, 0];
     if (this.hold) {
-      this.dragNow = this.pull(this.hold.position);
+      this.dragNow = limited(this.hold.force ?? this.pull(this.hold.position), this.rig.numbers.drag_limit);
       this.used = this.hold.id;
       forces = forces.map((value, k) => value + this.dragNow[k]);
     }
@@ -163,9 +169,14 @@ export class Hands {
   pull(pointer) {
     const { world, rows, numbers } = this.rig;
     const motion = world.some(rows.MOTION, 4);
-    const [x, y] = [0, 1].map((k) => this.stiffness * (pointer[k] - motion[k]) - numbers.drag_damping * motion[2 + k]);
-    const size = Math.sqrt(x * x + y * y);
-    return size > numbers.drag_limit ? [x * (numbers.drag_limit / size), y * (numbers.drag_limit / size)] : [x, y];
+    return [0, 1].map((k) => this.stiffness * (pointer[k] - motion[k]) - numbers.drag_damping * motion[2 + k]);
+  }
+
+  /** Where the spring from the end effector ends, or would end for a hand that pushes; null where there is no hand. */
+  get pointer() {
+    if (!this.hold?.force) return this.hold?.position ?? null;
+    const position = this.rig.world.some(this.rig.rows.MOTION, 2);
+    return position.map((value, k) => value + this.hold.force[k] / this.stiffness);
   }
 
   follow(force) {

@@ -1,20 +1,9 @@
 // Takes a session down and makes the file that birthsim-replay plays (birthsim_live/rig/recording.py has the format).
 
-import { rowOf } from "./frames.js";
+import { crc32 } from "../crc32.js";
+import { NO_ROW, rowOf } from "./frames.js";
 
 const ROWS = 512; // in a chunk
-
-const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
-  let c = n;
-  for (let k = 0; k < 8; k += 1) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
-  return c;
-});
-
-function crc32(bytes) {
-  let c = 0xffffffff;
-  for (const byte of bytes) c = TABLE[(c ^ byte) & 255] ^ (c >>> 8);
-  return (c ^ 0xffffffff) >>> 0;
-}
 
 /** A chunk that says `said` and holds `rows`. */
 async function packed(said, rows) {
@@ -32,7 +21,7 @@ export class Recorder {
     Object.assign(this, { name, every, longest, interval: every * session.period, header: session.pack.header });
     this.rows = [];
     this.events = [];
-    this.known = {};
+    this.known = { second_lost: "null" };
     this.paths = -1;
     this.periods = 0;
     this.take(session);
@@ -53,7 +42,8 @@ export class Recorder {
       if (this.paths !== session.paths) this.note("path", session.path());
       this.paths = session.paths;
       this.note("lost", session.lost);
-      this.rows.push(rowOf(session));
+      this.note("second_lost", session.second?.lost ?? null);
+      this.rows.push(new Float64Array([...rowOf(session), ...(session.second ? rowOf(session.second) : NO_ROW)]));
     }
     this.periods += 1;
   }

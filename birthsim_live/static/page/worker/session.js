@@ -1,21 +1,23 @@
-// One rig that a person plays with (birthsim_live/rig/session.py): control periods one after the other, no clock.
+// A rig that a person plays with, and one beside it to compare (birthsim_live/rig/session.py): control periods, no clock.
 
 import { Law } from "./law.js";
 import { doublesOf } from "./machine.js";
 import { Course, Hands, Setpoints } from "./parts.js";
-import { merged } from "./settings.js";
+import { NOTHING, merged } from "./settings.js";
 
 export class Session {
-  constructor(pack, machine) {
+  /** `policy` as of `lawOf`. */
+  constructor(pack, machine, settings = pack.settings, policy = null) {
     this.pack = pack;
     this.machine = machine;
     this.numbers = pack.numbers;
     this.rows = pack.rows;
     this.period = pack.period;
-    this.settings = { ...pack.settings };
+    this.settings = { ...settings };
     this.lost = null;
     this.paths = 0;
     this.recorder = null;
+    this.second = null; // the rig beside it: the same world, settings and hand under the controller `settings.compare`
     this.low = doublesOf(pack.range.low);
     this.high = doublesOf(pack.range.high);
     this.column = doublesOf(pack.rig.column);
@@ -29,7 +31,7 @@ export class Session {
     this.scenarios = {};
     this.models = {};
     this.laws = {};
-    this.law = this.lawOf(this.settings.controller);
+    this.law = this.lawOf(this.settings.controller, policy);
     const { trajectory, force, schedule, duration } = this.scenario(this.settings.scenario);
     this.duration = duration;
     this.course = new Course(this, trajectory);
@@ -133,6 +135,9 @@ export class Session {
     this.look();
     this.law.reset();
     this.paths += 1;
+    if (!this.second) return;
+    this.second.hands.hold = this.hands.hold;
+    this.second.reset();
   }
 
   /** Write the rig that moves: mass and friction as set. */
@@ -149,8 +154,11 @@ export class Session {
     });
   }
 
-  /** Apply checked settings; the rig keeps its state and its motion. `policy` as of `lawOf`. */
-  change(changes, policy) {
+  /**
+   * Apply checked settings; the rig keeps its state and its motion, unless another pair of controllers is to be compared.
+   * `policy` and `compared`, that of the second rig, as of `lawOf`.
+   */
+  change(changes, policy, compared) {
     const before = this.settings;
     const after = merged(before, changes, this.scenarioSetpoints());
     if (after.controller !== before.controller) this.law = this.lawOf(after.controller, policy);
@@ -166,6 +174,19 @@ export class Session {
     if (after.sensors !== before.sensors) this.exchange(after.sensors);
     if (after.scenario_force !== before.scenario_force) this.hands.want(after.scenario_force);
     this.hands.stiffness = after.drag_stiffness;
+    this.compare(before, changes, compared);
+  }
+
+  /** Let the second rig follow the settings, come or go. */
+  compare(before, { controller, compare, ...others }, policy) {
+    const now = this.settings;
+    if (now.compare === NOTHING) this.second = null;
+    else if (this.second && now.compare === before.compare) this.second.change(others);
+    else {
+      const own = { ...now, controller: now.compare, compare: NOTHING };
+      this.second = new Session(this.pack, this.machine.another(), own, policy);
+    }
+    if (this.second && (now.controller !== before.controller || now.compare !== before.compare)) this.reset();
   }
 
   /** Go over to the start of an episode of the scenario. */
@@ -180,8 +201,12 @@ export class Session {
   /** Run up to `periods` control periods, none begun after `until` (ms of performance.now), at least one; how many. */
   advance(periods, until) {
     let done = 0;
-    while (done < periods && this.lost === null && (done === 0 || performance.now() < until)) {
+    while (done < periods && !this.halted && (done === 0 || performance.now() < until)) {
       this.advanceOne();
+      if (this.second && this.lost === null) {
+        this.second.hands.hold = this.hands.hold;
+        this.second.advanceOne();
+      }
       done += 1;
       this.recorder?.take(this);
     }
@@ -221,8 +246,9 @@ export class Session {
     return `${kind} of chamber ${chamber} = ${words[0]} ${unit}; the model holds from ${words[1]} to ${words[2]}`;
   }
 
+  /** Both rigs stand still where one is lost. */
   get halted() {
-    return this.lost !== null;
+    return this.lost !== null || Boolean(this.second?.lost);
   }
 
   /** What the scenario asks for at this time. */
@@ -234,7 +260,7 @@ export class Session {
   /** The settings as the page shows them: with the scenario's setpoints where they hold. */
   shownSettings() {
     const given = this.settings.stiffness_source === "scenario" ? this.scenarioSetpoints() : {};
-    return { ...this.settings, ...given, damping_applies: this.law.damped };
+    return { ...this.settings, ...given, damping_applies: this.law.damped || Boolean(this.second?.law.damped) };
   }
 
   path() {

@@ -1,5 +1,6 @@
 // What a person can set, and what is refused (birthsim_live/rig/settings.py).
 
+export const NOTHING = "nothing"; // to compare with
 const STIFFNESSES = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
 
 /** `changes` if all are allowed; else an error that names the setting, its value and what is allowed. */

@@ -1,0 +1,41 @@
+// The numbers of an instant, and what follows from them, as of birthsim_live/rig/frames.py. A rig in a worker needs it too.
+
+export const FIELDS = {
+  time: 1, episode_time: 1, joints: 2, position: 2, velocity: 2, target: 2, compliant: 2, scenario_force: 2, drag_force: 2,
+  pointer: 2, pressures: 4, openings: 4, stiffness: 2, pneumatic: 2, pneumatic_setpoint: 2, friction: 2, flows: 4,
+};
+
+export const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
+export const LEAST_GIVEN = 1e-4;
+
+const told = (value) => (Number.isFinite(value) ? value : null);
+
+/** An instant, name -> numbers in the order of FIELDS, as a frame: null where there is no number. */
+export function frameOf(now, geometry) {
+  const force = now.scenario_force.map((value, k) => value + now.drag_force[k]);
+  const given = now.position.map((value, k) => value - now.target[k]);
+  const off = now.position.map((value, k) => value - now.compliant[k]);
+  const rendered = force.map((f, k) => {
+    const says = Math.abs(f) >= LEAST_FORCE && Math.abs(given[k]) >= LEAST_GIVEN && f * given[k] > 0;
+    return says ? f / given[k] : null;
+  });
+  const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? told(values[0]) : values.map(told)]);
+  return {
+    ...Object.fromEntries(named),
+    pointer: now.pointer.every(Number.isFinite) ? now.pointer : null,
+    force: force.map(told),
+    error_mm: told(1e3 * Math.hypot(...off)),
+    rendered: rendered.map(told),
+    linkage: linkage(now.joints, geometry),
+  };
+}
+
+/** Pivot 1, joint, pivot 2 and end effector, m; null where the linkage cannot close. */
+function linkage([y1, y2], { d3, d6, k1, k2, gamma3 }) {
+  const r4 = y1 + k1;
+  const sine = (r4 * r4 - d3 * d3 - d6 * d6) / (2 * d3 * d6);
+  if (!(Math.abs(sine) < 1)) return null;
+  const tilt = gamma3 - Math.asin(sine);
+  const at = (length) => [length * Math.sin(tilt), -length * Math.cos(tilt)];
+  return [[d3 * Math.cos(gamma3), d3 * Math.sin(gamma3)], at(d6), [0, 0], at(k2 + y2)];
+}

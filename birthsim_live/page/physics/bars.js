@@ -1,0 +1,40 @@
+// Bars from a middle line, to the right where a number is above zero.
+
+import * as pen from "../pen.js";
+
+export const ROW = 19; // px
+const LEFT = 54; // px for names
+const RIGHT = 62; // px for figures
+
+/** Draws a row: its name, a bar for `share` from -1 to 1, and a figure. */
+export function drawBar(context, width, row, name, share, figure, colour) {
+  const [left, room, top] = [LEFT, width - LEFT - RIGHT, row * ROW];
+  const middle = left + room / 2;
+  context.fillStyle = pen.FAINT;
+  context.fillRect(left, top + 4, room, ROW - 8);
+  if (Number.isFinite(share)) {
+    const length = (Math.min(Math.max(share, -1), 1) * room) / 2;
+    context.fillStyle = colour;
+    context.fillRect(Math.min(middle, middle + length), top + 4, Math.abs(length), ROW - 8);
+  }
+  context.fillStyle = pen.INK;
+  context.fillRect(middle - 0.75, top + 1, 1.5, ROW - 2);
+  context.textBaseline = "middle";
+  context.font = `600 12px ${pen.FONT}`;
+  context.textAlign = "left";
+  context.fillText(name, 0, top + ROW / 2);
+  context.textAlign = "right";
+  context.fillText(figure, width, top + ROW / 2);
+}
+
+/** A line of small words below the bars: at their left end, in the middle and at their right end. */
+export function drawEnds(context, width, row, words) {
+  const [left, room] = [LEFT, width - LEFT - RIGHT];
+  context.font = `500 11px ${pen.FONT}`;
+  context.fillStyle = pen.INK;
+  context.textBaseline = "middle";
+  words.forEach((text, k) => {
+    context.textAlign = ["left", "center", "right"][k];
+    context.fillText(text, left + (k * room) / 2, row * ROW + 8);
+  });
+}

@@ -1,0 +1,99 @@
+// The rigs in their pictures: one, or two beside each other under one hand.
+
+import { Drag } from "./drag.js";
+import { stiffness } from "./readouts.js";
+import { RunningRms } from "./rms.js";
+import { Scene } from "./scene.js";
+import { formula } from "./symbols.js";
+
+const RATE = 8; // updates of the captions per second: faster, digits cannot be read
+const PLACES = ["rig", "second-rig"];
+const CURVES = ["error", "second_error"];
+const NOTHING = "nothing"; // to compare with
+
+const digits = (value, places) => (Number.isFinite(value) ? value.toFixed(places) : "–");
+
+export class Rigs {
+  /** `hand` is this window's; `frame()` is the newest frame, `enabled()` says whether there is a rig to hold. */
+  constructor(hand, { frame, enabled }) {
+    this.hand = hand;
+    this.last = 0;
+    this.rms = PLACES.map(() => new RunningRms());
+    const canvases = PLACES.map((place) => document.getElementById(place));
+    const frames = [() => frame(), () => frame()?.second];
+    this.scenes = canvases.map((canvas, k) => {
+      const scene = new Scene(canvas, { magnified: k === 0 });
+      new Drag(canvas, { scene, hand, enabled, frame: frames[k] });
+      return scene;
+    });
+    this.captions = canvases.map((canvas) => [...canvas.parentElement.querySelectorAll("b, i")]);
+  }
+
+  setUp({ geometry, air, choices }) {
+    this.titles = Object.fromEntries(choices.controller.map(({ name, title }) => [name, title]));
+    for (const scene of this.scenes) scene.setUp(geometry, air);
+    this.clear();
+  }
+
+  /** Forget the past. */
+  clear() {
+    for (const rms of this.rms) rms.clear();
+  }
+
+  setPath(points) {
+    for (const scene of this.scenes) scene.setPath(points);
+  }
+
+  /** The names of both, above the pictures and in the plot of the error. */
+  show({ controller = "", compare = NOTHING }) {
+    const names = [controller, compare].map((name) => this.titles[name] ?? name);
+    names.forEach((name, k) => this.write(k, 0, name));
+    CURVES.forEach((curve, k) => {
+      const parts = compare === NOTHING ? [["e"]] : [names[k]];
+      document.querySelector(`[data-curve=${curve}] .symbol`).replaceWith(formula(parts));
+    });
+  }
+
+  /** Take note of a frame. */
+  push(frame) {
+    this.note(frame);
+    this.scenes[0].push(frame);
+    if (frame.second) this.scenes[1].push(frame.second);
+  }
+
+  /** Take note of what a frame adds to the running errors. */
+  note({ time, error_mm: error, second }) {
+    this.rms[0].push(time, error);
+    this.rms[1].push(time, second?.error_mm ?? NaN);
+  }
+
+  /** The hint of what to do has been followed. */
+  cued() {
+    for (const scene of this.scenes) scene.cue = false;
+  }
+
+  /** `window` is the width of what the magnifier shows, m. */
+  draw(frame, window) {
+    const two = frame.second ? "2" : "1";
+    if (document.body.dataset.rigs !== two) document.body.dataset.rigs = two;
+    this.scenes[0].draw(frame, this.hand.held, window);
+    if (frame.second) this.scenes[1].draw(frame.second, this.hand.held, window);
+  }
+
+  /** Called with each frame of the screen: the captions of two, `rms` their running errors, mm. */
+  step(frame, rms, now) {
+    if (!frame.second || now - this.last < 1e3 / RATE) return;
+    this.last = now;
+    [frame, frame.second].forEach((one, k) => {
+      this.write(k, 1, digits(one.error_mm, 2));
+      this.write(k, 2, digits(rms[k], 2));
+      const felt = stiffness(one);
+      this.write(k, 3, felt ? Number(felt[0].toPrecision(3)).toLocaleString("en") : "–");
+    });
+  }
+
+  write(side, part, words) {
+    const element = this.captions[side][part];
+    if (element.textContent !== words) element.textContent = words;
+  }
+}

@@ -1,0 +1,92 @@
+"""Friction and flows of a frame, against the plant's own equations of motion and of mass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from birthsim_env.physics.compiled.lanes import (
+    BRISTLE_S0,
+    BRISTLE_S1,
+    FC1,
+    FC2,
+    FS1,
+    FS2,
+    FV1,
+    FV2,
+    MASS,
+    TN1,
+    TN2,
+    TP1,
+    TP2,
+    V1,
+    V2,
+    parameter_array,
+)
+from birthsim_env.physics.geometry import amplification
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.frames import SLICES, row_of
+from birthsim_live.rig.inside import ROWS, look_inside
+from birthsim_live.rig.session import Session
+
+FRICTION = (FC1, FC2, FS1, FS2, FV1, FV2, BRISTLE_S0, BRISTLE_S1)
+
+
+def moving_plant(law: str) -> Plant:
+    """A rig whose pistons slide, its bristles bent."""
+    plant = Plant(Parameters().replace({"friction.law": law}))
+    plant.advance(np.array([[0.6], [-0.6], [-0.4], [0.4]]), np.array([[20.0], [-10.0]]), 0.2)
+    assert (np.abs(plant.piston_speed) > 0.01).all()
+    return plant
+
+
+def inside(plant: Plant) -> np.ndarray:
+    rows = np.empty((ROWS, 1))
+    look_inside(plant.state, plant.lane_parameters, rows)
+    return rows[:, 0]
+
+
+@pytest.mark.parametrize("law", ["lugre", "elasto_plastic", "coulomb"])
+def test_friction_is_what_the_pistons_lack_of_acceleration(law: str) -> None:
+    plant = moving_plant(law)
+    still = np.zeros((4, 1)), np.zeros((2, 1))
+    with_friction = plant.derivatives(plant.state, *still)
+    g, y1, y2 = Parameters().geometry, *plant.piston[:, 0]
+    w = (y1 + g.k1) ** 2 - g.d3**2 - g.d6**2
+    kappa = amplification(y2 + g.k2, y1 + g.k1, 1 / np.sqrt((2 * g.d3 * g.d6) ** 2 - w**2))
+    found = inside(plant)[:2]
+    plant.lane_parameters[list(FRICTION)] = 0.0
+    free = plant.derivatives(plant.state, *still)
+    lack = (free - with_friction)[[V1, V2], 0] * plant.lane_parameters[MASS, 0] * [kappa**2, 1.0]
+    assert found == pytest.approx(lack, rel=1e-9)
+    assert (np.abs(found) > 5).all()
+
+
+def test_flows_are_those_that_fill_the_chambers() -> None:
+    """The ideal gas: a chamber's mass P V / (R T) grows by what flows in."""
+    plant = moving_plant("lugre")
+    rig = Parameters()
+    flows, step = inside(plant)[2:], 1e-6
+
+    def masses() -> np.ndarray:
+        halves = np.repeat([rig.cylinder1.stroke / 2, rig.cylinder2.stroke / 2], 2)
+        lengths = halves + np.repeat(plant.piston[:, 0], 2) * [1, -1, 1, -1]
+        areas = [rig.cylinder1.area_p, rig.cylinder1.area_n, rig.cylinder2.area_p, rig.cylinder2.area_n]
+        volumes = rig.chambers.dead_volume + areas * lengths
+        return plant.pressures[:, 0] * volumes / (rig.air.gas_constant * plant.state[[TP1, TN1, TP2, TN2], 0])
+
+    before = masses()
+    plant.advance(plant.state[-4:].copy(), np.zeros((2, 1)), step)
+    assert (masses() - before) / step == pytest.approx(flows, rel=1e-3, abs=1e-8)
+
+
+def test_a_row_holds_them() -> None:
+    session = Session(Parameters())
+    session.advance(300)
+    rows = np.empty((ROWS, 1))
+    plant = session._simulation.plant
+    look_inside(plant.state, parameter_array(Parameters(), 1), rows)
+    row = row_of(session._simulation, session.hands, 0.0)
+    assert np.array_equal(row[SLICES["friction"]], rows[:2, 0])
+    assert np.array_equal(row[SLICES["flows"]], rows[2:, 0])

@@ -1,0 +1,63 @@
+"""A policy of one's own on the page: ``birthsim-live --policy``."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from agents.policy.seeds import SHIPPED
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import opening_settings
+from birthsim_live.static.pack import Packer, pack, packed_policies
+from tests.console import call
+
+RIG = Parameters()
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> str:
+    """A folder as birthsim-train leaves it."""
+    return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
+
+
+def test_it_is_a_choice_and_the_page_opens_with_it(mine: str) -> None:
+    session = Session(RIG, opening_settings(RIG, [mine]), policies=[mine, "forceps"])
+    choices = {one["name"]: one for one in session.choices.controllers}
+    assert session.settings.controller == f"residual:{mine}"
+    assert "run 1" in choices[f"residual:{mine}"]["title"]
+    assert [name for name in choices if name == "residual:forceps"] == ["residual:forceps"]
+    session.advance(200)
+    assert session.lost is None
+    session.change({"controller": "residual:forceps"})
+    session.change({"controller": f"residual:{mine}"})
+    session.advance(50)
+    shipped = Session(RIG)
+    with pytest.raises(ValueError, match=r"controller = .*allowed: backstepping"):
+        shipped.change({"controller": f"residual:{mine}"})
+
+
+def test_the_page_without_a_server_has_it_too(mine: str) -> None:
+    packer = Packer()
+    packed = pack(RIG, packer, [mine])
+    own = packed["controllers"][f"residual:{mine}"]["policy"]["file"]
+    assert packed["opens"] == {"controller": f"residual:{mine}"}
+    assert packed["settings"]["controller"] == "backstepping"
+    files = packed_policies(RIG, packer, [mine])
+    assert own in files
+    assert " " not in own
+    assert own.count("/") == 1
+    assert len(files) == len({one["policy"]["file"] for one in packed["controllers"].values() if "policy" in one})
+
+
+@pytest.mark.parametrize("where", [[], ["--static", "page"]])
+def test_what_is_no_policy_is_refused_in_one_line(
+    where: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, _, complained = call("live", monkeypatch, capsys, "--port", "0", "--policy", "circle", "nowhere", *where)
+    assert status == 2
+    assert complained.strip().splitlines()[-1].startswith("birthsim-live: error: policy = 'nowhere'")
+    assert not (tmp_path / "page").exists()

@@ -1,0 +1,143 @@
+"""A recording that is opened on the page: dropped or chosen, played, searched, and refused in a line where it is none."""
+
+from __future__ import annotations
+
+import base64
+import os
+import struct
+
+import numpy as np
+import pytest
+
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.frames import FIELDS, SLICES
+from birthsim_live.rig.hand import Hold
+from birthsim_live.rig.player import Player
+from birthsim_live.rig.recorder import Recorder
+from birthsim_live.rig.recording import load_recording
+from birthsim_live.rig.session import Session
+from tests.live import browser
+from tests.live.browser import Server, Window
+
+LACK = browser.missing()
+pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
+
+DROP = """([bytes, name]) => {
+    const data = new DataTransfer();
+    const content = typeof bytes === "number" ? new Uint8Array(bytes) : Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0));
+    data.items.add(new File([content], name));
+    const event = (kind) => new DragEvent(kind, { dataTransfer: data, bubbles: true, cancelable: true });
+    window.dispatchEvent(event("dragover"));
+    window.shaded = !document.querySelector("#drop").hidden;
+    window.dispatchEvent(event("drop"));
+}"""
+"""What a browser does when somebody drops a file."""
+NOTICES = "document.querySelector('#notices').textContent"
+
+
+def record(folder, rig=None):
+    """A file of 2 s: at rest, a pull, another law."""
+    session = Session(rig or Parameters())
+    session.recorder = Recorder(session, folder / "pull.rec")
+    session.advance(600)
+    session.hands.hold = Hold(np.array([0.54, 0.01]), 1)
+    session.advance(700)
+    session.change({"controller": "backstepping", "Kclx": 3000})
+    session.advance(700)
+    session.recorder.finish()
+    return folder / "pull.rec"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recordings"))
+
+
+def drop(window, content, name="pull.rec"):
+    window.page.evaluate(DROP, [content if isinstance(content, int) else base64.b64encode(content).decode(), name])
+
+
+def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures):
+    lesson = window.value("document.querySelector('#guide').value")
+    drop(window, file.read_bytes())
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'pull.rec'")
+    assert window.value("window.shaded && document.querySelector('#drop').hidden")
+    assert not window.page.locator("#settings").is_visible()
+    window.page.locator("#pause").click()
+    player = Player(load_recording(file))
+    duration = player.recording.duration
+    assert window.value("birthsim.state.duration") == pytest.approx(duration)
+    assert window.value("birthsim.plots.shown.history.view('time').at(-1)") == pytest.approx(duration, abs=0.03)
+    for time in (0.1, 0.999, 1.5, duration):
+        window.page.evaluate(f"() => window.birthsim.send({{ type: 'seek', time: {time} }})")
+        window.wait(f"Math.abs(birthsim.frame.time - {time}) < 1e-9")
+        player.seek(time)
+        frame, wanted = window.frame(), player.frame()
+        for name in {*FIELDS, "force", "rendered", "linkage", "error_mm"} - {"pointer"}:
+            numbers = np.array([frame[name], wanted[name]], dtype=np.float64)
+            assert np.allclose(*numbers, rtol=1e-5, atol=1e-7, equal_nan=True), (time, name)
+    assert "backstepping" in window.page.locator("#played").text_content()
+    assert "Kclx 3000 N/m" in window.page.locator("#played").text_content()
+    window.page.screenshot(path=pictures / "dropped.png")
+    window.page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live' && birthsim.frame.real_time !== null")
+    assert window.page.locator("#settings").is_visible()
+    assert window.value("document.querySelector('#guide').value") == lesson
+    window.hold(across=30)
+    window.wait("birthsim.frame.force[0] > 5")
+    window.page.mouse.up()
+
+
+def test_a_recording_can_be_chosen(window, file):
+    window.page.locator("#choose").set_input_files(file)
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.frame.time > 0")
+    window.page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live'")
+
+
+@pytest.mark.parametrize("damage", ["foreign", "checksum", "large", "shape"])
+def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
+    whole = file.read_bytes()
+    content, words = {
+        "foreign": (b"PK this is no recording", "is damaged or foreign"),
+        "checksum": (whole[:400] + bytes([whole[400] ^ 1]) + whole[401:], "has another checksum"),
+        "large": (2**27 + 1, "allowed: up to 134217728"),
+        "shape": (record(tmp_path, Parameters().replace({"geometry.d6": 0.26})).read_bytes(), "allowed: birthsim-replay FILE"),
+    }[damage]
+    drop(window, content, f"{damage}.rec")
+    window.wait(f"{NOTICES}.includes({words!r}) && {NOTICES}.includes('{damage}.rec')")
+    assert "\n" not in window.value(NOTICES)
+    assert window.value("birthsim.hello.mode") == "live"
+
+
+def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
+    drop(window, file.read_bytes() + struct.pack("<II", 1000, 0) + bytes(10))
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.frame.time > 0")
+    window.page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live'")
+
+
+def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, file):
+    with Server("replay", file) as server, Window(chromium, server.url) as viewer:
+        first = viewer.value("birthsim.plots.shown.history.view('time')[0]")
+        assert first == 0
+        assert viewer.page.locator("#file").text_content() == "pull.rec"
+        assert not viewer.page.locator("#back").is_visible()
+        viewer.wait("birthsim.state.paused")  # at its end
+        recording = load_recording(file)
+        last = viewer.value("['time', 'force_x'].map((name) => birthsim.plots.shown.history.view(name).at(-1))")
+        row = recording.rows[round(last[0] / recording.interval)]
+        assert last[1] == pytest.approx(row[SLICES["drag_force"]][0], rel=1e-5)
+        # From its end it would play on from wherever it is put.
+        viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
+        viewer.page.locator("#scrub").fill("0.4")
+        viewer.wait("Math.abs(birthsim.frame.time - 0.4) < 0.02")
+        shown = "Number(document.querySelector('[data-figure=error] small').textContent.match(/[\\d.]+/)[0])"
+        viewer.wait(f"Math.abs({shown} - birthsim.plots.shown.history.at('error_rms', 0.4)) < 0.006")
+        assert viewer.complaints == []
+
+
+def test_rows_are_as_long_as_the_page_believes(window):
+    """The page reads recordings by names and sizes of its own."""
+    found = window.page.evaluate("async () => (await import(new URL('static/frame.js', location))).FIELDS")
+    assert list(found.items()) == list(FIELDS.items())
