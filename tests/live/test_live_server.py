@@ -26,7 +26,6 @@ from birthsim_live.server import live_hub, protocol
 from birthsim_live.server.addresses import is_loopback, listen
 from birthsim_live.server.app import create_app
 from birthsim_live.server.live_hub import LiveHub
-from birthsim_live.server.past import PLOTTED, Past
 from birthsim_live.server.replay_hub import ReplayHub
 from tests.console import PATIENCE, call, run
 
@@ -82,26 +81,6 @@ def test_a_window_is_told_everything_and_then_sees_frames(live: TestClient) -> N
         assert set(FIELDS) | {"linkage", "force", "rendered", "error_mm", "pointer_id", "lost", "behind"} <= set(first)
         assert second["n"] > first["n"]
         assert second["time"] >= first["time"]
-
-
-def test_a_window_that_joins_sees_the_time_before(live: TestClient) -> None:
-    with live.websocket_connect(SOCKET) as first:
-        assert until(first, lambda m: m["type"] == "frame" and m["time"] > 0.3)
-        with live.websocket_connect(SOCKET) as second:
-            times = [frame["time"] for frame in until(second, of("history"))["frames"]]
-            assert times[0] < 0.05
-            assert times[-1] > 0.2
-            assert (np.diff(times) > 0.02).all()
-
-
-def test_the_past_is_ten_seconds_and_forgets_what_a_reset_undoes() -> None:
-    past, frame = Past(), dict.fromkeys(PLOTTED, 0.0)
-    for k in range(2000):
-        past.take({**frame, "time": 0.01 * k})
-    times = [one["time"] for one in past.message()["frames"]]
-    assert times[-1] - times[0] == pytest.approx(10.0, abs=0.05)
-    past.take({**frame, "time": 0.0})
-    assert [one["time"] for one in past.message()["frames"]] == [0.0]
 
 
 def test_a_window_that_falls_silent_lets_go(live: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
