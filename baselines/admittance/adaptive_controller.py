@@ -30,8 +30,6 @@ MOST_BIAS = 2.0
 class AdaptiveAdmittance(AdmittanceBackstepping):
     """As ``AdmittanceBackstepping``, adaptive: ``friction_level``, ``tracker_noise`` and ``force_bias`` of ``estimation``.
 
-    With sampled positions its observer knows friction along the pistons' own motion: ``own_friction``.
-
     Arguments are those of ``AdmittanceBackstepping``. One gain more: friction_rate, 1/s, at which friction is learned while
     a piston slides; 0 learns nothing.
     """
@@ -40,10 +38,7 @@ class AdaptiveAdmittance(AdmittanceBackstepping):
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {**AdmittanceBackstepping.TUNABLE, "friction_rate": (0.0, 20.0)}
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {**AdmittanceBackstepping.TUNED["ideal"], "friction_rate": 4.0},
-        "lab": {
-            **AdmittanceBackstepping.TUNED["lab"],
-            **{"friction_rate": 4.0, "gain": 80.0, "rest_gain": 45.0, "bandwidth": 95.0},
-        },
+        "lab": {**AdmittanceBackstepping.TUNED["lab"], "friction_rate": 4.0, "rest_gain": 45.0},
     }
 
     @property
@@ -75,7 +70,3 @@ class SensorlessAdmittance(AdaptiveAdmittance):
     """
 
     FORCE_SENSOR = False
-    TUNED: ClassVar[dict[str, dict[str, float]]] = {
-        "ideal": AdaptiveAdmittance.TUNED["ideal"],
-        "lab": {**AdmittanceBackstepping.TUNED["lab"], "friction_rate": 4.0, "rest_gain": 45.0},
-    }

@@ -16,7 +16,6 @@ from baselines.estimation import (
     force_bias,
     force_observer,
     friction_level,
-    own_friction,
     reference_friction,
     tracker_noise,
 )
@@ -49,12 +48,10 @@ BIAS = TRACKER + tracker_noise.ROWS
 FRICTION = BIAS + force_bias.ROWS
 HAND = FRICTION + friction_level.ROWS
 FELT = HAND + force_observer.ROWS
-OWN_FRICTION = FELT + 2
-PISTONS = OWN_FRICTION + own_friction.ROWS
+PISTONS = FELT + 2
 """Rows of memory at which its parts begin: offset of the compliant motion; 1 at a new start; bristles; spools, pressures and
 openings of the four chambers; joints a period ago; the law's own; tracker's noise; bias of the force; level of friction; the
-observer of the hand's force and what it found a period ago; friction along the pistons' own motion; the observer of the
-pistons."""
+observer of the hand's force and what it found a period ago; the observer of the pistons."""
 
 CONSTANTS = (
     *("sampled", "rows", "period", "mass", "ratio", "friction_fraction", "trust", "bandwidth", "noise", "force_bias"),
@@ -76,14 +73,13 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     s, about = block(seen, SEEN), numbers(constants, NUMBERS + at.PARAMETERS)
     p, period, sampled = about[NUMBERS:], about[PERIOD], about[SAMPLED] > 0.0
     m = block(memory, PISTONS + int(about[MEMORY_ROWS]))[:, :n]
-    own, push, missed = scratch(25)[:, :n], scratch(2)[:, :n], 0
+    own, push, missed = scratch(21)[:, :n], scratch(2)[:, :n], 0
     motion, believed, disturbance, disturbance_force = own[:8], own[8:10], own[10:12], own[12:14]
     rest, moving, force, fresh = own[14:16], own[16], own[17:19], m[FRESH]
     time, position, velocity = s[TIME, :n], s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n]
     target, told, openings = s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], s[OPENING:SHOWN, :n]
     spools, pressures, opened, joints = m[SPOOLS:PRESSURES], m[PRESSURES:OPENED], m[OPENED:JOINTS], m[JOINTS:LAW]
     pistons, levels, unexplained = m[PISTONS:], m[FRICTION:HAND], own[19:21]
-    ahead, before, owned, rubs = own[21:23], own[23:25], m[OWN_FRICTION:PISTONS], sampled and about[FORCE_SENSOR] > 0.0
     for i in range(n):
         missed += 0 if admittance.is_stiffer(target[8, i], target[9, i], target[14, i], 0.0) else 1
         rest[0, i], rest[1, i] = 0.0, 0.0
@@ -107,9 +103,6 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
             # Without a force sensor the hand is part of what the observers find.
             push[k, i] = force[k, i] if about[FORCE_SENSOR] > 0.0 else 0.0
             believed[k, i] = -about[FRACTION] * levels[friction_level.LEVEL + k, i] * drag[k, i]
-            ahead[k, i] = believed[k, i]
-    if rubs:
-        own_friction.rub(owned, pistons, levels, p, period, fresh, believed, before)
     for i in range(n):
         one = slice(i, i + 1)
         if sampled:
@@ -138,10 +131,7 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     friction_level.learn(
         levels, drag, p[at.FC1], p[at.FC2], joints, unexplained, period, about[FRICTION_RATE] * about[FORCE_SENSOR], fresh
     )  # fmt: skip
-    force_observer.observe(m[HAND:FELT], time, joints, unexplained, p, period, fresh, m[FELT:OWN_FRICTION])
-    if rubs:
-        own_friction.hold(owned, pistons, levels, p, before, believed)
-        own_friction.tell(owned, rest, ahead, period, fresh, believed)
+    force_observer.observe(m[HAND:FELT], time, joints, unexplained, p, period, fresh, m[FELT:PISTONS])
     for i in range(n):
         disturbance[0, i], disturbance[1, i] = pistons[4 if sampled else 2, i], pistons[5 if sampled else 3, i]
     disturbance_forces(joints, believed, disturbance, p, disturbance_force)
