@@ -18,7 +18,7 @@ from agents.training.trainer import train
 
 def test_every_observation_has_the_figures_of_its_own_episode():
     lanes = gymnasium.make_vec(
-        "BirthSIM/ProbeResidual-v1", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
+        "BirthSIM/ProbeResidual-v2", num_envs=4, randomize=True, autoreset_mode="SameStep", duration=0.05
     )  # fmt: skip
     env = Privileged(SB3VecEnv(lanes, staggered=True))
     env.seed(0)
@@ -39,7 +39,7 @@ def test_every_observation_has_the_figures_of_its_own_episode():
 
 def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
     settings = TrainingSettings(
-        "BirthSIM/ProbeResidual-v1", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
+        "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
     )  # fmt: skip
     train(settings, ResidualSettings(), tmp_path)
     policy = load_policy(tmp_path)

@@ -55,7 +55,7 @@ def told(monkeypatch, capsys, *arguments):
 def test_a_student_is_taught_written_and_read(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(module, "LANES", 4)
     settings = TrainingSettings(
-        "BirthSIM/ProbeResidual-v1", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
+        "BirthSIM/ProbeResidual-v2", steps=64, lanes=4, rollout=8, batch=32, validation_lanes=4, validations=1, privileged=True
     )  # fmt: skip
     train(settings, ResidualSettings(force_sensor=False), tmp_path / "teacher")
     out = told(monkeypatch, capsys, "--teacher", tmp_path / "teacher", "--rounds", 2, "--hidden", 3, "--out", tmp_path / "one")
