@@ -161,6 +161,9 @@ pictures: $(READY)
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
 	$(BIN)/birthsim-animate --seed 1 --out docs/forceps.webp
+	$(BIN)/birthsim-animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
+	$(BIN)/birthsim-animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
+	  --out docs/vacuum.webp
 	$(BIN)/birthsim-evaluate --all --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
 	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
