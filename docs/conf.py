@@ -1,6 +1,7 @@
 """How Sphinx builds docs/ into a site (`make docs`): MyST Markdown, notebooks that run, reference pages from code."""
 
 import posixpath
+import shutil
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE)]
 import _generate  # noqa: E402
 
 import birthsim_env  # noqa: E402
+from birthsim_live.static.build import build_page  # noqa: E402
 
 project = "BirthSIM"
 author = "The BirthSIM developers"
@@ -66,9 +68,33 @@ def with_data(app, page, template, context, doctree):
             app.add_js_file(None, body=file.read_text(encoding="utf-8"), type="text/csv", title=file.name)
 
 
+RIG = """<h2>Pull the head</h2>
+<iframe class="rig" src="rig/index.html?controller=backstepping" title="The rig in the browser" loading="lazy"></iframe>
+<p>The rig runs here, in your browser. <a class="reference external" href="rig/index.html">Open it in a window of its own</a>. A page that is opened from a disk
+cannot run it; <code>python -m http.server --directory out/docs</code> serves the site.</p>
+"""
+FIRST = '<section id="three-ways-in">'
+
+
+def with_rig(app, page, template, context, doctree):
+    """The landing page shows the rig itself."""
+    if page == "index":
+        assert FIRST in context["body"], f"docs/index.md has no {FIRST}"
+        context["body"] = context["body"].replace(FIRST, RIG + FIRST)
+
+
+def build_rig(app, exception):
+    """The folder of static files that runs the rig, beside the pages."""
+    if exception is None and app.builder.name == "html":
+        shutil.rmtree(app.outdir / "rig", ignore_errors=True)
+        build_page(app.outdir / "rig", birthsim_env.Parameters())
+
+
 def setup(app):
     """Write the generated parts before any page is read."""
     app.connect("source-read", seen_from_the_site)
     app.connect("html-page-context", with_data)
+    app.connect("html-page-context", with_rig)
+    app.connect("build-finished", build_rig)
     app.connect("builder-inited", lambda _: _generate.write(HERE.parent / "out" / "docs-generated"))
     return {"parallel_read_safe": False}

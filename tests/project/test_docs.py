@@ -166,3 +166,5 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(tmp_path):
     notebooks = [page for page, text in PAGES.items() if "{code-cell}" in text]
     assert len(notebooks) >= 5
     assert [page for page in notebooks if 'class="cell_output' not in (tmp_path / f"{page}.html").read_text("utf-8")] == []
+    assert (tmp_path / "rig" / "rig" / "loop.wasm").exists()
+    assert 'src="rig/index.html' in (tmp_path / "index.html").read_text("utf-8")
