@@ -70,8 +70,8 @@ def with_data(app, page, template, context, doctree):
 
 RIG = """<h2>Pull the head</h2>
 <iframe class="rig" src="rig/index.html?controller=backstepping" title="The rig in the browser" loading="lazy"></iframe>
-<p>The rig runs here, in your browser. <a class="reference external" href="rig/index.html">Open it in a window of its own</a>. A page that is opened from a disk
-cannot run it; <code>python -m http.server --directory out/docs</code> serves the site.</p>
+<p>The rig runs here, in your browser. <a class="reference external" href="rig/index.html">Open it in a window of its own</a>.
+A page that is opened from a disk cannot run it; <code>python -m http.server --directory out/docs</code> serves the site.</p>
 """
 FIRST = '<section id="three-ways-in">'
 
