@@ -1,6 +1,7 @@
 """A recurrent student learns from a privileged policy to act without what that one is told.
 
-python -m agents.commands.distill --teacher DIR --out DIR, and then agents.commands.beside_law --policy DIR
+python -m agents.commands.distill --teacher DIR --out DIR, and then agents.commands.beside_law --policy DIR. The best student
+so far is in --out after every round; an interrupted command does not continue.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy
-from agents.training.student import Lessons, teach
-from agents.training.student_file import save_student
-from agents.training.validation import Score
 from baselines.commands.shared import run, seed_number, whole_up_to
 from birthsim_env.physics.rig.parameters import load_parameters
+
+try:
+    from agents.policy.files import load_policy
+    from agents.policy.seeds import best_policy
+    from agents.training.student import Lessons, teach
+    from agents.training.student_file import save_student
+except ImportError as error:
+    raise SystemExit(f"{error}; a student needs the extra: pip install 'birthsim[agents]'") from error
 
 
 def main() -> None:
@@ -36,14 +40,14 @@ def _distill(arguments: argparse.Namespace) -> None:
     if not teacher.training.get("privileged", False):
         raise ValueError(f"--teacher {arguments.teacher!r} is not privileged; allowed: a policy trained with privileged = true")
     lessons = Lessons(arguments.hidden, arguments.rounds, arguments.seed)
-    student, reached = teach(teacher, lessons, load_parameters(arguments.parameters), _report)
-    training = {"lessons": asdict(lessons), "teacher": teacher.training, "reached": reached.to_dict()}
-    save_student(student, teacher, training, arguments.out)
-    print(f"{sum(one.numel() for one in student.parameters()):,} weights, {reached.pooled:.3f} mm; written to {arguments.out}/")
-
-
-def _report(number: int, score: Score) -> None:
-    print(f"round {number + 1}: {score.pooled:.3f} mm, 95 % {score.tail:.2f} mm, {score.lost} lost", flush=True)
+    rounds = teach(teacher, lessons, load_parameters(arguments.parameters))
+    for number, (student, score, best) in enumerate(rounds, start=1):
+        said = f"round {number} of {lessons.rounds}: {score.pooled:.3f} mm, 95 % {score.tail:.2f} mm, {score.lost} lost"
+        if best:
+            training = {"lessons": asdict(lessons), "teacher": teacher.training, "reached": score.to_dict()}
+            save_student(student, teacher, training, arguments.out)
+            said += f"; the best so far, written to {arguments.out}/"
+        print(said, flush=True)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ student acts. The student is a gated recurrent unit (GRU), as in RAPTOR (arXiv 2
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,10 +89,9 @@ Round = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
 """Observations (T, N, D), the teacher's actions (T, N, size), and whether the episode went on (T, N)."""
 
 
-def teach(
-    teacher: Policy, lessons: Lessons, parameters: Parameters, report: Callable[[int, Score], None]
-) -> tuple[Student, Score]:  # fmt: skip
-    """The student that did best in validation (pooled error and its tail), and what it reached; ``report`` takes each round's.
+def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator[tuple[Student, Score, bool]]:
+    """After each round: the student as it is, what it reaches in validation, and whether no round before was as good (sum of
+    pooled error and tail).
 
     ``parameters`` is the rig as its owner describes it.
     """
@@ -103,21 +103,15 @@ def teach(
     student = Student(network.mean[:inputs], deviation, network.outputs, lessons.hidden)
     adam = torch.optim.Adam(student.parameters(), lr=RATE)
     past: deque[Round] = deque(maxlen=KEPT)
-    best: tuple[float, dict[str, torch.Tensor], Score] | None = None
-    for number in range(lessons.rounds):
-        past.append(_round(env, teacher, student, SEED + SPACING * lessons.seed + LANES * number, number == 0))
-        adam.param_groups[0]["lr"] = RATE * (1 - number / lessons.rounds) + LEAST_RATE
-        _learn(student, adam, list(past), number)
-        score = validate(checks, student.acting())
-        report(number, score)
-        if best is None or score.pooled + score.tail < best[0]:
-            state = {name: value.clone() for name, value in student.state_dict().items()}
-            best = score.pooled + score.tail, state, score
-    assert best is not None
-    student.load_state_dict(best[1])
-    for worlds in (env, checks):
-        worlds.close()
-    return student, best[2]
+    least = np.inf
+    with closing(env), closing(checks):
+        for number in range(lessons.rounds):
+            past.append(_round(env, teacher, student, SEED + SPACING * lessons.seed + LANES * number, number == 0))
+            adam.param_groups[0]["lr"] = RATE * (1 - number / lessons.rounds) + LEAST_RATE
+            _learn(student, adam, list(past), number)
+            score = validate(checks, student.acting())
+            before, least = least, min(least, score.pooled + score.tail)
+            yield student, score, number == 0 or least < before
 
 
 def _worlds(teacher: Policy, lanes: int, parameters: Parameters) -> Any:
