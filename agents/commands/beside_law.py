@@ -15,10 +15,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policy.controller import ResidualController
 from agents.residual.privileged import PolicyFunction, acting
 from agents.residual.settings import LAWS, ResidualSettings
-from agents.training.validation import Score, validate
 from baselines.bench.haptics.rendering import rendering
 from baselines.bench.haptics.worlds import Condition
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, number, quantile
@@ -29,10 +27,12 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
 try:
+    from agents.policy.controller import ResidualController
     from agents.policy.files import Policy, load_policy
     from agents.policy.seeds import policy_folders
     from agents.training.student_file import NAME as STUDENT
     from agents.training.student_file import Taught, load_student
+    from agents.training.validation import Score, validate
 except ImportError as error:
     raise SystemExit(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
 
