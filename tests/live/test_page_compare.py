@@ -16,7 +16,7 @@ LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 FIRST, SECOND = "admittance-backstepping", "backstepping"
-BESIDE = "birthsim.frame.second !== null && document.body.dataset.rigs === '2'"
+BESIDE = "birthsim.frame !== null && birthsim.frame.second !== null && document.body.dataset.rigs === '2'"
 ALONE = "birthsim.frame.second === null && document.body.dataset.rigs === '1'"
 SHOWN = "[...document.querySelectorAll('.rigs figure')].map((one) => one.offsetParent !== null)"
 NAMES = "[...document.querySelectorAll('.rigs b')].map((one) => one.textContent)"
@@ -32,6 +32,8 @@ def pair(chromium, server):
         opened.wait(f"birthsim.settings.controller === '{FIRST}' && {BESIDE}")
         opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
         yield opened
+        if opened.value("birthsim.hello.mode === 'replay'"):  # a test that failed left it so
+            opened.page.locator("#back").click()
         opened.page.evaluate("birthsim.send({ type: 'set', settings: { compare: 'nothing' } })")
         opened.wait(ALONE)
         assert opened.complaints == []
@@ -114,13 +116,15 @@ def test_both_are_recorded_replayed_by_command_and_opened_on_the_page(chromium, 
     recording = load_recording(file)
     forces = recording.second[:, SLICES["drag_force"]][:, 0]
     assert np.isfinite(forces).all()
-    pulled = recording.interval * float(np.argmax(forces))
+    # In the middle of the pull, at a step of the scrubber.
+    pulled = round(recording.interval * float(np.median(np.flatnonzero(forces > 10))), 2)
 
     def second_at_the_pull(viewer):
         viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
         viewer.wait(f"birthsim.state.paused && {BESIDE}")
         viewer.page.locator("#scrub").fill(str(pulled))
-        viewer.wait(f"Math.abs(birthsim.frame.time - {pulled}) < 0.02 && birthsim.frame.second.force[0] > 10")
+        # No nearer instant counts: the replay may have been paused beside it, and a frame between two rows has other values.
+        viewer.wait(f"Math.abs(birthsim.frame.time - {pulled}) < 1e-4 && birthsim.frame.second.force[0] > 10")
         assert viewer.value(NAMES) == ["admittance backstepping", "backstepping"]
         return viewer.frame()["second"]
 
