@@ -45,7 +45,7 @@ class AdaptiveAdmittance(AdmittanceBackstepping):
         "lab": {**AdmittanceBackstepping.TUNED["lab"], "friction_rate": 4.0, "rest_gain": 45.0},
         "inertial": {
             **AdmittanceBackstepping.TUNED["ideal"],
-            **{"friction_rate": 4.0, "rest_gain": 60.0, "pressure_bandwidth": 30.0},
+            **{"friction_rate": 4.0, "rest_gain": 45.0, "pressure_bandwidth": 30.0},
         },
     }
 
