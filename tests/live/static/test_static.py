@@ -20,6 +20,7 @@ from birthsim_live.rig.settings import opening_settings
 from tests.build.targets import need_linker
 from tests.console import run
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
+from tests.live.static.lack import lack
 
 LACK = lack()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
