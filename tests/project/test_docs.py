@@ -161,10 +161,16 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(tmp_path):
     pytest.importorskip("sphinx")
     pytest.importorskip("myst_nb")
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", str(DOCS), str(tmp_path)]
-    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    given = {**os.environ, "BIRTHSIM_REPOSITORY": "someone/birthsim"}
+    built = subprocess.run(command, env=given, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr[-4000:]
     notebooks = [page for page, text in PAGES.items() if "{code-cell}" in text]
     assert len(notebooks) >= 5
     assert [page for page in notebooks if 'class="cell_output' not in (tmp_path / f"{page}.html").read_text("utf-8")] == []
+    tutorials = [page for page in notebooks if page.startswith("tutorials/")]
+    assert sorted(Path(page).name for page in tutorials) == sorted(file.stem for file in (tmp_path / "notebooks").iterdir())
+    for page in tutorials:
+        links = (tmp_path / f"{page}.html").read_text("utf-8").partition('<p class="notebook">')[2].partition("</p>")[0]
+        assert re.findall(r">(\w[^<]+)<", links) == ["Download this notebook", "Open in Colab", "Open in Binder"]
     assert (tmp_path / "rig" / "rig" / "loop.wasm").exists()
     assert 'src="rig/index.html' in (tmp_path / "index.html").read_text("utf-8")
