@@ -36,9 +36,7 @@ def main() -> None:
     """Entry point."""
     own = Lessons()
     parser = argparse.ArgumentParser(prog="agents.commands.distill", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument(
-        "--teacher", type=Path, required=True, metavar="DIR", help="folder of privileged policies, in it seed_0 ..."
-    )
+    parser.add_argument("--teacher", type=Path, required=True, metavar="DIR", help="privileged policies: seed_0 ... in it")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--hidden", type=whole_up_to(512), default=own.hidden, help="cells of memory (default: %(default)s)")
     parser.add_argument("--rounds", type=whole_up_to(1000), default=own.rounds, help="of 256 episodes (default: %(default)s)")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,8 @@ class PolicyNetwork:
                 raise ValueError(f"policy: a memory of {gates} and {len(self.memory[1][1])} gates; allowed: 3 H for H cells")
             width += gates // 3
         _outputs("the last layer", self.layers[-1], width)
-        arrays = [self.mean, self.variance, *(array for one in (*self.layers, *self.memory) for array in one)]
+        own = (*self.layers, *self.memory)
+        arrays: list[NDArray[Any]] = [self.mean, self.variance, *(array for one in own for array in one)]
         if not all(np.isfinite(array).all() for array in arrays) or (self.variance < 0).any():
             raise ValueError("policy: some numbers are not finite or a variance is negative; allowed: finite numbers")
 
@@ -121,7 +123,7 @@ class Acting:
 
     def __init__(self, network: PolicyNetwork) -> None:
         self._network = network
-        self.reset()
+        self._memory: Array = np.zeros((0, network.cells))
 
     def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         if len(self._memory) != len(observations):
@@ -130,10 +132,8 @@ class Acting:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._memory: Array = np.zeros((0, self._network.cells))
-        elif len(self._memory):
-            self._memory[lanes] = 0.0
+        if lanes is None or len(self._memory):
+            self._memory[slice(None) if lanes is None else lanes] = 0.0
 
 
 def _outputs(name: str, one: Layer, width: int) -> int:
@@ -170,7 +170,7 @@ def layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) ->
 
 @kernel
 def remember(enters: Array, own: Array, memory: Array) -> None:
-    """One step of a gated recurrent unit: ``memory`` (N, H) goes on, with ``enters`` = W x + b and ``own`` = V h + c (N, 3H)."""
+    """One step of a gated recurrent unit: ``memory`` h (N, H) goes on, with W x + b and V h + c, both (N, 3H)."""
     cells = memory.shape[1]
     for i in range(memory.shape[0]):
         for j in range(cells):

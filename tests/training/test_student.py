@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import torch
+from agents.training.student_file import NAME, load_student
 
 from agents.commands import distill
 from agents.policy.seeds import policy_folders
@@ -14,7 +15,6 @@ from agents.residual.settings import ResidualSettings
 from agents.training import student as module
 from agents.training.configuration import TrainingSettings
 from agents.training.student import Student, _learn
-from agents.training.student_file import NAME, load_student
 from agents.training.trainer import train
 
 
