@@ -48,11 +48,15 @@ FELT = (
     "bandwidth, Hz: mean",
     "JND at 1 Hz: median",
     "own error, mm: median",
+    "more bandwidth than the law: mean, Hz",
     "less JND than the law: mean",
     "less own error than the law: mean, mm",
     "lost",
 )
 """Columns of the table of what a hand feels."""
+
+GAINED = ("bandwidth", "jnd", "error")
+"""Figures of what a hand feels that are compared with the law's."""
 
 SETPOINT, PUSH = 2000.0, 10.0
 """N/m and N, of the multisine hand."""
@@ -156,10 +160,16 @@ def _feel(folders: Sequence[Path], settings: ResidualSettings, arguments: argpar
     print(f"| | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
     for name, own in zip((settings.law, *(folder.name for folder in folders)), (law, *policies), strict=True):
         figures = [np.mean(own["bandwidth"]), quantile(own["jnd"], 0.5), quantile(own["error"], 0.5)]
-        less = ["", ""] if own is law else [_interval(_mean, (law[k] - own[k])[None]) for k in ("jnd", "error")]
-        print(f"| {name} | {' | '.join([*map(number, figures), *less])} | {own['lost']:g} |")
-    less = [_interval(_mean, np.stack([law[k] - own[k] for own in policies])) for k in ("jnd", "error")]
-    print(f"| all seeds | | | | {' | '.join(less)} | |")
+        better = [""] * len(GAINED) if own is law else [_interval(_mean, _gained(law, own, key)[None]) for key in GAINED]
+        print(f"| {name} | {' | '.join([*map(number, figures), *better])} | {own['lost']:g} |")
+    better = [_interval(_mean, np.stack([_gained(law, own, key) for own in policies])) for key in GAINED]
+    print(f"| all seeds | | | | {' | '.join(better)} | |")
+
+
+def _gained(law: dict[str, Any], own: dict[str, Any], key: str) -> Array:
+    """How much better than the law, per rig (rigs,)."""
+    better: Array = own[key] - law[key]
+    return better if key == "bandwidth" else -better
 
 
 def _felt(found: Result, rigs: int) -> dict[str, Any]:

@@ -34,7 +34,9 @@ def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(monkeypatch, c
     assert [row[0] for row in felt] == [row[0] for row in settled]
     errors = [float(row[3]) for row in felt if row[3]]
     assert max(errors[1:]) < errors[0], "own error under a multisine hand"
-    gained = [float(row[5].split()[0]) for row in felt[1:-1]]
+    gained = [float(row[6].split()[0]) for row in felt[1:-1]]
+    more = [float(row[4].split()[0]) for row in felt[1:-1]]
+    assert more == pytest.approx([float(row[1]) - float(felt[0][1]) for row in felt[1:-1]], abs=0.02)
     assert gained == pytest.approx([errors[0] - own for own in errors[1:]], abs=0.02), "one rig: its mean is the median"
 
 
