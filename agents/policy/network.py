@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,7 @@ class PolicyNetwork:
         r = s(Wr x + br + Vr h + cr),  z = s(Wz x + bz + Vz h + cz),  n = tanh(Wn x + bn + r (Vn h + cn)),  h' = (1 - z) n + z h
 
     with s(a) = 1/(1 + exp(-a)). Its two layers are W (3H, M) with b, and V (3H, H) with c; their rows are r, z and n.
-    Raises ``ValueError`` where shapes do not fit together or a number is not finite.
+    Raises ``ValueError`` where shapes or kinds of numbers do not fit together, or a number is not finite.
     """
 
     mean: Statistics
@@ -67,10 +66,15 @@ class PolicyNetwork:
                 raise ValueError(f"policy: a memory of {gates} and {len(self.memory[1][1])} gates; allowed: 3 H for H cells")
             width += gates // 3
         _outputs("the last layer", self.layers[-1], width)
-        own = (*self.layers, *self.memory)
-        arrays: list[NDArray[Any]] = [self.mean, self.variance, *(array for one in own for array in one)]
-        if not all(np.isfinite(array).all() for array in arrays) or (self.variance < 0).any():
-            raise ValueError("policy: some numbers are not finite or a variance is negative; allowed: finite numbers")
+        weights = [array for one in (*self.layers, *self.memory) for array in one]
+        for arrays, kind in ((weights, np.float32), ([self.mean, self.variance], np.float64)):
+            # The compiled stage takes their bytes as they are.
+            if any(array.dtype != kind for array in arrays):
+                raise ValueError(f"policy: arrays of {[str(array.dtype) for array in arrays]}; allowed: {np.dtype(kind)}")
+            if not all(np.isfinite(array).all() for array in arrays):
+                raise ValueError("policy: some numbers are not finite; allowed: finite numbers")
+        if (self.variance < 0).any():
+            raise ValueError(f"policy: a variance is {self.variance.min()}; allowed: 0 or more")
 
     @property
     def inputs(self) -> int:

@@ -157,13 +157,15 @@ def shape(*sizes, fill=0.1, dtype=np.float32):
         {"1_weight": shape(8, 17)},
         {"3_weight": shape(2, 3), "3_bias": shape(2)},
         {"extra_weight": shape(2, 2)},
-        {"variance": shape(INPUTS, fill=-0.1)},
+        {"variance": shape(INPUTS, fill=-0.1, dtype=np.float64)},
     ]
     + [{name: None for name in ("0_weight", "1_weight", "2_weight")}]
-    + [{"mean": shape(INPUTS, fill=bad)} for bad in (np.nan, np.inf)]
-    + [{"variance": shape(INPUTS, fill=bad)} for bad in (np.nan, np.inf)]
+    + [{"mean": shape(INPUTS, fill=bad, dtype=np.float64)} for bad in (np.nan, np.inf)]
+    + [{"variance": shape(INPUTS, fill=bad, dtype=np.float64)} for bad in (np.nan, np.inf)]
     + [{"1_weight": shape(8, 16, fill=bad)} for bad in (np.nan, np.inf, -np.inf)]
-    + [{"2_bias": shape(2, fill=np.nan)}],
+    + [{"2_bias": shape(2, fill=np.nan)}]
+    + [{"1_weight": shape(8, 16, dtype=kind)} for kind in (np.float64, np.float16, np.int32, np.bool_)]
+    + [{"mean": shape(INPUTS)}, {"variance": shape(INPUTS)}],
 )
 def test_arrays_that_are_no_network_are_refused(folder, changes):
     replace_arrays(folder, **changes)
