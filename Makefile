@@ -11,7 +11,7 @@
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
-# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
+# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm, and installs axe-core too
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -20,7 +20,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
-PROSE := $(OUT)/prose
+NPM := $(OUT)/npm
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
@@ -120,14 +120,15 @@ lint: $(READY)
 	$(BIN)/ruff check docs/conf.py docs/_generate
 	$(BIN)/ruff format --check docs/conf.py docs/_generate
 
-# README.md is not read yet; CHANGELOG.md tells of the past.
-prose: $(PROSE)/.ready
-	$(PROSE)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js CONTRIBUTING.md SECURITY.md docs
+# CHANGELOG.md tells of the past.
+prose: $(NPM)/.ready
+	$(NPM)/node_modules/.bin/textlint --format compact --config docs/_prose/.textlintrc.js README.md CONTRIBUTING.md SECURITY.md docs
 
-$(PROSE)/.ready: docs/_prose/package.json docs/_prose/package-lock.json
-	mkdir -p $(PROSE)
-	cp docs/_prose/package.json docs/_prose/package-lock.json $(PROSE)
-	npm ci --prefix $(PROSE) --ignore-scripts --no-audit --no-fund --silent
+# What comes from npm: the reader of the prose, and axe-core, with which tests look at pages.
+$(NPM)/.ready: requirements/npm/package.json requirements/npm/package-lock.json
+	mkdir -p $(NPM)
+	cp requirements/npm/package.json requirements/npm/package-lock.json $(NPM)
+	npm ci --prefix $(NPM) --ignore-scripts --no-audit --no-fund --silent
 	touch $@
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.

@@ -52,6 +52,11 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
         ("measurement.velocity", measurement.velocity, 2),
         ("measurement.pressures", measurement.pressures, 4),
         ("measurement.user_force", measurement.user_force, 2),
+        (
+            "measurement.acceleration",
+            measurement.user_force if measurement.acceleration is None else measurement.acceleration,
+            2,
+        ),
         ("reference.rows", reference.rows, REFERENCES),
     ):
         if signal.shape != (rows, lanes):

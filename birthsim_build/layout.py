@@ -63,6 +63,7 @@ _SEEN = (
     *(Row(f"measured_{name}", "m", f"{name} of the end effector as measured") for name in ("x", "y")),
     *(Row(f"measured_{name}", "m/s", f"{name} of the end effector as measured") for name in ("vx", "vy")),
     Row("position_time", "s", "when the position was measured"),
+    *(Row(f"measured_a{axis}", "m/s2", f"acceleration along {axis} as measured; 0 without a sensor") for axis in "xy"),
     *(Row(f"measured_P{c}{k}", "Pa", f"pressure P{c}{k} as measured, absolute") for k in "12" for c in "pn"),
     *(Row(f"measured_force_{axis}", "N", f"force of the hand along {axis} as measured") for axis in "xy"),
     *_named(REFERENCE_NAMES, _REFERENCE_UNITS, "reference_", "what is asked for:"),

@@ -154,6 +154,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
             seen.pressures[:, 0],
             seen.user_force[:, 0],
             seen.sampled,
+            None if seen.acceleration is None else seen.acceleration[:, 0],
         )
 
     @property

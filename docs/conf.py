@@ -11,6 +11,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
 import _generate  # noqa: E402
+from _generate import notebooks  # noqa: E402
 
 import birthsim_env  # noqa: E402
 from birthsim_live.static.build import build_page  # noqa: E402
@@ -44,7 +45,7 @@ html_theme = "furo"
 html_title = "BirthSIM"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_js_files = ["tables.js", "data.js"]
+html_js_files = ["access.js", "tables.js", "data.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
@@ -83,6 +84,19 @@ def with_rig(app, page, template, context, doctree):
         context["body"] = context["body"].replace(FIRST, RIG + FIRST)
 
 
+def with_notebook(app, page, template, context, doctree):
+    """Below its title a tutorial says where it is to be had as a notebook."""
+    folder, _, name = page.partition("/")
+    if folder == "tutorials" and name in notebooks.NAMES:
+        context["body"] = context["body"].replace("</h1>\n", f"</h1>\n{notebooks.links(name)}", 1)
+
+
+def build_notebooks(app, exception):
+    """The tutorials as files, beside the pages."""
+    if exception is None and app.builder.name == "html":
+        notebooks.write(app.outdir / "notebooks")
+
+
 def build_rig(app, exception):
     """The folder of static files that runs the rig, beside the pages."""
     if exception is None and app.builder.name == "html":
@@ -95,6 +109,8 @@ def setup(app):
     app.connect("source-read", seen_from_the_site)
     app.connect("html-page-context", with_data)
     app.connect("html-page-context", with_rig)
+    app.connect("html-page-context", with_notebook)
     app.connect("build-finished", build_rig)
+    app.connect("build-finished", build_notebooks)
     app.connect("builder-inited", lambda _: _generate.write(HERE.parent / "out" / "docs-generated"))
     return {"parallel_read_safe": False}

@@ -63,7 +63,7 @@ def pytest_unconfigure(config):
     """After everything else pytest says whether the page was tested: a skip among thousands of dots is not seen."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     skipped = reporter.stats.get("skipped", []) if reporter else []
-    reasons = [report.longrepr[2] for report in skipped if report.nodeid.startswith("tests/live/test_page.py")]
+    reasons = [report.longrepr[2] for report in skipped if report.nodeid.startswith("tests/live/page/")]
     if reasons:
         said = reasons[0].removeprefix("Skipped: ")
         reporter.write_line(f"THE PAGE WAS NOT TESTED, {len(reasons)} tests were skipped: {said}", red=True, bold=True)

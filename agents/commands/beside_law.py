@@ -85,7 +85,7 @@ def _compare(arguments: argparse.Namespace) -> None:
     law, scores = _law(settings, policies[0].environment, arguments), _scores(policies, arguments)
     within, errors = law.feasible, np.stack([score.error for score in scores])
     print(f"{int(within.sum())} of {arguments.episodes} episodes are within the rig's strength; 95 % intervals of pairs.\n")
-    print(f"| | {' | '.join(HEAD)} |\n|{'---|' * (1 + len(HEAD))}")
+    print(f"| law | {' | '.join(HEAD)} |\n|{'---|' * (1 + len(HEAD))}")
     print(_row(settings.law, law, within))
     for folder, score in zip(folders, scores, strict=True):
         print(_row(folder.name, score, within, (law.error - score.error)[None, within]))
@@ -157,7 +157,7 @@ def _feel(folders: Sequence[Path], settings: ResidualSettings, arguments: argpar
         for condition in (Condition(settings.law, *where), *(_Learned(str(folder), *where) for folder in folders))
     )
     print(f"\nMultisine hand of {PUSH:g} N at {SETPOINT:g} N/m, {rigs} rigs drawn from seed {arguments.seed}, at rest.\n")
-    print(f"| | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
+    print(f"| law | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
     for name, own in zip((settings.law, *(folder.name for folder in folders)), (law, *policies), strict=True):
         figures = [np.mean(own["bandwidth"]), quantile(own["jnd"], 0.5), quantile(own["error"], 0.5)]
         better = [""] * len(GAINED) if own is law else [_interval(_mean, _gained(law, own, key)[None]) for key in GAINED]

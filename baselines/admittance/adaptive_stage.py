@@ -27,7 +27,6 @@ from birthsim_env.loop.rows import (
     DAMPING,
     FEEDFORWARD,
     OPENING,
-    POSITION,
     POSITION_TIME,
     PRESSURE,
     REFERENCE,
@@ -35,7 +34,6 @@ from birthsim_env.loop.rows import (
     SHOWN,
     TIME,
     USER_FORCE,
-    VELOCITY,
 )
 from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.physics import geometry
@@ -55,15 +53,15 @@ observer of the hand's force and what it found a period ago; the observer of the
 
 CONSTANTS = (
     *("sampled", "rows", "period", "mass", "ratio", "friction_fraction", "trust", "bandwidth", "noise", "force_bias"),
-    *("friction_rate", "force_sensor"),
+    *("friction_rate", "force_sensor", "place"),
     *admittance_law.GAIN_NAMES,
 )
 """Those of ``admittance.stage``, with ``noise`` and the largest ``force_bias``, N, as believed; rate, 1/s, at which friction is
-learned; 1 with a force sensor, 0 without. The rig follows."""
+learned; 1 with a force sensor, 0 without; row of what is seen at which x, y, vx, vy stand. The rig follows."""
 (
     SAMPLED, MEMORY_ROWS, PERIOD, MASS, RATIO, FRACTION, TRUST, BANDWIDTH, NOISE, FORCE_BIAS,
-    FRICTION_RATE, FORCE_SENSOR, GAINS,
-) = range(13)  # fmt: skip
+    FRICTION_RATE, FORCE_SENSOR, PLACE, GAINS,
+) = range(14)  # fmt: skip
 NUMBERS = len(CONSTANTS)
 
 
@@ -76,7 +74,8 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
     own, push, missed = scratch(21)[:, :n], scratch(2)[:, :n], 0
     motion, believed, disturbance, disturbance_force = own[:8], own[8:10], own[10:12], own[12:14]
     rest, moving, force, fresh = own[14:16], own[16], own[17:19], m[FRESH]
-    time, position, velocity = s[TIME, :n], s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n]
+    place = int(about[PLACE])
+    time, position, velocity = s[TIME, :n], s[place : place + 2, :n], s[place + 2 : place + 4, :n]
     target, told, openings = s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], s[OPENING:SHOWN, :n]
     spools, pressures, opened, joints = m[SPOOLS:PRESSURES], m[PRESSURES:OPENED], m[OPENED:JOINTS], m[JOINTS:LAW]
     pistons, levels, unexplained = m[PISTONS:], m[FRICTION:HAND], own[19:21]
@@ -88,8 +87,8 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
             force[k, i] = s[USER_FORCE + k, i] if about[FORCE_SENSOR] > 0.0 else m[FELT + k, i]
     if sampled:
         tracker_noise.observe(m[TRACKER:BIAS], position, s[POSITION_TIME, :n], about[NOISE], fresh)
-        if about[FORCE_SENSOR] > 0.0:
-            force_bias.tare(m[BIAS:FRICTION], time, s[USER_FORCE:REFERENCE, :n], about[FORCE_BIAS], period, force)
+    if about[FORCE_BIAS] > 0.0:
+        force_bias.tare(m[BIAS:FRICTION], time, s[USER_FORCE:REFERENCE, :n], about[FORCE_BIAS], period, force)
     admittance.give_way(m[OFFSET:FRESH], target, force, about[MASS], about[RATIO], period, s[DAMPING, :n], motion)
     admittance.mark_moving(motion, moving)
     chamber_observer.observe(spools, pressures, opened, s[PRESSURE:USER_FORCE, :n], joints, p, period, about[TRUST], fresh)

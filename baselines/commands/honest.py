@@ -20,7 +20,7 @@ from baselines.work.files import make_folder, write_text
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 CONDITIONS = ("ideal", "lab", "honest", "honest, drawn")
 """Sensors; the last ones are drawn from their ranges, and the laws believe in the defaults."""
@@ -32,6 +32,7 @@ def main() -> None:
     parser.add_argument("--controller", nargs="+", required=True, metavar="NAME", help="laws of the registry")
     parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=128, help="per cell (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=70000, help="of the first episode (default: %(default)s)")
+    parser.add_argument("--parameters", help="TOML file of the rig as the laws believe it (default: the paper's)")
     parser.add_argument("--out", type=Path, required=True, help="folder for honest.md")
     run(parser, _honest)
 
@@ -44,7 +45,7 @@ def as_described(rig: Parameters) -> Parameters:
 
 
 def _honest(arguments: argparse.Namespace) -> None:
-    folder, believed = make_folder(arguments.out), Parameters()
+    folder, believed = make_folder(arguments.out), load_parameters(arguments.parameters)
     lines = [
         f"Rigs and scenarios drawn, {arguments.episodes} episodes from seed {arguments.seed}; median, 95 % and worst.", "",
         "| law | sensors | Probe: stiffness error, % | hunting, mm | settled error, mm | Circle: settled error, mm | "

@@ -23,7 +23,7 @@ from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
-from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
 
 ENVIRONMENT = environment_id("probe")
@@ -49,11 +49,13 @@ def main() -> None:
     )
     parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=800, help="default: %(default)s")
     parser.add_argument("--seed", type=seed_number, default=90000, help="of the first world (default: %(default)s)")
+    parser.add_argument("--parameters", help="TOML file of the rig as the laws believe it (default: the paper's)")
     run(parser, _worst)
 
 
 def _worst(arguments: argparse.Namespace) -> None:
     checked_number("--rest", arguments.rest, "s", least=0.0, most=LONGEST_REST)
+    believed = load_parameters(arguments.parameters)
     rest = f"{arguments.rest:g} s of rest before the push"
     print(f"{arguments.episodes} worlds of {ENVIRONMENT} from seed {arguments.seed}, rigs and scenarios drawn, {rest}.")
     print("Median, 95 % and worst.\n")
@@ -63,7 +65,7 @@ def _worst(arguments: argparse.Namespace) -> None:
     found = []
     for name in arguments.controller:
         for sensors in arguments.sensors or ["honest"]:
-            rig = Parameters() if arguments.drawn else as_described(Parameters())
+            rig = believed if arguments.drawn else as_described(believed)
             done = _evaluated(name, arguments.rest, rig, sensors, arguments.seed, arguments.episodes)
             sizes = sizes_of(done, arguments.metric)
             order = np.argsort(-sizes, kind="stable")
@@ -129,7 +131,7 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
 def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:
     hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
-    return evaluate(ENVIRONMENT, make_controller(name, Parameters()), name, episodes, seed, False, randomize=True, **setting)
+    return evaluate(ENVIRONMENT, make_controller(name, rig), name, episodes, seed, False, randomize=True, **setting)
 
 
 if __name__ == "__main__":

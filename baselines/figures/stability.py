@@ -28,8 +28,7 @@ def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Pat
     with plt.rc_context({**STYLE, "axes.grid": False}):
         width = max(4.6, 3.7 * count)
         figure, panels = plt.subplots(1, count, figsize=(width, 4.3), layout="constrained", sharey=True, squeeze=False)
-        x, y = (np.array(chart[side]["values"]) for side in "xy")
-        across, up = _edges(x, chart["x"]["logarithmic"]), _edges(y, chart["y"]["logarithmic"])
+        across, up = (_edges(_places(chart[side]), chart[side]["logarithmic"]) for side in "xy")
         lost = False
         for axes, (label, found) in zip(panels[0], chart["variants"].items(), strict=True):
             motion, stable = np.array(found["motion_mm"], dtype=float), np.array(found["stable"])
@@ -46,6 +45,9 @@ def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Pat
                     axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
                     axis.set_major_formatter("{x:g}")
                     axis.set_minor_formatter(NullFormatter())
+                    if chart[side]["values"][0] == 0.0:
+                        axis.set_ticks(_places(chart[side]), [f"{value:g}" for value in chart[side]["values"]])
+                        axis.set_ticks([], minor=True)
             axes.set(xlabel=chart["x"]["label"], xlim=across[[0, -1]], ylim=up[[0, -1]])
             axes.set_title(f"{label_of(label)}\n{100 * stable.mean():.0f} % of the cells stable", loc="left", fontsize=8.5)
         panels[0, 0].set_ylabel(chart["y"]["label"])
@@ -61,6 +63,15 @@ def stability_figure(name: str, chart: dict[str, Any], heading: str, folder: Pat
         legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
         figure.suptitle(f"{chart['title']}: {heading}", fontsize=9.5)
         return save(figure, folder, f"stability_{name}")
+
+
+def _places(side: dict[str, Any]) -> Array:
+    """Where the values of a side (n,) are drawn: on a logarithmic one a first value of 0 as far from the second as that from
+    the third."""
+    values = np.array(side["values"], dtype=np.float64)
+    if side["logarithmic"] and values[0] == 0.0:
+        values[0] = values[1] ** 2 / values[2]
+    return values
 
 
 def _edges(values: Array, logarithmic: bool) -> Array:

@@ -86,5 +86,5 @@ def _measured(models: Sequence[Any], tick: int, now: float, plant: Plant) -> Mea
 
     return Measurement(
         joined("time"), joined("position"), joined("position_time"), joined("velocity"), joined("pressures"),
-        joined("user_force"), said[0].sampled,
+        joined("user_force"), said[0].sampled, None if said[0].acceleration is None else joined("acceleration"),
     )  # fmt: skip

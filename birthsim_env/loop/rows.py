@@ -34,7 +34,9 @@ VELOCITY = POSITION + 2
 """vx, vy as measured, m/s."""
 POSITION_TIME = VELOCITY + 2
 """When the position was measured, s."""
-PRESSURE = POSITION_TIME + 1
+ACCELERATION = POSITION_TIME + 1
+"""Acceleration of the end effector as a sensor there feels it, m/s2; 0 without one."""
+PRESSURE = ACCELERATION + 2
 """Measured pressures of chambers P1, N1, P2, N2, Pa."""
 USER_FORCE = PRESSURE + 4
 """Measured force of the hand, N."""
@@ -63,6 +65,7 @@ def fill_measurement(rows: Array, measurement: Measurement) -> None:
     rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
     rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
     rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
+    rows[ACCELERATION:PRESSURE] = 0.0 if measurement.acceleration is None else measurement.acceleration
 
 
 def measurement_of(rows: Array, sampled: bool) -> Measurement:
@@ -70,5 +73,5 @@ def measurement_of(rows: Array, sampled: bool) -> Measurement:
     seen = rows[:REFERENCE].copy()
     return Measurement(
         seen[TIME], seen[POSITION:VELOCITY], seen[POSITION_TIME], seen[VELOCITY:POSITION_TIME], seen[PRESSURE:USER_FORCE],
-        seen[USER_FORCE:], sampled,
+        seen[USER_FORCE:], sampled, seen[ACCELERATION:PRESSURE],
     )  # fmt: skip

@@ -93,7 +93,8 @@ class Measurement:
     ``position`` (2, N) of the end effector was taken at ``position_time`` (N,), at or before ``time`` (N,). ``velocity``
     (2, N) is measured, or, where ``sampled`` is True, only the low-passed difference of rare and late position samples, which
     a controller will want to replace by an observer of its own. ``pressures`` (4, N) are those of chambers P1, N1, P2, N2,
-    absolute. ``user_force`` (2, N) is that of a force sensor at the end effector.
+    absolute. ``user_force`` (2, N) is that of a force sensor at the end effector. ``acceleration`` (2, N) is that of a sensor
+    there; zero, or None, without one.
     """
 
     time: Array
@@ -103,6 +104,7 @@ class Measurement:
     pressures: Array
     user_force: Array
     sampled: bool
+    acceleration: Array | None = None
 
 
 Mask = NDArray[np.bool_]
@@ -122,5 +124,6 @@ def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measuremen
         column(measurement.pressures),
         column(measurement.user_force),
         measurement.sampled,
+        None if measurement.acceleration is None else column(measurement.acceleration),
     )
     return seen, Reference(column(reference.rows))

@@ -13,8 +13,9 @@ NO_LARGER = "an episode draws within +-"
 class Electronics(Part):
     """Control board and the sensors of a laboratory.
 
-    The first five figures are those of the sensor models ``lab`` and ``honest``, all others those of ``honest`` alone: 0
-    switches an error off (of ``force_bandwidth``: the low-pass; of bits: the converter). The tracker is registered to the rig
+    The first five figures, bandwidth and noise of the acceleration are those of the sensor models ``lab`` and ``honest``, all
+    others those of ``honest`` alone: 0 switches an error off (of ``force_bandwidth``: the low-pass; of bits: the converter).
+    ``acceleration_bandwidth`` is 0 where the head has no acceleration sensor. The tracker is registered to the rig
     at one point, where its distortion and scale do no harm and its noise is ``position_noise``. Ranges are drawn from with
     ``honest`` sensors.
     """
@@ -104,6 +105,19 @@ class Electronics(Part):
         0.0, "-", "0 is a steady clock; the valves' voltages are late by up to this fraction of a period, up to 0.5 assumed of "
         "boards without a real-time system", least=0, most=1, option=True, worth=(0, 0.5),
     )  # fmt: skip
+
+    acceleration_bandwidth: float = quantity(
+        0.0, "Hz", "0 is a head without an acceleration sensor; -3 dB of a first-order low-pass, 200 to 400 assumed of a "
+        "micromechanical one", least=0, most=1e5, option=True,
+    )  # fmt: skip
+    acceleration_noise: float = quantity(
+        0.02, "m/s2", "assumed; standard deviation per axis and period, 100 ug/sqrt(Hz) over 400 Hz", least=0, most=100,
+        option=True,
+    )  # fmt: skip
+    acceleration_bias: float = quantity(
+        0.1, "m/s2", f"assumed, of the sensor and of gravity that was taken off; {NO_LARGER}", least=0, most=100, option=True
+    )
+    acceleration_gain_error: float = quantity(0.01, "-", f"assumed, per axis; {NO_LARGER}", least=0, most=0.9, option=True)
 
     def _check_together(self) -> None:
         if (self.transmitter_x, self.transmitter_y) == (self.registration_x, self.registration_y):

@@ -9,7 +9,8 @@ const BAR = 1e-5;
 
 /**
  * `symbol` is a formula, or null for a curve that shares the key of the one before; `colour` is a name of colours.css; `only`
- * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers.
+ * is the class of what belongs to one rig or to two, `unless` a curve that takes its place where that has numbers. A plot that
+ * is `common` shows both rigs; the others show one, and the names of the second's curves begin with SECOND.
  */
 const curve = (name, symbol, colour, width, dash = [], { only = "", unless } = {}) => ({ name, symbol, colour, width, dash, only, unless });
 const setpoints = (names, colour) => names.map((name, i) => curve(name, i ? null : ["set"], colour, 1.5, DOTTED));
@@ -32,6 +33,7 @@ export const PLOTS = [
     unit: "mm",
     least: 2,
     zero: true,
+    common: true,
     curves: [
       curve("error", [["e"]], "force", 1.8),
       curve("error_rms", ["RMS of 2 s"], "ink", 1.6, DASHED, { only: "one-only", unless: "second_error" }),
@@ -90,23 +92,27 @@ export const DEEPER = [
   },
 ];
 
-/** Running errors of both rigs. */
-export const RMS = ["error_rms", "second_rms"];
+export const SECOND = "second_";
 
-/** Name of a curve -> its unit. */
-export const UNITS = {
-  ...Object.fromEntries([...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit]))),
-  second_rms: "mm",
-};
+/** Running errors of both rigs. */
+export const RMS = ["error_rms", `${SECOND}error_rms`];
+
+const own = [...PLOTS, ...DEEPER].flatMap(({ unit, curves }) => curves.map(({ name }) => [name, unit])).filter(([name]) => !name.startsWith(SECOND));
+
+/** Name of a curve -> its unit; those of the second rig follow those of the first. */
+export const UNITS = Object.fromEntries([...own, ...own.map(([name, unit]) => [SECOND + name, unit])]);
 
 /** One row of the history, in the units of the plots; `rms` are the running errors of both rigs (rms.js). */
 export function rowOf(frame, rms) {
+  const second = frame.second ? rowOfOne(frame.second, rms[1].value) : {};
+  return { ...rowOfOne(frame, rms[0].value), ...Object.fromEntries(own.map(([name]) => [SECOND + name, second[name] ?? NaN])) };
+}
+
+function rowOfOne(frame, rms) {
   const [vx, vy] = frame.velocity;
   const row = {
     error: frame.error_mm,
-    error_rms: rms[0].value,
-    second_error: frame.second?.error_mm ?? NaN,
-    second_rms: frame.second ? rms[1].value : NaN,
+    error_rms: rms,
     power: frame.force[0] * vx + frame.force[1] * vy,
   };
   ["x", "y"].forEach((axis, i) => {

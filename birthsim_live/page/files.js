@@ -1,13 +1,13 @@
 // Files of what is shown: numbers, a picture, and recordings that are opened by choice or dropped on the page.
 
-import { UNITS } from "./curves.js";
+import { SECOND, UNITS } from "./curves.js";
 import { pictureOf } from "./picture.js";
 
 const byId = (id) => document.getElementById(id);
 
-/** The plots' numbers as CSV: a column per curve, with its unit; nothing where there is no number. */
+/** The plots' numbers as CSV: a column per curve, with its unit; nothing where there is no number, and no second rig that was not there. */
 export function csvOf(history) {
-  const names = Object.keys(UNITS);
+  const names = Object.keys(UNITS).filter((name) => !name.startsWith(SECOND) || history.view(name).some(Number.isFinite));
   const columns = ["time", ...names].map((name) => history.view(name));
   const head = ["time (s)", ...names.map((name) => `${name} (${UNITS[name]})`)];
   const row = (_, k) => columns.map((column) => (Number.isFinite(column[k]) ? Number(column[k].toPrecision(7)) : "")).join(",");

@@ -51,6 +51,6 @@ const belongsToAnother = (event) => modified(event) || event.target.closest?.("i
 /** Space presses a focused button or box and opens a focused list; R would choose from a list by its first letter. */
 export function keyOfTheRig(event) {
   if (event.repeat || modified(event)) return null;
-  if (event.key === " ") return event.target.closest?.("button, select, a, [type=checkbox]") ? null : "pause";
+  if (event.key === " ") return event.target.closest?.("button, select, a, [type=checkbox], [type=radio]") ? null : "pause";
   return event.key.toLowerCase() === "r" ? "reset" : null;
 }

@@ -1,4 +1,5 @@
 // The error, large: the end effector seen from the compliant target, which stands in the middle (birthsim_env/drawing/panel.py).
+// Two rigs share the picture: each head is seen from its own compliant target, so that their errors can be compared.
 
 import * as pen from "./pen.js";
 import { Axis, Pen, finite } from "./pen.js";
@@ -9,6 +10,9 @@ const WINDOWS = [0.02, 0.04, 0.08, 0.16]; // widths the magnifier may show, m
 const EDGE = 0.42; // of the width: so far from the middle is the end effector still well inside
 const CALM = 0.3; // of the next smaller width: as near must it be for that to be shown
 
+const rigsOf = (frame) => (frame.second ? [frame, frame.second] : [frame]);
+const errorOf = ({ position, compliant }) => [0, 1].map((k) => position[k] - compliant[k]);
+
 export class Magnifier {
   /** `heading` is the element that says how many times larger the picture is. */
   constructor(canvas, heading) {
@@ -16,7 +20,7 @@ export class Magnifier {
     this.path = [];
     this.times = "";
     this.window = WINDOWS[0];
-    this.trail = new Trail();
+    this.trails = [new Trail(), new Trail()];
     this.sheet = new Sheet(canvas, { opaque: true });
   }
 
@@ -24,14 +28,14 @@ export class Magnifier {
     this.path = points;
   }
 
-  /** Take note of a frame: the trail holds errors, m. */
-  push({ time, position, compliant }) {
-    this.trail.push(time, [position[0] - compliant[0], position[1] - compliant[1]]);
+  /** Take note of a frame: the trails hold errors, m. */
+  push(frame) {
+    rigsOf(frame).forEach((one, k) => this.trails[k].push(frame.time, errorOf(one)));
   }
 
-  /** The window grows at once, and shrinks only where the error fits well: else it would flap. */
-  fit({ compliant, position }) {
-    const offset = Math.max(...[0, 1].map((k) => Math.abs(position[k] - compliant[k])).filter(Number.isFinite), 0);
+  /** The window grows at once, and shrinks only where the errors fit well: else it would flap. */
+  fit(frame) {
+    const offset = Math.max(...rigsOf(frame).flatMap(errorOf).map(Math.abs).filter(Number.isFinite), 0);
     const least = WINDOWS.find((window) => offset <= EDGE * window) ?? WINDOWS.at(-1);
     const calm = WINDOWS.find((window) => offset <= CALM * window) ?? WINDOWS.at(-1);
     this.window = Math.max(least, Math.min(this.window, calm));
@@ -43,7 +47,7 @@ export class Magnifier {
     this.fit(frame);
     const { width, height, context } = this.sheet;
     if (!width) return;
-    const { target, compliant, position } = frame;
+    const { target, compliant, position, second } = frame;
     const { window } = this;
     const centre = [compliant, position, target].find(finite) ?? [0, 0];
     const scale = Math.min(width, height) / window;
@@ -52,18 +56,32 @@ export class Magnifier {
     context.fillStyle = pen.SHEET;
     context.fillRect(0, 0, width, height);
     this.drawGrid(world, centre, step);
-    world.line(this.path, pen.PATH, 2);
-    if (finite(compliant)) this.trail.draw(world, pen.GREY, 1.5, compliant);
+    const beside = pen.colour("beside");
+    const other = second && errorOf(second).map((part, k) => centre[k] + part);
+    if (!second) world.line(this.path, pen.PATH, 2); // path and target stand elsewhere, seen from the other diamond
+    if (finite(compliant)) this.trails[0].draw(world, pen.GREY, 1.5, compliant);
+    if (second) this.trails[1].draw(world, beside, 1.2, centre);
     world.line([compliant, position], pen.FORCE, 1.5);
-    pen.targetMarker(world, target, 9);
+    if (second) this.drawDashed(world, [centre, other], beside);
+    else pen.targetMarker(world, target, 9);
     pen.compliantMarker(world, compliant, 7.8);
+    if (second) world.disc(other, 5, pen.SHEET, beside, 2.5);
     pen.endEffectorMarker(world, position, 4.2);
-    for (const [place, colour] of [[target, pen.TARGET], [position, pen.END_EFFECTOR]]) this.pointOut(world, centre, place, colour);
-    this.drawScale(world, step);
-    if (Number.isFinite(frame.error_mm)) {
-      world.text(`error ${frame.error_mm.toFixed(1)} mm`, [width - 8, 14], { align: "right", colour: pen.FORCE, weight: 700 });
+    for (const [place, colour] of [second ? [other, beside] : [target, pen.TARGET], [position, pen.END_EFFECTOR]]) {
+      this.pointOut(world, centre, place, colour);
     }
+    this.drawScale(world, step);
+    rigsOf(frame).forEach(({ error_mm: error }, k) => {
+      if (!Number.isFinite(error)) return;
+      world.text(`error ${error.toFixed(1)} mm`, [width - 8, 14 + 16 * k], { align: "right", colour: [pen.FORCE, beside][k], weight: 700 });
+    });
     this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
+  }
+
+  drawDashed(world, points, colour) {
+    world.context.setLineDash([5, 3]);
+    world.line(points, colour, 1.5);
+    world.context.setLineDash([]);
   }
 
   name(words) {

@@ -185,12 +185,13 @@ function draw(now) {
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
   }
   transport.step(frame);
-  gauges.step(frame.pressures, now);
-  physics.step(frame, now);
-  plots.step(frame.time, now);
-  const running = rigs.rms.map(({ value }, k) => (rig.hello.mode === "live" ? value : whole.at(RMS[k], frame.time)));
+  const [one, k] = [rigs.rigOf(frame), rigs.chosen];
+  gauges.step(one.pressures, now);
+  physics.step(one, k, now);
+  plots.step(frame.time, k, now);
+  const running = rigs.rms.map(({ value }, i) => (rig.hello.mode === "live" ? value : whole.at(RMS[i], frame.time)));
   rigs.step(frame, running, now);
-  if (rig.connected) readouts.step(frame, running[0], state, now);
+  if (rig.connected) readouts.step(one, running[k], frame, state, now);
 }
 
 new Files({ plots, open: (file) => source.open(file) });

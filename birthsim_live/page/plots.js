@@ -1,6 +1,7 @@
 // Rolling plots: one of them is redrawn with each frame, in turn, and only those that can be seen.
 
 import uPlot from "./vendor/uPlot.esm.js";
+import { SECOND } from "./curves.js";
 import { FONT, colour } from "./pen.js";
 import { formula } from "./symbols.js";
 import { term } from "./terms.js";
@@ -48,7 +49,7 @@ function extremes(columns) {
 }
 
 class Plot {
-  /** `shown` is what all plots show: { history, duration, now }, the latter two of a whole recording. */
+  /** `shown` is what all plots show: { history, rig, duration, now }, the latter two of a whole recording; `rig` is 0 or 1. */
   constructor(definition, shown, parent) {
     this.definition = definition;
     this.shown = shown;
@@ -94,6 +95,11 @@ class Plot {
     return this.shown.history;
   }
 
+  /** What a curve shows of the rig that is chosen. */
+  view(name) {
+    return this.history.view(this.shown.rig && !this.definition.common ? SECOND + name : name);
+  }
+
   /** The whole of a recording, or the last seconds. */
   timeRange() {
     if (this.shown.duration) return [0, this.shown.duration];
@@ -103,7 +109,7 @@ class Plot {
 
   valueRange() {
     const { curves, follow } = this.definition;
-    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.history.view(name)));
+    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.view(name)));
     return this.range(low, follow ? 1.5 * high : high);
   }
 
@@ -122,10 +128,10 @@ class Plot {
 
   redraw() {
     const column = ({ name, only, unless }) => {
-      const values = this.history.view(name);
-      if (!only && !name.startsWith("rendered")) return values;
+      const values = this.view(name);
+      if (!only && !this.shown.rig && !name.startsWith("rendered")) return values;
       // uPlot leaves a gap where a value is null, and typed arrays have none.
-      const other = unless && this.history.view(unless);
+      const other = unless && this.view(unless);
       return Array.from(values, (value, k) => (Number.isNaN(value) || Number.isFinite(other?.[k]) ? null : value));
     };
     const data = [this.history.view("time"), ...this.definition.curves.map(column)];
@@ -166,7 +172,7 @@ function key({ name: curve, symbol, colour: name, width, dash, only }) {
 export class Plots {
   /** `places`: pairs of definitions and the element that they belong into. */
   constructor(places, history) {
-    this.shown = { history, duration: null, now: 0 };
+    this.shown = { history, rig: 0, duration: null, now: 0 };
     this.plots = places.flatMap(([definitions, parent]) => definitions.map((definition) => new Plot(definition, this.shown, parent)));
     this.next = 0;
     this.due = 0;
@@ -185,8 +191,8 @@ export class Plots {
   }
 
   /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. `time`, s, is the frame's. */
-  step(time, now) {
-    this.shown.now = time;
+  step(time, rig, now) {
+    Object.assign(this.shown, { now: time, rig });
     const visible = this.plots.filter((plot) => plot.visible);
     const gap = now - this.last;
     this.last = now;

@@ -68,12 +68,12 @@ export class Readouts {
     });
   }
 
-  /** `rms` of the error, mm. */
-  step(frame, rms, state, now) {
+  /** `one` is the rig that is chosen in a frame, `rms` that of its error, mm. */
+  step(one, rms, frame, state, now) {
     if (now - this.last < 1e3 / RATE) return;
     this.last = now;
     FIGURES.forEach(([, , , words], i) => {
-      [words(frame, rms)].flat().forEach((text, k) => {
+      [words(one, rms)].flat().forEach((text, k) => {
         if (this.values[i][k].textContent !== text) this.values[i][k].textContent = text;
       });
     });

@@ -18,15 +18,20 @@ export class Rigs {
   constructor(hand, { frame, enabled }) {
     this.hand = hand;
     this.last = 0;
+    this.chosen = 0;
     this.rms = PLACES.map(() => new RunningRms());
     const canvases = PLACES.map((place) => document.getElementById(place));
     const frames = [() => frame(), () => frame()?.second];
     this.scenes = canvases.map((canvas, k) => {
-      const scene = new Scene(canvas, { magnified: k === 0 });
+      const scene = new Scene(canvas, { cue: k === 0 });
       new Drag(canvas, { scene, hand, enabled, frame: frames[k] });
       return scene;
     });
-    this.captions = canvases.map((canvas) => [...canvas.parentElement.querySelectorAll("b, i")]);
+    const figures = canvases.map((canvas) => canvas.parentElement);
+    this.captions = figures.map((figure) => [...figure.querySelectorAll("b, i")]);
+    this.choices = figures.map((figure) => figure.querySelector("input"));
+    this.of = document.getElementById("of");
+    this.choices.forEach((choice, k) => choice.addEventListener("change", () => this.choose(k)));
   }
 
   setUp({ geometry, air, choices }) {
@@ -48,6 +53,7 @@ export class Rigs {
   show({ controller = "", compare = NOTHING }) {
     const names = [controller, compare].map((name) => this.titles[name] ?? name);
     names.forEach((name, k) => this.write(k, 0, name));
+    this.choose(compare === NOTHING ? 0 : this.chosen);
     CURVES.forEach((curve, k) => {
       const parts = compare === NOTHING ? [["e"]] : [names[k]];
       document.querySelector(`[data-curve=${curve}] .symbol`).replaceWith(formula(parts));
@@ -65,6 +71,18 @@ export class Rigs {
   note({ time, error_mm: error, second }) {
     this.rms[0].push(time, error);
     this.rms[1].push(time, second?.error_mm ?? NaN);
+  }
+
+  /** Choose the rig that figures, physics and plots show. */
+  choose(k) {
+    this.chosen = k;
+    this.choices[k].checked = true;
+    this.of.textContent = this.captions[k][0].textContent;
+  }
+
+  /** What a frame shows of the rig that is chosen. */
+  rigOf(frame) {
+    return (this.chosen && frame.second) || frame;
   }
 
   /** The hint of what to do has been followed. */

@@ -14,13 +14,12 @@ const STILL = matchMedia("(prefers-reduced-motion: reduce)");
 const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
 
 export class Scene {
-  /** `magnified`: a frame shows what the magnifier does, and until somebody has pulled a hint shows what to do. */
-  constructor(canvas, { magnified }) {
+  /** `cue`: until somebody has pulled, a hint shows what to do. */
+  constructor(canvas, { cue }) {
     this.geometry = null;
     this.path = [];
     this.trail = new Trail();
-    this.magnified = magnified;
-    this.cue = magnified;
+    this.cue = cue;
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
     pen.onNightfall(() => this.layOut());
   }
@@ -96,7 +95,7 @@ export class Scene {
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
     this.trail.draw(world, pen.INK, 1.6 * unit);
-    if (this.magnified) this.drawWindow(frame.compliant, window / 2);
+    this.drawWindow(frame.compliant, window / 2);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);

@@ -1,5 +1,7 @@
 // A canvas that keeps as many pixels as the screen shows, whatever its size and the device's pixel ratio.
 
+import { PAPER } from "./pen.js";
+
 const ratioNow = () => Math.min(window.devicePixelRatio || 1, 3);
 
 export class Sheet {
@@ -11,6 +13,7 @@ export class Sheet {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: !opaque });
     this.changed = changed;
+    this.opaque = opaque;
     this.width = 0;
     this.height = 0;
     this.ratio = 0;
@@ -31,7 +34,13 @@ export class Sheet {
     this.canvas.width = Math.max(1, Math.round(width * ratio));
     this.canvas.height = Math.max(1, Math.round(height * ratio));
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (this.opaque) this.cover(); // black until the first frame otherwise
     this.changed?.(width, height);
+  }
+
+  cover() {
+    this.context.fillStyle = PAPER;
+    this.context.fillRect(0, 0, this.width, this.height);
   }
 
   /** A canvas of the same size for what rarely changes; returns its context in CSS px. */

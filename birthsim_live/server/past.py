@@ -44,9 +44,9 @@ class Past:
 
 
 def plotted(frame: dict[str, Any]) -> dict[str, Any]:
-    """What plots need of a frame, and of the rig beside it the error."""
+    """What plots need of a frame and of the rig beside it."""
     second = frame.get("second")
-    return {**{name: frame[name] for name in PLOTTED}, "second": second and {"error_mm": second["error_mm"]}}
+    return {**{name: frame[name] for name in PLOTTED}, "second": second and plotted(second)}
 
 
 def whole(player: Player) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def _section(scenario: str) -> str:
     picture = f"![{name} under admittance-backstepping, in real time](../../out/docs-generated/{scenario}.webp)"
     made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
     return "\n".join([
-        f"## `{name}`", "", picture, "", "| | |", "|---|---|", *rows, "",
+        f"## `{name}`", "", picture, "", "| what | value |", "|---|---|", *rows, "",
         "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py",
         "\n\n".join(made).rstrip(), "```",
     ])  # fmt: skip

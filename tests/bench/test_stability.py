@@ -29,7 +29,7 @@ from baselines.bench.stability import (
     stability_tasks,
     stable_up_to,
 )
-from baselines.figures.stability import _border, _edges, stability_figure
+from baselines.figures.stability import _border, _edges, _places, stability_figure
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.equilibrium import balanced_state
@@ -196,6 +196,13 @@ def test_axes_and_edges_of_cells() -> None:
     np.testing.assert_allclose(_edges(np.array([1.0, 3, 5]), False), [0, 2, 4, 6])
     np.testing.assert_allclose(_edges(np.array([1.0, 100, 10000]), True), [0.1, 10, 1000, 100000])
     np.testing.assert_allclose(_edges(np.array([2.0]), False), [1.5, 2.5])
+
+
+def test_a_logarithmic_side_begins_at_none() -> None:
+    """A logarithm has no zero: the first cell stands a factor before the second, and its tick says 0."""
+    values = [0.0, 100.0, 1000.0]
+    np.testing.assert_allclose(_places({"values": values, "logarithmic": True}), [10, 100, 1000])
+    np.testing.assert_allclose(_places({"values": values, "logarithmic": False}), values)
 
 
 def test_the_border_runs_between_stable_cells_and_others() -> None:

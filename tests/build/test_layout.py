@@ -13,6 +13,7 @@ def test_rows_are_those_of_the_loop():
     world = {"impact1": at.IMPACT, "x": at.MOTION, "force_x": at.FORCE, "since_jump": at.SINCE_JUMP, "tick": at.TICK}
     seen = {
         "time": at.TIME, "measured_x": at.POSITION, "measured_vx": at.VELOCITY, "position_time": at.POSITION_TIME,
+        "measured_ax": at.ACCELERATION,
         "measured_Pp1": at.PRESSURE, "measured_force_x": at.USER_FORCE, "reference_x": at.REFERENCE, "asked_x": at.ASKED,
         "feedforward_force1": at.FEEDFORWARD, "damping_factor": at.DAMPING, "action": at.ACTION, "opening_P1": at.OPENING,
         "shown": at.SHOWN, "handed": at.HANDED,

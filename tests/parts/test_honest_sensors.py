@@ -31,14 +31,16 @@ def board(**changes):
     return Parameters().replace({f"electronics.{name}": value for name, value in changes.items()}).electronics
 
 
-def watch(electronics, ticks, lanes=1, motion=None, force=None, pressures=3e5, model=HonestSensors, ranges=None):
+NAMES = ("position", "position_time", "velocity", "pressures", "user_force")
+
+
+def watch(electronics, ticks, lanes=1, motion=None, force=None, pressures=3e5, model=HonestSensors, ranges=None, names=NAMES):
     """What is shown in ``ticks`` control periods, by name: (ticks, ..., lanes). ``motion(t)`` -> (4,) or (4, lanes)."""
     sensors = model(electronics, lanes)
     if ranges:
         sensors.vary(ranges)
     for lane in range(lanes):
         sensors.begin(lane, stream(lane, 0, "sensors"))
-    names = ("position", "position_time", "velocity", "pressures", "user_force")
     rows = {name: [] for name in names}
     for tick in range(ticks):
         time = np.full(lanes, tick * electronics.control_period)

@@ -17,7 +17,7 @@ from agents.reports import score_tables
 from baselines.bench import comparison_tables, evaluation_data
 from baselines.bench.metrics import UNITS
 from birthsim_env import Parameters
-from tests.live import browser
+from tests.live import axe, browser
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
@@ -156,15 +156,41 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     assert columns == compared | others
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning_and_its_notebooks_run(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, built as for a repository on GitHub."""
     pytest.importorskip("sphinx")
     pytest.importorskip("myst_nb")
-    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", str(DOCS), str(tmp_path)]
-    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", str(DOCS), str(folder)]
+    given = {**os.environ, "BIRTHSIM_REPOSITORY": "someone/birthsim"}
+    built = subprocess.run(command, env=given, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr[-4000:]
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
     notebooks = [page for page, text in PAGES.items() if "{code-cell}" in text]
     assert len(notebooks) >= 5
-    assert [page for page in notebooks if 'class="cell_output' not in (tmp_path / f"{page}.html").read_text("utf-8")] == []
-    assert (tmp_path / "rig" / "rig" / "loop.wasm").exists()
-    assert 'src="rig/index.html' in (tmp_path / "index.html").read_text("utf-8")
+    assert [page for page in notebooks if 'class="cell_output' not in (site / f"{page}.html").read_text("utf-8")] == []
+    tutorials = [page for page in notebooks if page.startswith("tutorials/")]
+    assert sorted(Path(page).name for page in tutorials) == sorted(file.stem for file in (site / "notebooks").iterdir())
+    for page in tutorials:
+        links = (site / f"{page}.html").read_text("utf-8").partition('<p class="notebook">')[2].partition("</p>")[0]
+        assert re.findall(r">(\w[^<]+)<", links) == ["Download this notebook", "Open in Colab", "Open in Binder"]
+    assert (site / "rig" / "rig" / "loop.wasm").exists()
+    assert 'src="rig/index.html' in (site / "index.html").read_text("utf-8")
+
+
+@pytest.mark.slow
+@axe.NEEDED
+@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_on_the_site(site, page_of, theme):
+    page = page_of("")
+    page.emulate_media(color_scheme=theme)
+    with browser.Folder(site) as address:
+        for name in ("index", "tutorials/first_episode", "comparison", "reference/environments", "reference/commands"):
+            page.goto(f"{address}{name}.html")
+            assert axe.violations(page, "iframe") == [], name

@@ -55,7 +55,7 @@ def growth(laps: Laps) -> float:
 
 def table(laps: Laps) -> str:
     """Markdown: steps, episodes and faults by scenario and by what controls."""
-    lines = ["| | policy steps | episodes ended by the rig | by the clock | faults |", "|---|---|---|---|---|"]
+    lines = ["| experiment | policy steps | episodes ended by the rig | by the clock | faults |", "|---|---|---|---|---|"]
     for key in ("scenario", "control"):
         groups: dict[str, Laps] = defaultdict(list)
         for lap in laps:

@@ -17,8 +17,8 @@ from baselines.bench.stability import Cases, Verdict, judge
 from baselines.controller import Controller
 from baselines.work.tasks import Result
 
-STIFFNESSES = (100.0, 300.0, 1000.0, 3000.0, 8000.0, 20000.0)
-"""N/m, of a hand: next to none, to a clamp."""
+STIFFNESSES = (0.0, 100.0, 300.0, 1000.0, 3000.0, 8000.0, 20000.0)
+"""N/m, of a hand: none, which leaves a mass alone, to a clamp."""
 
 MASSES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0)
 """kg, of a hand."""

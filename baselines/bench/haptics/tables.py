@@ -124,7 +124,7 @@ def stability_table(runs: Runs) -> str:
         columns += [f"hands of {piece['damping']:g} N s/m: stable", "motion, mm", "force, N", "energy given, J"]
     if any("z_width" in run for run in runs):
         columns += ["stable up to, N/m", "with the best damping, N/m"]
-    title = f"### Held by hands of 0.1 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
+    title = f"### Held by hands of 0 to 20 kN/m and 0 to 2 kg at {SETPOINT:g} N/m, and Z-width against {len(HANDS)} of them"
     return _table(title, columns, rows)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import (
+    ACCELERATION,
     FORCE,
     MOTION,
     OPENING,
@@ -31,8 +32,8 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
+from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors import sensor_errors as at
-from birthsim_env.parts.sensors import tracker
 from birthsim_env.parts.sensors.noise import happens, normal, uniform
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -42,8 +43,8 @@ from birthsim_env.physics.electronics import Electronics
 TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
 """Channels of random numbers; the pressures have the first four, all as the sensor model ``lab``."""
 
-SHOWN = 11
-"""What is shown: x, y and their time, velocity, four pressures, force."""
+SHOWN = 13
+"""What is shown: x, y and their time, velocity, four pressures, force, acceleration."""
 
 
 @helper
@@ -73,11 +74,11 @@ def _growth(e: Array, c: Array, i: int, x: float, y: float) -> float:
 @kernel
 def _honest(
     ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, force: Array, keys: NDArray[np.uint64], c: Array,
-    e: Array, queue: Array, arrived: Array, velocity: Array, passed: Array, late: Array, shown: Array,
+    e: Array, queue: Array, arrived: Array, velocity: Array, passed: Array, late: Array, shown: Array, sensed: Array,
 ) -> None:  # fmt: skip
     """One control instant. ``c`` constants and ``e`` (ROWS, N) errors of ``sensor_errors``; ``queue``, ``arrived`` and
     ``velocity`` of ``tracker``; ``passed`` (2, N): forces behind the low-pass; ``late`` (Q, 2, N): the last forces converted;
-    ``shown`` (SHOWN, N): what is told, which stays as it is in a missed period."""
+    ``shown`` (SHOWN, N): what is told, which stays as it is in a missed period; ``sensed`` of ``acceleration``."""
     for i in range(time.shape[0]):
         tick, key = int(ticks[i]), keys[i]
         due = tracker.sample_due(tick, time[i], c[at.PERIOD], c[at.RATE])
@@ -105,6 +106,11 @@ def _honest(
             if read:
                 newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
                 shown[9 + axis, i] = newer + rest * (older - newer)
+            if c[at.FEELS] > 0.0:
+                gain, bias = e[at.ACCELERATION_GAIN + axis, i], e[at.ACCELERATION_BIAS + axis, i]
+                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], gain, bias, c[at.PERIOD], c[at.FEELS])
+                if read:
+                    shown[11 + axis, i] = told + c[at.ACCELERATION_NOISE] * normal(key, tick, acceleration.NOISE + axis)
         if read:
             shown[0, i], shown[1, i] = arrived[0, i], arrived[1, i]
             stamp = arrived[2, i] + (e[at.POSITION_LATENCY, i] - c[at.STAMPED])
@@ -126,13 +132,13 @@ def _honest_stage(world: int, seen: int, memory: int, constants: int, tables: in
     _honest(
         w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, w[FORCE : FORCE + 2, :n], keys, c,
         table2(tables, 1)[:, mine], table3(tables, 2)[:, :, mine], table2(tables, 3)[:, mine], table2(tables, 4)[:, mine],
-        table2(tables, 5)[:, mine], table3(tables, 6)[:, :, mine], shown,
+        table2(tables, 5)[:, mine], table3(tables, 6)[:, :, mine], shown, table2(tables, 8)[:, mine],
     )  # fmt: skip
     for i in range(n):
         s[POSITION_TIME, i] = shown[2, i]
         for axis in range(2):
             s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], shown[3 + axis, i]
-            s[USER_FORCE + axis, i] = shown[9 + axis, i]
+            s[USER_FORCE + axis, i], s[ACCELERATION + axis, i] = shown[9 + axis, i], shown[11 + axis, i]
         for chamber in range(4):
             s[PRESSURE + chamber, i] = shown[5 + chamber, i]
     return 0
@@ -171,8 +177,9 @@ class HonestSensors:
     The force: gain, crosstalk and bias of the episode, low-pass, noise, converter, latency. The tracker: as ``lab``'s, with
     scale and distortion of the episode about the place of registration, noise that grows with the distance from the
     transmitter, and lost samples; ``position_time`` is worked out with the latency of the rig as described, which is wrong
-    where another one is drawn. Pressures: bias of the episode, noise, converter. In a missed period everything that is shown
-    stays as it was, and so do the valves, which are commanded through a converter (``board_stage``).
+    where another one is drawn. Pressures: bias of the episode, noise, converter.
+    Acceleration, where the rig has such a sensor: gain and bias of the episode, low-pass, noise. In a missed period everything
+    that is shown stays as it was, and so do the valves, which are commanded through a converter (``board_stage``).
     """
 
     sampled = True
@@ -190,6 +197,7 @@ class HonestSensors:
         self._passed: Array = np.zeros((2, num_envs))
         self._shown: Array = np.zeros((SHOWN, num_envs))
         self._last: Array = np.zeros((4, num_envs))
+        self._sensed: Array = np.zeros((acceleration.ROWS, num_envs))
         self._make_room()
 
     def _make_room(self) -> None:
@@ -220,6 +228,9 @@ class HonestSensors:
             figures[at.FIGURES.index(name)] = rng.uniform(low, high)
         errors = np.empty((at.ROWS, len(lanes)))
         at.work_out(figures, unit, self._constants, errors)
+        # Drawn last, so that all else is drawn as on a rig without such a sensor.
+        most = np.repeat([self._electronics.acceleration_bias, self._electronics.acceleration_gain_error], 2)
+        errors[at.ACCELERATION_BIAS :] = most[:, None] * np.asarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
         self._errors[:, lanes] = errors
 
     @property
@@ -240,16 +251,16 @@ class HonestSensors:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         _honest(
             ticks, time, motion, pressures, force, self._keys, self._constants, self._errors, self._queue, self._arrived,
-            self._velocity, self._passed, self._late, self._shown,
+            self._velocity, self._passed, self._late, self._shown, self._sensed,
         )  # fmt: skip
         told = self._shown.copy()
-        return Measurement(time, told[:2], told[2], told[3:5], told[5:9], told[9:], sampled=True)
+        return Measurement(time, told[:2], told[2], told[3:5], told[5:9], told[9:11], True, told[11:])
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
         keys = self._keys.view(np.float64)
         tables = (
-            keys, self._errors, self._queue, self._arrived, self._velocity, self._passed, self._late, self._shown,
+            keys, self._errors, self._queue, self._arrived, self._velocity, self._passed, self._late, self._shown, self._sensed,
         )  # fmt: skip
         return Stage(_honest_stage, self._constants, tables=tables)
 

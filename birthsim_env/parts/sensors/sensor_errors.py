@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from birthsim_env.parts.sensors import acceleration
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -50,19 +51,24 @@ HEIGHT = WAVE + 6 * WAVES
 """Amplitude of a wave, m."""
 REGISTERED = HEIGHT + 1
 """The field where the tracker was registered, m."""
-ROWS = REGISTERED + 2
+ACCELERATION_BIAS = REGISTERED + 2
+"""Of each axis, m/s2, and then its error of gain. ``work_out`` leaves them."""
+ACCELERATION_GAIN = ACCELERATION_BIAS + 2
+ROWS = ACCELERATION_GAIN + 2
 
-PERIOD, RATE, AT_X, AT_Y, FROM_X, FROM_Y, FORCE_RANGE, PRESSURE_RANGE, STAMPED = range(9)
+PERIOD, RATE, AT_X, AT_Y, FROM_X, FROM_Y, FORCE_RANGE, PRESSURE_RANGE, STAMPED, FEELS, ACCELERATION_NOISE = range(11)
 """Constants that all lanes share: control period, rate of the tracker, places of registration and transmitter, full scales,
-and the latency of the tracker that its samples are stamped with."""
-CONSTANTS = 9
+the latency of the tracker that its samples are stamped with, what passes the low-pass of an acceleration sensor in a period
+(0: there is none), and its noise."""
+CONSTANTS = 11
 
 
 def shared(electronics: Electronics, rate: float) -> Array:
     """The constants (CONSTANTS,), SI units; ``rate`` is the tracker's, Hz."""
     e = electronics
     places = (e.registration_x, e.registration_y, e.transmitter_x, e.transmitter_y)
-    return np.array((e.control_period, rate, *places, e.force_range, e.pressure_range, e.position_latency))
+    felt = acceleration.passed(e.acceleration_bandwidth, e.control_period), e.acceleration_noise
+    return np.array((e.control_period, rate, *places, e.force_range, e.pressure_range, e.position_latency, *felt))
 
 
 @helper

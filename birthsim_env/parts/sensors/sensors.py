@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import (
+    ACCELERATION,
     FORCE,
     MOTION,
     POSITION,
@@ -31,7 +32,7 @@ from birthsim_env.loop.rows import (
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
-from birthsim_env.parts.sensors import tracker
+from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.noise import normal
 from birthsim_env.physics.compiled.compilation import kernel
@@ -77,10 +78,11 @@ class IdealSensors:
 @kernel
 def _lab(
     ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
-    rate: float, latency: float, position_noise: float, pressure_noise: float, queue: Array, shown: Array, velocity: Array,
-    seen: Array,
+    rate: float, latency: float, position_noise: float, pressure_noise: float, passed: float, acceleration_noise: float,
+    queue: Array, shown: Array, velocity: Array, sensed: Array, seen: Array,
 ) -> None:  # fmt: skip
-    """One control instant; ``queue``, ``shown`` and ``velocity`` as in ``parts.tracker``, ``seen`` (4, N): noisy pressures."""
+    """One control instant; ``queue``, ``shown`` and ``velocity`` as in ``parts.tracker``, ``sensed`` in
+    ``parts.acceleration``, ``seen`` (6, N): noisy pressures and acceleration."""
     for i in range(time.shape[0]):
         tick, key = int(ticks[i]), keys[i]
         if tracker.sample_due(tick, time[i], period, rate):
@@ -92,31 +94,39 @@ def _lab(
         tracker.arrive(queue, shown, velocity, i, time[i], latency)
         for chamber in range(4):
             seen[chamber, i] = pressures[chamber, i] + pressure_noise * normal(key, tick, chamber)
+        for axis in range(2):
+            seen[4 + axis, i] = 0.0
+            if passed > 0.0:
+                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], 0.0, 0.0, period, passed)
+                seen[4 + axis, i] = told + acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
 
 
 @kernel
 def _lab_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 5)
+    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 7)
     keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
     queue, shown, velocity = table3(tables, 1)[:, :, mine], table2(tables, 2)[:, mine], table2(tables, 3)[:, mine]
-    pressures = scratch(4)
+    pressures, told = scratch(4), scratch(6)
     for chamber in range(4):
         for i in range(n):
             pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]
     _lab(
         w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, keys, about[0], about[1], about[2], about[3], about[4],
-        queue, shown, velocity, s[PRESSURE : PRESSURE + 4, :n],
+        about[5], about[6], queue, shown, velocity, table2(tables, 4)[:, mine], told,
     )  # fmt: skip
     for i in range(n):
         s[POSITION_TIME, i] = shown[2, i]
         for axis in range(2):
             s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], velocity[axis, i]
-            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+            s[USER_FORCE + axis, i], s[ACCELERATION + axis, i] = w[FORCE + axis, i], told[4 + axis, i]
+        for chamber in range(4):
+            s[PRESSURE + chamber, i] = told[chamber, i]
     return 0
 
 
 class LabSensors:
-    """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period.
+    """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period, and so is an
+    acceleration sensor where the rig has one.
 
     No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal
     force sensor.
@@ -130,11 +140,13 @@ class LabSensors:
         rate = min(board.position_rate, 1 / board.control_period)
         self._numbers = (
             board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
+            acceleration.passed(board.acceleration_bandwidth, board.control_period), board.acceleration_noise,
         )  # fmt: skip
         self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), 3, num_envs))
         self._shown: Array = np.zeros((3, num_envs))
         self._keys = np.zeros(num_envs, dtype=np.uint64)
         self._velocity: Array = np.zeros((2, num_envs))
+        self._sensed: Array = np.zeros((acceleration.ROWS, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -143,15 +155,15 @@ class LabSensors:
 
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
-        seen = np.empty_like(pressures)
-        _lab(ticks, time, motion, pressures, self._keys, *self._numbers, self._queue, self._shown, self._velocity, seen)
+        seen, kept = np.empty((6, len(time))), (self._queue, self._shown, self._velocity, self._sensed)
+        _lab(ticks, time, motion, pressures, self._keys, *self._numbers, *kept, seen)
         shown = self._shown.copy()
-        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen, force, sampled=True)
+        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen[:4], force, True, seen[4:])
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
         keys = self._keys.view(np.float64)
-        return Stage(_lab_stage, np.array(self._numbers), tables=(keys, self._queue, self._shown, self._velocity))
+        return Stage(_lab_stage, np.array(self._numbers), tables=(keys, self._queue, self._shown, self._velocity, self._sensed))
 
 
 class SensorModel(Protocol):

@@ -17,14 +17,13 @@ export class Physics {
   constructor(section, button) {
     this.section = section;
     this.button = button;
-    this.ellipse = new Ellipse();
-    this.work = new Work();
+    this.rigs = [0, 1].map(() => ({ ellipse: new Ellipse(), work: new Work() }));
     this.last = 0;
     const pictures = document.createElement("div");
     pictures.className = "pictures";
     this.sheets = ["valves and air", "forces in the cylinders", "stiffness at the head"].map((name) => picture(pictures, name));
     this.values = figures(pictures);
-    section.prepend(pictures);
+    section.querySelector(".plots").before(pictures);
     button.addEventListener("click", () => this.open(section.hidden));
   }
 
@@ -38,29 +37,34 @@ export class Physics {
   }
 
   push(frame) {
-    this.work.push(frame);
-    this.ellipse.push(frame);
+    [frame, frame.second].forEach((one, k) => {
+      if (!one) return;
+      this.rigs[k].work.push(one);
+      this.rigs[k].ellipse.push(one);
+    });
   }
 
-  step(frame, now) {
+  /** `frame` is that of rig `k`. */
+  step(frame, k, now) {
     if (this.section.hidden || now - this.last < 1e3 / RATE) return;
     this.last = now;
+    const { ellipse, work } = this.rigs[k];
     const draw = [
       (context, width) => drawValves(context, width, frame),
       (context, width) => drawForces(context, width, frame, this.rig),
-      (context, width, height) => this.ellipse.draw(context, width, height, frame),
+      (context, width, height) => ellipse.draw(context, width, height, frame),
     ];
-    this.sheets.forEach((sheet, k) => {
+    this.sheets.forEach((sheet, i) => {
       sheet.check();
       const { context, width, height } = sheet;
       if (!width) return;
       context.clearRect(0, 0, width, height);
-      draw[k](context, width, height);
+      draw[i](context, width, height);
     });
-    const found = this.work.figures(frame);
-    FIGURES.forEach(([name], k) => {
+    const found = work.figures(frame);
+    FIGURES.forEach(([name], i) => {
       const words = signed(found[name]);
-      if (this.values[k].textContent !== words) this.values[k].textContent = words;
+      if (this.values[i].textContent !== words) this.values[i].textContent = words;
     });
   }
 }

@@ -20,7 +20,7 @@ from birthsim_live.logs import reading
 from birthsim_live.rig import frames
 from birthsim_live.rig.recording import load_recording
 from tests.console import call
-from tests.live.test_live_recording import recorded
+from tests.live.recordings.test_recording import recorded
 
 MISSING = "mcap is not installed: pip install 'birthsim[log]'"
 HEAD = ["topic", "log_time"]

@@ -19,10 +19,6 @@ from birthsim_live.rig.recorder import EVERY, Recorder
 from birthsim_live.rig.recording import FIRST_COLUMNS, load_recording, packed
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
-from birthsim_live.server import live_hub
-from birthsim_live.server.live_hub import LiveHub
-from tests.console import run
-from tests.live.test_live_server import SOCKET, client, of, say, until
 
 RIG = Parameters()
 FIRST, SECOND = "backstepping", "admittance-backstepping"
@@ -194,34 +190,3 @@ def test_a_recording_of_one_rig_of_before_is_still_played(tmp_path: Path) -> Non
     assert recording.second.shape == (5, COLUMNS)
     assert Player(recording).frame()["second"] is None
     assert [one.topic for one in read_log(path).series] == ["/rig"]
-
-
-def test_a_command_that_compares_with_nobody_is_refused() -> None:
-    done = run("live", "--port", "0", "--compare", "nobody")
-    assert done.returncode == 2
-    assert "compare = 'nobody'; allowed: nothing, backstepping" in done.stderr.splitlines()[-1]
-    done = run("live", "--static", "page", "--compare", "pid")
-    assert done.returncode == 2
-    assert done.stderr.endswith("--compare pid beside --static; allowed: ?compare=pid in a link\n")
-
-
-def test_windows_choose_a_comparison_by_a_setting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live_hub, "PATIENCE", math.inf)
-    with client(LiveHub(Session(RIG), tmp_path)) as live, live.websocket_connect(SOCKET) as ws:
-        hello = until(ws, of("hello"))
-        assert hello["defaults"]["compare"] == "nothing"
-        assert [choice["name"] for choice in hello["choices"]["compare"][:2]] == ["nothing", "backstepping"]
-        assert until(ws, of("frame"))["second"] is None
-        say(ws, "set", settings={"compare": "nobody"})
-        assert "compare = 'nobody'; allowed: nothing, backstepping" in until(ws, of("error"))["message"]
-        say(ws, "set", settings={"compare": FIRST})
-        assert until(ws, of("settings", compare=FIRST))
-        begun = until(ws, lambda m: m["type"] == "frame" and m["second"] is not None)
-        assert begun["second"]["time"] == begun["time"]
-        say(ws, "push", force=[20, 0], id=5)
-        pushed = until(ws, lambda m: m["type"] == "frame" and m["second"]["drag_force"] == [20.0, 0.0])
-        assert (pushed["drag_force"], pushed["pointer_id"]) == ([20.0, 0.0], 5)
-        say(ws, "release")
-        assert until(ws, lambda m: m["type"] == "frame" and m["second"]["drag_force"] == [0.0, 0.0])
-        say(ws, "set", settings={"compare": "nothing"})
-        assert until(ws, lambda m: m["type"] == "frame" and m["second"] is None)

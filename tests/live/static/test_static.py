@@ -5,12 +5,10 @@ from __future__ import annotations
 import base64
 import os
 import shutil
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from agents.policy.seeds import SHIPPED
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -21,10 +19,10 @@ from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
 from tests.build.targets import need_linker
 from tests.console import run
-from tests.live import browser
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
+from tests.live.static.lack import lack
 
-LACK = browser.missing() or ("" if find_spec("ziglang") else "the static page's tests need pip install 'birthsim[build]'")
+LACK = lack()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 LARGEST = 1.5e6  # bytes
@@ -79,25 +77,6 @@ SILENT = """async () => {
   });
 }"""
 """True once a rig has let go of a hand that said a single word."""
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """The folder, made by the command."""
-    need_linker()
-    folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
-    own = shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
-    done = run("live", "--static", folder, "--policy", own)
-    assert done.returncode == 0, done.stderr
-    assert f"written to {folder}" in done.stdout
-    return folder
-
-
-@pytest.fixture(scope="module")
-def address(built):
-    """Of the page on a server of files, which has it below another folder."""
-    with Folder(built.parent) as served:
-        yield f"{served}{built.name}/"
 
 
 @pytest.fixture

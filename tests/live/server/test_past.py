@@ -11,7 +11,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.session import Session
 from birthsim_live.server.live_hub import LiveHub
 from birthsim_live.server.past import PLOTTED, Past
-from tests.live.test_live_server import SOCKET, client, of, until
+from tests.live.server.sockets import SOCKET, client, of, until
 
 
 def test_a_window_that_joins_sees_the_time_before(tmp_path: Path) -> None:

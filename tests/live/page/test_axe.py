@@ -1,0 +1,63 @@
+"""axe-core finds nothing on the page, whatever it shows, by day and by night."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.recorder import EVERY, Recorder
+from birthsim_live.rig.session import Session
+from tests.live import axe, browser
+from tests.live.axe import violations
+from tests.live.browser import NARROW, WIDE, Server, Window
+
+LACK = browser.missing()
+pytestmark = [pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
+
+
+def test_a_picture_without_a_name_is_found(chromium):
+    page = chromium.new_page()
+    page.set_content('<!doctype html><html lang="en"><title>A</title><main><h1>A</h1><img src="data:,"></main>')
+    assert [line.partition(":")[0] for line in violations(page)] == ["image-alt"]
+    page.close()
+
+
+@pytest.mark.parametrize(("theme", "size"), [("light", WIDE), ("dark", WIDE), ("light", NARROW)])
+def test_nothing_is_found_on_the_page(chromium, server, theme, size):
+    with Window(chromium, server.url, size) as window:
+        page = window.page
+        page.emulate_media(color_scheme=theme)
+        window.live(0.2)
+        assert violations(page) == []
+        page.locator("#open-physics").click()
+        page.locator("select[name=compare]").select_option("lqr")
+        window.wait("birthsim.frame.second !== null && document.body.dataset.rigs === '2'")
+        assert violations(page) == []
+        page.locator("[popovertarget=files]").click()
+        assert violations(page) == []
+        page.keyboard.press("Escape")
+        page.locator(".term").first.click()
+        assert violations(page) == []
+        page.keyboard.press("Escape")
+        page.locator("#open-about").click()
+        assert violations(page) == []
+        page.locator("#close-about").click()
+        page.locator("select[name=compare]").select_option("nothing")
+        window.wait("birthsim.frame.second === null")
+        page.evaluate("window.birthsim.send({ type: 'set', settings: { mass: 900 } })")
+        window.wait("document.querySelector('#notices').textContent.includes('mass = 900')")
+        assert violations(page) == []
+        assert window.complaints == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_is_found_on_a_replay(chromium, tmp_path, theme):
+    session = Session(Parameters())
+    session.recorder = Recorder(session, tmp_path / "rest.rec")
+    session.advance(100 * EVERY)
+    session.recorder.finish()
+    with Server("replay", tmp_path / "rest.rec") as replay, Window(chromium, replay.url) as viewer:
+        viewer.page.emulate_media(color_scheme=theme)
+        assert violations(viewer.page) == []

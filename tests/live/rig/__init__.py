@@ -1,0 +1,1 @@
+"""The rig behind the page: control periods, the hand, settings, a second rig."""

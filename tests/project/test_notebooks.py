@@ -1,0 +1,82 @@
+"""The tutorials as notebooks: what the site offers, and what Colab and Binder would install."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+nbformat = pytest.importorskip("nbformat")
+pytest.importorskip("jupytext")
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+BINDER = ROOT / "binder"
+
+
+@pytest.fixture(scope="module")
+def notebooks():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "docs")
+        from _generate import notebooks
+    return notebooks
+
+
+def read(notebooks, name):
+    """Sources of a notebook's code cells, and all its words."""
+    notebook = nbformat.reads(notebooks.notebook(name), 4)
+    nbformat.validate(notebook)
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    return code, "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+
+
+def test_without_an_address_a_tutorial_is_a_file_that_installs_from_its_clone(notebooks, monkeypatch):
+    monkeypatch.delenv("BIRTHSIM_REPOSITORY", raising=False)
+    assert len(notebooks.NAMES) == 5
+    for name in notebooks.NAMES:
+        (first, *others), _ = read(notebooks, name)
+        assert re.search(r'"install", "--quiet", "\.\./\.\.(\[agents\])?"\]', first)
+        assert len(others) >= 3
+        found = re.findall(r'href="([^"]+)"', notebooks.links(name))
+        assert found == [f"../notebooks/{name}.ipynb"]
+
+
+def test_with_an_address_it_installs_from_there_and_colab_and_binder_open_it(notebooks, monkeypatch):
+    monkeypatch.setenv("BIRTHSIM_REPOSITORY", "someone/birthsim")
+    for name in notebooks.NAMES:
+        (first, *_), words = read(notebooks, name)
+        assert re.search(r'"install", "--quiet", "birthsim(\[agents\])? @ git\+https://github.com/someone/birthsim"\]', first)
+        links = re.findall(r"\]\(([^)]+)\)", words)
+        pages = [link.partition("#")[0] for link in links if link.startswith("https://github.com/someone/birthsim/blob/HEAD/")]
+        assert len(pages) == len([link for link in links if "github.com/someone" in link or "://" not in link])
+        assert [page for page in pages if not (ROOT / page.partition("/HEAD/")[2]).exists()] == []
+        assert re.findall(r'href="([^"]+)">([^<]+)', notebooks.links(name)) == [
+            (f"../notebooks/{name}.ipynb", "Download this notebook"),
+            (
+                f"https://colab.research.google.com/github/someone/birthsim/blob/gh-pages/notebooks/{name}.ipynb",
+                "Open in Colab",
+            ),
+            (
+                f"https://mybinder.org/v2/gh/someone/birthsim/HEAD?labpath=docs%2Ftutorials%2F{name}.ipynb",
+                "Open in Binder",
+            ),
+        ]
+
+
+def test_an_address_that_is_none_is_refused(notebooks, monkeypatch):
+    monkeypatch.setenv("BIRTHSIM_REPOSITORY", "https://github.com/someone/birthsim")
+    with pytest.raises(ValueError, match=r"BIRTHSIM_REPOSITORY = 'https://.*'; allowed: OWNER/NAME of a repository on GitHub"):
+        notebooks.repository()
+
+
+def test_binder_installs_the_locked_pytorch_and_every_extra_that_a_tutorial_needs(notebooks):
+    wanted = (BINDER / "requirements.txt").read_text(encoding="utf-8")
+    locked = re.search(r"^torch==(\S+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    assert f"torch=={locked}+cpu" in wanted.splitlines()
+    assert ".[agents]" in wanted.splitlines()
+    first = "".join(read(notebooks, name)[0][0] for name in notebooks.NAMES)
+    assert set(re.findall(r"\.\./\.\.\[(\w+)\]", first)) == {"agents"}
+    assert os.access(BINDER / "postBuild", os.X_OK)
+    assert subprocess.run(["bash", "-n", BINDER / "postBuild"], check=False).returncode == 0
