@@ -17,7 +17,7 @@ def told(monkeypatch, capsys, *arguments):
 
 def rows_of(text):
     """Of the two tables, the rows below their heads."""
-    tables = [[line for line in part.splitlines() if line.startswith("| ")] for part in text.split("\n\n| |")[1:]]
+    tables = [[line for line in part.splitlines() if line.startswith("| ")] for part in text.split("\n\n| law |")[1:]]
     return [[[cell.strip() for cell in line.split("|")[1:-1]] for line in table] for table in tables]
 
 
