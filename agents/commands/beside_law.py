@@ -15,7 +15,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.residual.privileged import PolicyFunction, acting
+from agents.residual.privileged import acting
 from agents.residual.settings import LAWS, ResidualSettings
 from baselines.bench.haptics.rendering import rendering
 from baselines.bench.haptics.worlds import Condition
@@ -30,8 +30,6 @@ try:
     from agents.policy.controller import ResidualController
     from agents.policy.files import Policy, load_policy
     from agents.policy.seeds import policy_folders
-    from agents.training.student_file import NAME as STUDENT
-    from agents.training.student_file import Taught, load_student
     from agents.training.validation import Score, validate
 except ImportError as error:
     raise SystemExit(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
@@ -50,11 +48,15 @@ FELT = (
     "bandwidth, Hz: mean",
     "JND at 1 Hz: median",
     "own error, mm: median",
+    "more bandwidth than the law: mean, Hz",
     "less JND than the law: mean",
     "less own error than the law: mean, mm",
     "lost",
 )
 """Columns of the table of what a hand feels."""
+
+GAINED = ("bandwidth", "jnd", "error")
+"""Figures of what a hand feels that are compared with the law's."""
 
 SETPOINT, PUSH = 2000.0, 10.0
 """N/m and N, of the multisine hand."""
@@ -98,14 +100,12 @@ def _compare(arguments: argparse.Namespace) -> None:
             print(_row(label, score, within))
         mean = np.mean([score.error for score in others.values()], axis=0)
         print(_less(f"all seeds, less than {name}", (mean - errors)[:, within]))
-    if not isinstance(policies[0], Taught) and not _privileged(policies[0]):
+    if not _privileged(policies[0]):
         _feel(folders, settings, arguments)
 
 
-def _seeds_of(name: str) -> tuple[list[Path], Sequence[Policy | Taught]]:
-    """Folders and policies of the seeds of one training; or of one student."""
-    if (Path(name) / STUDENT).is_file():
-        return [Path(name)], [load_student(Path(name))]
+def _seeds_of(name: str) -> tuple[list[Path], list[Policy]]:
+    """Folders and policies of the seeds of one training."""
     folders = policy_folders(name)
     policies = [load_policy(folder) for folder in folders]
     if len({(policy.environment, policy.settings) for policy in policies}) > 1:
@@ -121,18 +121,12 @@ def _law(settings: ResidualSettings, environment: str, arguments: argparse.Names
     return score
 
 
-def _scores(policies: Sequence[Policy | Taught], arguments: argparse.Namespace) -> list[Score]:
+def _scores(policies: Sequence[Policy], arguments: argparse.Namespace) -> list[Score]:
     """Those of policies of the same settings."""
     env = _worlds(policies[0].environment, policies[0].settings, arguments)
-    scores = [validate(env, _acting(one, env), arguments.seed) for one in policies]
+    scores = [validate(env, acting(one.network.acting(), env, _privileged(one)), arguments.seed) for one in policies]
     env.close()
     return scores
-
-
-def _acting(policy: Policy | Taught, env: Any) -> PolicyFunction:
-    if isinstance(policy, Taught):
-        return policy.student.acting()
-    return acting(policy.network.actions, env, _privileged(policy))
 
 
 def _privileged(policy: Policy) -> bool:
@@ -166,10 +160,16 @@ def _feel(folders: Sequence[Path], settings: ResidualSettings, arguments: argpar
     print(f"| law | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
     for name, own in zip((settings.law, *(folder.name for folder in folders)), (law, *policies), strict=True):
         figures = [np.mean(own["bandwidth"]), quantile(own["jnd"], 0.5), quantile(own["error"], 0.5)]
-        less = ["", ""] if own is law else [_interval(_mean, (law[k] - own[k])[None]) for k in ("jnd", "error")]
-        print(f"| {name} | {' | '.join([*map(number, figures), *less])} | {own['lost']:g} |")
-    less = [_interval(_mean, np.stack([law[k] - own[k] for own in policies])) for k in ("jnd", "error")]
-    print(f"| all seeds | | | | {' | '.join(less)} | |")
+        better = [""] * len(GAINED) if own is law else [_interval(_mean, _gained(law, own, key)[None]) for key in GAINED]
+        print(f"| {name} | {' | '.join([*map(number, figures), *better])} | {own['lost']:g} |")
+    better = [_interval(_mean, np.stack([_gained(law, own, key) for own in policies])) for key in GAINED]
+    print(f"| all seeds | | | | {' | '.join(better)} | |")
+
+
+def _gained(law: dict[str, Any], own: dict[str, Any], key: str) -> Array:
+    """How much better than the law, per rig (rigs,)."""
+    better: Array = own[key] - law[key]
+    return better if key == "bandwidth" else -better
 
 
 def _felt(found: Result, rigs: int) -> dict[str, Any]:

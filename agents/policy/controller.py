@@ -21,7 +21,8 @@ from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
-"""Actions (N, ``settings.size``) in [-1, 1] for observations (N, ``observation_size(settings)``)."""
+"""Actions (N, ``settings.size``) in [-1, 1] for observations (N, ``observation_size(settings)``). One that remembers also has
+``reset(lanes)``, which forgets the past of all lanes (None) or of those where the mask (N,) is True."""
 
 
 def observation_size(settings: ResidualSettings) -> int:
@@ -58,6 +59,8 @@ class ResidualController:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
+        if hasattr(self._policy, "reset"):
+            self._policy.reset(lanes)
         if lanes is None:
             self._calls = 0
             self._action: Array = np.zeros((self._size, 0))
@@ -99,4 +102,4 @@ def _stored(place: str | Path) -> tuple[PolicyFunction, ResidualSettings]:
         raise ValueError(
             f"policy = {str(place)!r} maps {network.inputs} to {network.outputs} numbers; allowed: {seen} to {said}"
         )
-    return network.actions, stored.settings
+    return network.acting(), stored.settings

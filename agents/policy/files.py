@@ -1,7 +1,7 @@
 """A policy is one file in a folder: ``policy.safetensors``, arrays with JSON about them. Nothing is unpickled.
 
-The arrays are mean, variance and of layer k k.weight and k.bias; the JSON has format, environment, residual settings, training
-configuration and a checksum of the file.
+The arrays are mean, variance, of layer k k.weight and k.bias, and of a memory enters.weight, enters.bias, own.weight and
+own.bias; the JSON has format, environment, residual settings, training configuration and a checksum of the file.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from birthsim_env.physics.rig.values import problem
 
 FORMAT = "birthsim-residual-3"
 WEIGHTS = "policy.safetensors"
+MEMORY = ("enters", "own")
+"""Names of a memory's layers."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class Policy:
 def policy_content(policy: Policy) -> bytes:
     """The content of a policy's file."""
     arrays: Arrays = {"mean": policy.network.mean, "variance": policy.network.variance}
-    for k, (weight, bias) in enumerate(policy.network.layers):
-        arrays[f"{k}.weight"], arrays[f"{k}.bias"] = weight, bias
+    for name, (weight, bias) in (*enumerate(policy.network.layers), *zip(MEMORY, policy.network.memory, strict=False)):
+        arrays[f"{name}.weight"], arrays[f"{name}.bias"] = weight, bias
     about = {
         "format": FORMAT,
         "environment": policy.environment,
@@ -63,9 +65,12 @@ def load_policy(folder: str | Path) -> Policy:
     except ValueError as error:
         raise ValueError(f"policy = {str(folder)!r}: {WEIGHTS} is {error}; {allowed}") from error
     try:
-        count = sum(name.endswith(".weight") for name in arrays)
-        layers = tuple((arrays[f"{k}.weight"], arrays[f"{k}.bias"]) for k in range(count))
-        network = PolicyNetwork(arrays["mean"], arrays["variance"], layers, _truth(about["squashed"]))
+        memory = MEMORY if f"{MEMORY[0]}.weight" in arrays else ()
+        count = sum(name.endswith(".weight") for name in arrays) - len(memory)
+        layers, remembers = (
+            tuple((arrays[f"{name}.weight"], arrays[f"{name}.bias"]) for name in names) for names in (range(count), memory)
+        )
+        network = PolicyNetwork(arrays["mean"], arrays["variance"], layers, _truth(about["squashed"]), remembers)
         settings = ResidualSettings(**about["settings"])
         return Policy(network, str(about["environment"]), settings, dict(about["training"]))
     except (KeyError, TypeError, ValueError) as error:

@@ -1,7 +1,8 @@
 """A trained policy with its normalisation as one ONNX file that says what goes in and what comes out.
 
 The file's metadata (``metadata_props``): ``format``; ``environment``, on which the policy was trained; ``settings``, those of
-``ResidualSettings`` as JSON; ``observations`` and ``actions``, the names of the entries as JSON lists.
+``ResidualSettings`` as JSON; ``observations`` and ``actions``, the names of the entries as JSON lists. A policy that remembers
+has "memory" (N, cells) as a further input, zeros where an episode begins, and "next_memory" as a further output, both float64.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 
 from agents.policy.files import Policy
-from agents.policy.network import CLIP, EPSILON, PolicyNetwork
+from agents.policy.network import CLIP, EPSILON, PolicyNetwork, Weights
 from agents.residual.law import action_names, observation_names
 from baselines.work.files import whole_file
 from birthsim_env.observation import LIMIT
@@ -28,51 +29,60 @@ from birthsim_env.observation import LIMIT
 FORMAT = "birthsim-residual-onnx-1"
 
 INPUT, OUTPUT = "observation", "action"
+MEMORY, NEXT = "memory", "next_memory"
 
 OPSET = 17
 """Old enough for the runtimes of embedded computers."""
 
 TOLERANCE = 2.0**-23
-"""Largest difference of an action, in [-1, 1], that an exported policy may have: one unit in the last place of a single at 1.
-Everything inside is in double precision, where the order of a sum shows only in the rounding of the last step."""
+"""Largest difference that an exported policy may have, of an action or the memory, in [-1, 1]: one unit in the last place of a
+single at 1. Everything inside is in double precision, where the order of a sum shows only in the rounding of the last step."""
 
 CHECKS = 1000
 """Random observations of each kind that an exported policy is checked on."""
 
-Actions = NDArray[np.float32]
 Observations = NDArray[np.float32]
 
 
 class PolicyModule(torch.nn.Module):
-    """``PolicyNetwork`` in PyTorch: actions (N, outputs) for observations (N, inputs), both float32."""
+    """``PolicyNetwork`` in PyTorch, in doubles throughout: actions (N, outputs) for observations (N, inputs), both float32.
+
+    A network that remembers takes its memory (N, cells), float64, too, and gives the next one.
+    """
 
     mean: torch.Tensor
     deviation: torch.Tensor
 
     def __init__(self, network: PolicyNetwork) -> None:
         super().__init__()
-        # Doubles throughout, as in PolicyNetwork.
         self.register_buffer("mean", torch.as_tensor(network.mean, dtype=torch.float64))
         self.register_buffer("deviation", torch.as_tensor(np.sqrt(network.variance + EPSILON), dtype=torch.float64))
-        parts: list[torch.nn.Module] = []
-        for weight, bias in network.layers:
-            linear = torch.nn.Linear(weight.shape[1], weight.shape[0], dtype=torch.float64)
-            linear.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
-            parts += [linear, torch.nn.Tanh()]
-        if not network.squashed:
-            parts[-1] = torch.nn.Hardtanh(-1.0, 1.0)
-        self.layers = torch.nn.Sequential(*parts)
+        *hidden, last = (_linear(*layer) for layer in network.layers)
+        self.hidden = torch.nn.Sequential(*(part for one in hidden for part in (one, torch.nn.Tanh())))
+        self.memory = torch.nn.ModuleList(_linear(*layer) for layer in network.memory)
+        self.last = torch.nn.Sequential(last, torch.nn.Tanh() if network.squashed else torch.nn.Hardtanh(-1.0, 1.0))
 
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        normalized = ((observations.double() - self.mean) / self.deviation).clamp(-CLIP, CLIP)
-        actions: torch.Tensor = self.layers(normalized)
-        return actions.float()
+    def forward(self, observations: torch.Tensor, *memory: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        x: torch.Tensor = self.hidden(((observations.double() - self.mean) / self.deviation).clamp(-CLIP, CLIP))
+        after = [self._next(x, held) for held in memory]
+        return self.last(torch.cat([x, *after], 1)).float(), *after
+
+    def _next(self, x: torch.Tensor, held: torch.Tensor) -> torch.Tensor:
+        (reset, kept, new), own = (layer(y).chunk(3, 1) for layer, y in zip(self.memory, (x, held), strict=True))
+        kept = torch.sigmoid(kept + own[1])
+        return (1.0 - kept) * torch.tanh(new + torch.sigmoid(reset + own[0]) * own[2]) + kept * held
+
+
+def _linear(weight: Weights, bias: Weights) -> torch.nn.Linear:
+    linear = torch.nn.Linear(weight.shape[1], weight.shape[0], dtype=torch.float64)
+    linear.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
+    return linear
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: bytes of the file, and the largest difference of an action from PyTorch's and from NumPy's, over
-    ``observations`` observations."""
+    """What was written: bytes of the file, and the largest difference of an action or the memory from PyTorch's and from
+    NumPy's, over ``observations`` observations."""
 
     size: int
     observations: int
@@ -81,7 +91,8 @@ class Exported:
 
 
 def export_onnx(policy: Policy, path: Path) -> Exported:
-    """Write ``policy`` to ``path``, whole or not at all: input "observation" (N, D), output "action" (N, size), both float32.
+    """Write ``policy`` to ``path``, whole or not at all: input "observation" (N, D), output "action" (N, size), both float32,
+    and the memory where there is one.
 
     Raises ``ValueError`` for a network that does not fit the settings, and where the file, run by onnxruntime, differs from
     PyTorch or from ``PolicyNetwork`` by more than ``TOLERANCE``; nothing is written then.
@@ -94,7 +105,7 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     if path.is_dir():
         raise ValueError(f"{str(path)!r} is a folder; allowed: the name of a file")
     module = PolicyModule(network).eval()
-    model = _traced(module, network.inputs)
+    model = _traced(module, network.inputs, network.cells)
     onnx.helper.set_model_props(
         model,
         {
@@ -114,14 +125,16 @@ def export_onnx(policy: Policy, path: Path) -> Exported:
     return exported
 
 
-def _traced(module: PolicyModule, inputs: int) -> Any:
+def _traced(module: PolicyModule, inputs: int, cells: int) -> Any:
+    zeros = {INPUT: torch.zeros(1, inputs), **({MEMORY: torch.zeros(1, cells, dtype=torch.float64)} if cells else {})}
+    outputs = [OUTPUT, *([NEXT] if cells else [])]
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         path = Path(folder) / "policy.onnx"
         # PyTorch calls this exporter deprecated; the one that takes its place needs onnxscript, which nothing else here does.
         warnings.simplefilter("ignore", DeprecationWarning)
         torch.onnx.export(
-            module, (torch.zeros(1, inputs),), path, dynamo=False, opset_version=OPSET, input_names=[INPUT],
-            output_names=[OUTPUT], dynamic_axes={INPUT: {0: "batch"}, OUTPUT: {0: "batch"}},
+            module, tuple(zeros.values()), path, dynamo=False, opset_version=OPSET, input_names=list(zeros),
+            output_names=outputs, dynamic_axes={name: {0: "batch"} for name in (*zeros, *outputs)},
         )  # fmt: skip
         return onnx.load(path)
 
@@ -130,13 +143,18 @@ def _checked(content: bytes, module: PolicyModule, network: PolicyNetwork) -> Ex
     """Runs the file as its user will, on many observations at once and on one."""
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
     seen = _observations(network)
+    feeds: dict[str, NDArray[Any]] = {INPUT: seen}
+    if network.cells:
+        feeds[MEMORY] = np.random.default_rng(1).uniform(-1.0, 1.0, (len(seen), network.cells))
     with torch.no_grad():
-        by_torch: Actions = module(torch.from_numpy(seen)).numpy()
-    by_numpy = network.actions(seen)
-    many = session.run([OUTPUT], {INPUT: seen})[0]
-    one = session.run([OUTPUT], {INPUT: seen[:1]})[0]
+        by_torch = [one.numpy() for one in module(*map(torch.from_numpy, feeds.values()))]
+    after = [feeds[MEMORY].copy()] if network.cells else []
+    by_numpy = [network.actions(seen, *after), *after]
+    many = session.run(None, feeds)
+    one = session.run(None, {name: values[:1] for name, values in feeds.items()})
     from_torch, from_numpy = (
-        float(max(np.abs(many - other).max(), np.abs(one - other[:1]).max())) for other in (by_torch, by_numpy)
+        float(max(np.abs(own - its[: len(own)]).max() for runs in (many, one) for own, its in zip(runs, other, strict=True)))
+        for other in (by_torch, by_numpy)
     )
     for name, difference in (("PyTorch", from_torch), ("NumPy", from_numpy)):
         # What is not a number is not within the tolerance either.

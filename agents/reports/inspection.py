@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import gymnasium
 import numpy as np
 
+from agents.policy.controller import PolicyFunction
 from agents.policy.files import Policy
-from agents.policy.network import PolicyNetwork
+from agents.residual.settings import ResidualSettings
 from baselines.bench.pneumatic_range import pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import quantile
@@ -53,8 +53,9 @@ RIGS = 4
 
 
 def _follow(
-    policy: Policy, lanes: int, seconds: float, trajectory: Trajectory, ranges: dict[str, tuple[float, float]], rig: Parameters
-) -> tuple[Any, dict[str, Array]]:
+    policy: PolicyFunction, settings: ResidualSettings, lanes: int, seconds: float, trajectory: Trajectory,
+    ranges: dict[str, tuple[float, float]], rig: Parameters,
+) -> tuple[Any, dict[str, Array]]:  # fmt: skip
     """Lanes without a hand at 2000 N/m under the policy; the environment, and by name what was at each of T steps, (T, N, 2).
 
     ``correction`` is the believed force, N; the others are of ``info``.
@@ -62,7 +63,7 @@ def _follow(
     env: Any = gymnasium.make_vec(
         "BirthSIM/ProbeResidual-v2", num_envs=lanes, reference=trajectory, user_force=ForceProfile(), parameters=rig,
         stiffness=StiffnessSchedule(), randomize=ranges or False, duration=seconds, autoreset_mode="SameStep",
-        **policy.settings.to_dict(),
+        **settings.to_dict(),
     )  # fmt: skip
     rows = [k for k, name in enumerate(env.observation_names) if name.startswith("smoothed action: believed force")]
     taken: dict[str, list[Array]] = {
@@ -70,8 +71,8 @@ def _follow(
     }
     observation, info = env.reset(seed=0)
     for _ in range(env.steps - 1):
-        observation, _, _, _, info = env.step(policy.network.actions(observation))
-        taken["correction"].append(policy.settings.authority * observation[:, rows].astype(np.float64))
+        observation, _, _, _, info = env.step(policy(observation))
+        taken["correction"].append(settings.authority * observation[:, rows].astype(np.float64))
         for name in list(taken)[1:]:
             taken[name].append(info[name])
     return env, {name: np.array(steps) for name, steps in taken.items()}
@@ -80,7 +81,7 @@ def _follow(
 def weight_over_workspace(policy: Policy) -> tuple[Array, Array]:
     """Correction on cylinder 2 and m g cos(theta1), N, (PLACES,) each: held still, without friction, masses drawn at random."""
     hold, rig = Hold(((0.40, 0.60), (-0.12, 0.08))), Parameters().replace(FRICTIONLESS)
-    env, taken = _follow(policy, PLACES, 3.0, hold, {"mechanics.mass": MASSES}, rig)
+    env, taken = _follow(policy.network.acting(), policy.settings, PLACES, 3.0, hold, {"mechanics.mass": MASSES}, rig)
     mass = env.simulation.plant.lane_parameters[at.MASS]
     angle = theta1(taken["piston_position"][-1, :, 0], rig)
     return taken["correction"][-100:, :, 1].mean(axis=0), mass * rig.mechanics.gravity * np.cos(angle)
@@ -96,7 +97,7 @@ def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
     rig, halves = Parameters(), np.zeros((2, RUBBED))
     ranges = {f"cylinder{i}.coulomb_friction": FRICTIONS for i in (1, 2)}
     for period in (ROUND, -ROUND):
-        env, taken = _follow(policy, RUBBED, 12.0, Circle(period=period), ranges, rig)
+        env, taken = _follow(policy.network.acting(), policy.settings, RUBBED, 12.0, Circle(period=period), ranges, rig)
         speed, correction = (np.moveaxis(taken[name][400:], 2, 0) for name in ("piston_velocity", "correction"))
         outwards, inwards = (correction.mean(axis=1, where=moves) for moves in (speed > SLIDING, speed < -SLIDING))
         halves += (outwards - inwards) / 4
@@ -107,13 +108,9 @@ def friction_along_circle(policy: Policy) -> tuple[Array, Array]:
 def frictionless_circle(policy: Policy) -> tuple[float, float]:
     """Settled RMS error on x, mm, of the law and with the policy: a circle of 100 mm in 4 s at 2000 N/m without friction."""
     rig, circle = Parameters().replace(FRICTIONLESS), Circle(radius=0.1)
-    silent = PolicyNetwork(
-        policy.network.mean, policy.network.variance, ((np.zeros_like(policy.network.layers[0][0])[: policy.settings.size],
-        np.zeros(policy.settings.size, dtype=np.float32)),),
-    )  # fmt: skip
     errors = []
-    for network in (silent, policy.network):
-        _, taken = _follow(replace(policy, network=network), 1, 12.0, circle, {}, rig)
+    for act in (lambda seen: np.zeros((len(seen), policy.settings.size)), policy.network.acting()):
+        _, taken = _follow(act, policy.settings, 1, 12.0, circle, {}, rig)
         errors.append(1e3 * float(np.sqrt(np.mean(taken["tracking_error"][400:, 0, 0] ** 2))))
     return errors[0], errors[1]
 

@@ -18,7 +18,7 @@ from agents.training.checkpoint import save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.time_split import split
-from agents.training.validation import validate
+from agents.training.validation import merit, validate
 from birthsim_env.physics.rig.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
@@ -99,7 +99,7 @@ class Monitor(BaseCallback):
         began = time.perf_counter()
         average: Any = self.model.average  # type: ignore[attr-defined]
         network = network_of(average.module, self.training_env)  # type: ignore[arg-type]
-        score = validate(self._env, acting(network.actions, self._env, self._settings.privileged))
+        score = validate(self._env, acting(network.acting(), self._env, self._settings.privileged))
         figures, law = score.to_dict(), self._reached["law"]
         self._validating += time.perf_counter() - began
         seconds = self._before + time.perf_counter() - self._started
@@ -118,7 +118,7 @@ class Monitor(BaseCallback):
         self.logger.dump(self.num_timesteps)
         self._bar.set_postfix_str(f"error {score.pooled:.2f} mm, law {law['pooled_mm']:.2f} mm, {better:+.0f} % better")
         best = self._reached["policy"]
-        if best is None or _merit(figures) < _merit(best):
+        if best is None or merit(figures) < merit(best):
             self._reached["policy"] = figures
             training = {**self._settings.to_dict(), "law": law, "reached": figures}
             self._best = policy_content(Policy(network, self._settings.environment, self._residual, training))
@@ -154,8 +154,3 @@ def _without_policy(env: Any) -> dict[str, float]:
 def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:
     """All settings of a training, as JSON takes them."""
     return {**settings.to_dict(), **residual.to_dict(), "rig": rig.to_dict()}
-
-
-def _merit(figures: dict[str, float]) -> float:
-    """What is to be small: pooled error and its tail together, since the tail is what a mean hides."""
-    return figures["pooled_mm"] + figures["tail_mm"]

@@ -7,7 +7,7 @@ student acts. The student is a gated recurrent unit (GRU), as in RAPTOR (arXiv 2
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from agents.policy.files import Policy
-from agents.policy.network import CLIP, EPSILON
+from agents.policy.network import PolicyNetwork, Statistics
 from agents.residual.privileged import told
 from agents.training.validation import TRAINING_SEED, Score, validate
 from birthsim_env.physics.rig.parameters import Parameters
@@ -42,76 +42,63 @@ SEED, SPACING = TRAINING_SEED + 500_000, 100_000
 
 @dataclass(frozen=True)
 class Lessons:
-    """What a student is taught with: sizes of its memory, how many rounds, ``seed`` of weights and worlds."""
+    """What a student is taught with: cells of its memory, how many rounds, ``seed`` of weights and worlds."""
 
     hidden: int = 32
     rounds: int = 12
     seed: int = 0
 
 
-Numbers = NDArray[np.floating]
-
-
 class Student(torch.nn.Module):
-    """Observations (T, N, D) -> actions (T, N, size): a tanh layer, a GRU of as many cells, and a layer over both."""
+    """Normalised observations (T, N, D) -> actions (T, N, size): a tanh layer, a GRU of as many cells, a layer over both."""
 
-    def __init__(self, mean: Numbers, deviation: Numbers, outputs: int, hidden: int) -> None:
-        """``mean`` and ``deviation`` (D,) of the observations."""
+    def __init__(self, inputs: int, outputs: int, hidden: int) -> None:
         super().__init__()
-        self.mean: torch.Tensor
-        self.deviation: torch.Tensor
-        self.register_buffer("mean", torch.tensor(mean, dtype=torch.float32))
-        self.register_buffer("deviation", torch.tensor(deviation, dtype=torch.float32))
-        self.enter, self.memory = torch.nn.Linear(len(mean), hidden), torch.nn.GRU(hidden, hidden)
+        self.enter, self.memory = torch.nn.Linear(inputs, hidden), torch.nn.GRU(hidden, hidden)
         self.leave = torch.nn.Linear(2 * hidden, outputs)
         torch.nn.init.zeros_(self.leave.weight)
         torch.nn.init.zeros_(self.leave.bias)
 
     def forward(self, seen: torch.Tensor, state: torch.Tensor | None = None) -> tuple[torch.Tensor, torch.Tensor]:
         """Actions, and the state (1, N, hidden) of the memory after them; None begins an episode."""
-        entered = torch.tanh(self.enter(((seen - self.mean) / self.deviation).clamp(-CLIP, CLIP)))
+        entered = torch.tanh(self.enter(seen))
         remembered, state = self.memory(entered, state)
         return self.leave(torch.cat([entered, remembered], -1)), state
 
-    def acting(self) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
-        """What it does from the beginning of an episode on: observations (N, D) of one step after the other -> actions."""
-        state: list[torch.Tensor | None] = [None]
-
-        def act(seen: NDArray[np.float32]) -> NDArray[np.float32]:
-            with torch.no_grad():
-                actions, state[0] = self(torch.from_numpy(seen)[None], state[0])
-            return np.asarray(actions[0].clamp(-1.0, 1.0).numpy())
-
-        return act
+    def network(self, mean: Statistics, variance: Statistics) -> PolicyNetwork:
+        """The student as plain arrays, a copy, for observations of this ``mean`` and ``variance`` (D,)."""
+        arrays: dict[str, NDArray[np.float32]] = {name: value.numpy().copy() for name, value in self.state_dict().items()}
+        enter, leave = ((arrays[f"{name}.weight"], arrays[f"{name}.bias"]) for name in ("enter", "leave"))
+        enters, own = ((arrays[f"memory.weight_{kind}_l0"], arrays[f"memory.bias_{kind}_l0"]) for kind in ("ih", "hh"))
+        return PolicyNetwork(mean, variance, (enter, leave), memory=(enters, own))
 
 
 Round = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
-"""Observations (T, N, D), the teacher's actions (T, N, size), and whether the episode went on (T, N)."""
+"""Normalised observations (T, N, D), the teacher's actions (T, N, size), and whether the episode went on (T, N)."""
 
 
-def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator[tuple[Student, Score, bool]]:
-    """After each round: the student as it is, what it reaches in validation, and whether no round before was as good (sum of
-    pooled error and tail).
+def teach(teacher: Policy, lessons: Lessons, parameters: Parameters) -> Iterator[tuple[int, PolicyNetwork, Score]]:
+    """Before the first and after each round: policy steps so far, the student as it is, and what it reaches in validation.
 
-    ``parameters`` is the rig as its owner describes it.
+    An untaught student is the law alone. ``parameters`` is the rig as its owner describes it.
     """
     torch.set_num_threads(1)
     torch.manual_seed(lessons.seed)
     env, checks = (_worlds(teacher, lanes, parameters) for lanes in (LANES, teacher.training["validation_lanes"]))
-    network, inputs = teacher.network, env.single_observation_space.shape[0]
-    deviation = np.sqrt(network.variance[:inputs] + EPSILON)
-    student = Student(network.mean[:inputs], deviation, network.outputs, lessons.hidden)
+    inputs, outputs = env.single_observation_space.shape[0], teacher.network.outputs
+    mean, variance = teacher.network.mean[:inputs], teacher.network.variance[:inputs]
+    student = Student(inputs, outputs, lessons.hidden)
     adam = torch.optim.Adam(student.parameters(), lr=RATE)
     past: deque[Round] = deque(maxlen=KEPT)
-    least = np.inf
+    network = student.network(mean, variance)
     with closing(env), closing(checks):
+        yield 0, network, validate(checks, network.acting())
         for number in range(lessons.rounds):
-            past.append(_round(env, teacher, student, SEED + SPACING * lessons.seed + LANES * number, number == 0))
+            past.append(_round(env, teacher, network, SEED + SPACING * lessons.seed + LANES * number, number == 0))
             adam.param_groups[0]["lr"] = RATE * (1 - number / lessons.rounds) + LEAST_RATE
             _learn(student, adam, list(past), number)
-            score = validate(checks, student.acting())
-            before, least = least, min(least, score.pooled + score.tail)
-            yield student, score, number == 0 or least < before
+            network = student.network(mean, variance)
+            yield (number + 1) * LANES * env.steps, network, validate(checks, network.acting())
 
 
 def _worlds(teacher: Policy, lanes: int, parameters: Parameters) -> Any:
@@ -122,14 +109,14 @@ def _worlds(teacher: Policy, lanes: int, parameters: Parameters) -> Any:
     )  # fmt: skip
 
 
-def _round(env: Any, teacher: Policy, student: Student, seed: int, shown: bool) -> Round:
+def _round(env: Any, teacher: Policy, network: PolicyNetwork, seed: int, shown: bool) -> Round:
     """An episode in every lane, in which the student acts, or where it is ``shown`` how, the teacher."""
     seen, _ = env.reset(seed=seed)
-    act, alive, steps = student.acting(), np.ones(env.num_envs, dtype=np.bool_), []
+    acts, shows, alive, steps = network.acting(), teacher.network.acting(), np.ones(env.num_envs, dtype=np.bool_), []
     for _ in range(env.steps):
-        right = teacher.network.actions(told(env, seen))
-        steps.append((seen, right, alive))
-        seen, _, terminated, _, _ = env.step(right if shown else act(seen))
+        right = shows(told(env, seen))
+        steps.append((network.normalized(seen).astype(np.float32), right, alive))
+        seen, _, terminated, _, _ = env.step(right if shown else acts(seen))
         alive = alive & ~terminated
     observations, actions, counted = (torch.from_numpy(np.stack(rows)) for rows in zip(*steps, strict=True))
     return observations, actions, counted

@@ -81,10 +81,15 @@ class Score:
         }
 
 
+def merit(figures: dict[str, float]) -> float:
+    """What is to be small: pooled error and its tail together, since the tail is what a mean hides."""
+    return figures["pooled_mm"] + figures["tail_mm"]
+
+
 def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed: int = VALIDATION_SEED) -> Score:
     """Run one episode in every lane of a residual vector environment under ``act``: observations (N, D) -> actions (N, size).
 
-    Figures are sampled once per policy step.
+    ``act`` stands at the beginning of an episode. Figures are sampled once per policy step.
     """
     observation, info = env.reset(seed=seed)
     asked = required_strength_ratio(env)

@@ -15,7 +15,7 @@ from llvmlite.binding import llvm_version_info
 
 from birthsim_build.code.compiler import LEAST_LLVM
 
-BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "--sensors", "ideal", "lab")
+BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "circle_honest_student", "--sensors", "ideal", "lab")
 
 
 def need(there, reason):

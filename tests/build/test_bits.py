@@ -15,6 +15,8 @@ CASES = [
     ("lab", "admittance-backstepping"),
     ("ideal", "residual:circle"),
     ("lab", "residual:circle"),
+    ("ideal", "residual:circle_honest_student"),
+    ("lab", "residual:circle_honest_student"),
 ]
 OPENINGS = [ROW[f"opening_{name}"] for name in CHAMBERS]
 recorded, law_openings, plant_states = cache(loop_rows), cache(reference.law_openings), cache(reference.plant_states)

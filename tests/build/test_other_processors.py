@@ -27,7 +27,7 @@ def aarch64(tmp_path_factory):
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-@pytest.mark.parametrize("controller", ["admittance-backstepping", "residual:circle"])
+@pytest.mark.parametrize("controller", ["admittance-backstepping", "residual:circle", "residual:circle_honest_student"])
 def test_closed_loops_on_aarch64(aarch64, sensors, controller):
     rows = emulated_rows("aarch64", aarch64, f"circle_{sensors}_{identifier(controller)}", PERIODS)
     assert_same_bits(rows[:, SHARED], loop_rows("circle", sensors, controller)[:, SHARED])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -57,13 +58,18 @@ def _sealed(rng: Rng, content: bytes, form: str) -> bytes:
     return sealed(_changed(rng, arrays) if choice > 0.7 else arrays, {**about, "format": form})
 
 
-def _policies(_: Path) -> bytes:
-    from agents.policy.files import WEIGHTS, load_policy
-    from agents.policy.seeds import SHIPPED, policy_folders
+def _policies(name: str) -> Callable[[Path], bytes]:
+    """A shipped policy's file."""
 
-    folder = policy_folders(SHIPPED / "circle")[0]
-    load_policy(folder)
-    return (folder / WEIGHTS).read_bytes()
+    def content(_: Path) -> bytes:
+        from agents.policy.files import WEIGHTS, load_policy
+        from agents.policy.seeds import policy_folders
+
+        folder = policy_folders(name)[0]
+        load_policy(folder)
+        return (folder / WEIGHTS).read_bytes()
+
+    return content
 
 
 def _policy(valid: bytes, rng: Rng, folder: Path, case: Case) -> None:
@@ -106,4 +112,8 @@ def _checkpoint(valid: tuple[Any, Any, bytes], rng: Rng, folder: Path, case: Cas
     assert isinstance(load_checkpoint(folder, model, env, SETTINGS), dict)
 
 
-SEALED: dict[str, Kind] = {"policy": Kind(_policies, _policy), "checkpoint": Kind(_checkpoints, _checkpoint)}
+SEALED: dict[str, Kind] = {
+    "policy": Kind(_policies("circle"), _policy),
+    "policy-with-memory": Kind(_policies("circle_honest_student"), _policy),
+    "checkpoint": Kind(_checkpoints, _checkpoint),
+}

@@ -12,6 +12,7 @@ import pytest
 
 from agents.policy.controller import ResidualController
 from agents.policy.files import save_policy
+from agents.policy.onnx_export import TOLERANCE
 from birthsim_env import Parameters
 from tests.residual.test_onnx_export import ROOT, exported, policy
 
@@ -34,9 +35,9 @@ def positions(controller, sensors):
 # Actions off by 1e-6 at random, which is what an export may be off by, moved the rig by up to 0.2 um, and with sensors that are
 # late and rough, where a random policy hunts, by up to 2 um. Ten times that is allowed.
 @pytest.mark.parametrize(("sensors", "close"), [("ideal", 2e-6), ("lab", 2e-5)])
-@pytest.mark.parametrize("squashed", [False, True])
-def test_the_example_moves_the_rig_as_the_controller_does(tmp_path, squashed, sensors, close):
-    made = policy(squashed=squashed)
+@pytest.mark.parametrize(("squashed", "cells"), [(False, 0), (True, 0), (False, 8)])
+def test_the_example_moves_the_rig_as_the_controller_does(tmp_path, squashed, cells, sensors, close):
+    made = policy(squashed=squashed, cells=cells)
     save_policy(made, tmp_path)
     exported(made, tmp_path)
     rig = Parameters()
@@ -45,6 +46,17 @@ def test_the_example_moves_the_rig_as_the_controller_does(tmp_path, squashed, se
     mine, environment = runpy.run_path(str(EXAMPLE))["onnx_controller"](tmp_path / "policy.onnx", rig)
     assert environment == "BirthSIM/Probe-v2"
     np.testing.assert_allclose(positions(mine, sensors), expected, rtol=0, atol=close)
+
+
+def test_the_example_forgets_lanes(tmp_path):
+    made = policy(cells=8)
+    session = exported(made, tmp_path)
+    theirs, own = runpy.run_path(str(EXAMPLE))["OnnxPolicy"](session), made.network.acting()
+    seen = np.random.default_rng(0).normal(size=(6, 4, made.network.inputs)).astype(np.float32)
+    for k, rows in enumerate(seen):
+        np.testing.assert_allclose(theirs(rows), own(rows), rtol=0, atol=TOLERANCE)
+        lanes = np.arange(4) == k if k < 4 else None
+        theirs.reset(lanes), own.reset(lanes)
 
 
 def test_the_example_runs_without_torch_and_prints_a_table(tmp_path):

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,13 +15,12 @@ import torch
 
 import agents
 from agents.policy import onnx_export
-from agents.policy.controller import ResidualController, observation_size
-from agents.policy.files import WEIGHTS, Policy, save_policy
+from agents.policy.controller import observation_size
+from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
 from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
 from agents.residual.law import action_names
 from agents.residual.settings import ResidualSettings
-from tests.console import call
 
 ROOT = Path(__file__).parent.parent.parent
 ENVIRONMENT = "BirthSIM/ProbeResidual-v2"
@@ -32,24 +28,21 @@ SETTINGS = ResidualSettings(impedance="variable_kp", authority=40.0)
 assert agents  # importing it registers the residual environments
 
 
-def network(settings=SETTINGS, squashed=False, hidden=(64, 64), seed=0) -> PolicyNetwork:
+def network(settings=SETTINGS, squashed=False, hidden=(64, 64), seed=0, cells=0) -> PolicyNetwork:
     rng = np.random.default_rng(seed)
     inputs = observation_size(settings)
-    layers = tuple(
-        ((rng.normal(size=(n, m)) / np.sqrt(m)).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32))
-        for m, n in pairwise((inputs, *hidden, settings.size))
-    )
-    return PolicyNetwork(rng.normal(size=inputs, scale=0.3), rng.uniform(1e-3, 2, inputs), layers, squashed)
+
+    def layer(m, n):
+        return (rng.normal(size=(n, m)) / np.sqrt(m)).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32)
+
+    *widths, last = inputs, *hidden
+    memory = (layer(last, 3 * cells), layer(cells, 3 * cells)) if cells else ()
+    layers = (*(layer(m, n) for m, n in pairwise((*widths, last))), layer(last + cells, settings.size))
+    return PolicyNetwork(rng.normal(size=inputs, scale=0.3), rng.uniform(1e-3, 2, inputs), layers, squashed, memory)
 
 
 def policy(settings=SETTINGS, **options) -> Policy:
     return Policy(network(settings, **options), ENVIRONMENT, settings, {"steps": 7})
-
-
-@pytest.fixture
-def folder(tmp_path):
-    save_policy(policy(), tmp_path / "policy")
-    return tmp_path / "policy"
 
 
 def exported(policy, folder) -> onnxruntime.InferenceSession:
@@ -61,7 +54,7 @@ def assert_same(session, policy, observations):
     """What onnxruntime, PyTorch and NumPy make of the observations; returns the actions."""
     actions = session.run(["action"], {"observation": observations})[0]
     with torch.no_grad():
-        by_torch = PolicyModule(policy.network)(torch.from_numpy(observations)).numpy()
+        by_torch = PolicyModule(policy.network)(torch.from_numpy(observations))[0].numpy()
     assert actions.dtype == by_torch.dtype == np.float32
     assert actions.shape == (len(observations), policy.settings.size)
     np.testing.assert_allclose(actions, by_torch, rtol=0, atol=TOLERANCE)
@@ -82,6 +75,22 @@ def test_random_observations_make_the_same_actions(tmp_path, squashed, hidden):
     assert len(np.unique(actions.round(3), axis=0)) > 1900
     # Without squashing some actions stand at the bound, with it none does.
     assert (np.abs(actions) == 1.0).any() == (not squashed)
+
+
+@pytest.mark.parametrize(("hidden", "squashed"), [((16,), False), ((), True)])
+def test_a_memory_goes_in_and_comes_out(tmp_path, hidden, squashed):
+    made = policy(hidden=hidden, squashed=squashed, cells=6)
+    session = exported(made, tmp_path)
+    (_, taken), (_, given) = session.get_inputs(), session.get_outputs()
+    for one, name in ((taken, "memory"), (given, "next_memory")):
+        assert (one.name, one.type, one.shape) == (name, "tensor(double)", ["batch", 6])
+    rng, act = np.random.default_rng(6), made.network.acting()
+    memory = np.zeros((9, 6))
+    for _ in range(40):
+        seen = (made.network.mean + rng.normal(size=(9, made.network.inputs))).astype(np.float32)
+        actions, memory = session.run(None, {"observation": seen, "memory": memory})
+        np.testing.assert_allclose(actions, act(seen), rtol=0, atol=TOLERANCE)
+    assert np.ptp(memory) > 0.5
 
 
 @pytest.mark.parametrize("squashed", [False, True])
@@ -179,10 +188,10 @@ def test_exporting_leaves_the_policy_as_it_was(tmp_path):
     np.testing.assert_array_equal(made.network.mean, again.network.mean)
 
 
-def tampered(module, inputs):
+def tampered(module, *sizes):
     """The model with one bias a little off."""
-    model = TRACED(module, inputs)
-    bias = next(part for part in model.graph.initializer if part.name == "layers.4.bias")
+    model = TRACED(module, *sizes)
+    bias = next(part for part in model.graph.initializer if part.name == "last.0.bias")
     values = onnx.numpy_helper.to_array(bias) + 3e-5
     bias.CopyFrom(onnx.numpy_helper.from_array(values, bias.name))
     return model
@@ -233,59 +242,3 @@ def test_a_network_of_other_settings_is_refused(tmp_path):
     with pytest.raises(ValueError, match="policy maps 36 to 4 numbers; allowed: 32 to 2"):
         export_onnx(Policy(network(SETTINGS), ENVIRONMENT, fixed, {}), tmp_path / "policy.onnx")
     assert list(tmp_path.iterdir()) == []
-
-
-def refused(monkeypatch, capsys, *arguments):
-    """What the command complained about, in one line and with exit status 2."""
-    status, printed, complaint = call("export", monkeypatch, capsys, *arguments)
-    assert (status, printed) == (2, "")
-    assert complaint.startswith("birthsim-export: error: ")
-    assert complaint.count("\n") == 1
-    return complaint
-
-
-def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):
-    status, printed, complaint = call("export", monkeypatch, capsys, folder)
-    assert (status, complaint) == (0, "")
-    written = folder / "policy.onnx"
-    assert f"{written}: {written.stat().st_size} bytes, 36 observation entries to 4 actions" in printed
-    assert "over 3000 observations" in printed
-    assert re.search(r": \S+ from PyTorch, \S+ from NumPy; allowed: 1.19209e-07\n", printed)
-    elsewhere = tmp_path / "new" / "folder" / "mine.onnx"
-    status, printed, complaint = call("export", monkeypatch, capsys, folder, "--format", "onnx", "--out", elsewhere)
-    assert (status, complaint) == (0, "")
-    assert str(elsewhere) in printed
-    assert elsewhere.read_bytes() == written.read_bytes()
-    # The folder is still a policy's.
-    ResidualController(policy=folder)
-
-
-def test_what_a_user_can_mend_is_said_in_one_line(folder, tmp_path, monkeypatch, capsys):
-    assert "--format 'tflite'; allowed: onnx" in refused(monkeypatch, capsys, folder, "--format", "tflite")
-    assert f"has no {WEIGHTS}" in refused(monkeypatch, capsys, tmp_path / "nowhere")
-    assert "is a folder; allowed: the name of a file" in refused(monkeypatch, capsys, folder, "--out", tmp_path)
-    (tmp_path / "file").write_text("")
-    refused(monkeypatch, capsys, folder, "--out", tmp_path / "file" / "policy.onnx")
-    content = bytearray((folder / WEIGHTS).read_bytes())
-    content[100] ^= 1
-    (folder / WEIGHTS).write_bytes(content)
-    assert f"{WEIGHTS} is" in refused(monkeypatch, capsys, folder)
-    assert sorted(path.name for path in folder.iterdir()) == [WEIGHTS]
-
-
-@pytest.mark.parametrize("missing", ["onnx", "onnxruntime", "torch"])
-def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
-    monkeypatch.delitem(sys.modules, "agents.policy.onnx_export")
-    monkeypatch.delattr(agents.policy, "onnx_export")
-    monkeypatch.setitem(sys.modules, missing, None)
-    complaint = refused(monkeypatch, capsys, folder)
-    assert missing in complaint
-    assert "extras agents and onnx: pip install 'birthsim[agents,onnx]'" in complaint
-
-
-def test_help_names_every_option():
-    line = [sys.executable, "-W", "error", "-m", "agents.commands.export", "--help"]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("usage: birthsim-export")
-    assert all(word in done.stdout for word in ("POLICY", "--format", "--out"))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import gymnasium
 import numpy as np
 import pytest
@@ -22,15 +20,15 @@ assert agents  # importing it registers the ids
 CIRCLE, PROBE = "BirthSIM/CircleResidual-v1", "BirthSIM/ProbeResidual-v2"
 
 
-def random_network(inputs, outputs, reach=0.5, squashed=False, seed=0) -> PolicyNetwork:
-    """Two layers of random weights whose actions are about ``reach`` in size."""
-    rng = np.random.default_rng(seed)
-    layers = [
-        (rng.normal(size=(n, m), scale=1 / np.sqrt(m)).astype(np.float32), np.zeros(n, np.float32))
-        for m, n in pairwise((inputs, 12, outputs))
-    ]
-    layers[-1] = (layers[-1][0] * np.float32(reach), layers[-1][1])
-    return PolicyNetwork(rng.normal(size=inputs, scale=0.1), rng.uniform(0.5, 2, inputs), tuple(layers), squashed)
+def random_network(inputs, outputs, reach=0.5, squashed=False, cells=0) -> PolicyNetwork:
+    """Two layers of random weights whose actions are about ``reach`` in size; with ``cells`` a memory between them."""
+    rng = np.random.default_rng(0)
+    sizes = (inputs, 12), (12 + cells, outputs), *(((12, 3 * cells), (cells, 3 * cells)) if cells else ())
+    first, last, *memory = (
+        (rng.normal(size=(n, m), scale=1 / np.sqrt(m)).astype(np.float32), np.zeros(n, np.float32)) for m, n in sizes
+    )
+    layers = first, (last[0] * np.float32(reach), last[1])
+    return PolicyNetwork(rng.normal(size=inputs, scale=0.1), rng.uniform(0.5, 2, inputs), layers, squashed, tuple(memory))
 
 
 SETTINGS = {
@@ -39,6 +37,7 @@ SETTINGS = {
     "variable_kp": ResidualSettings("backstepping-frozen", "variable_kp", policy_period=0.02),
     "variable": ResidualSettings("backstepping-weight", "variable", time_constant=0.01),
     "no law": ResidualSettings("none"),
+    "with a memory": ResidualSettings("backstepping-force-first", force_sensor=False),
 }
 
 
@@ -47,7 +46,8 @@ SETTINGS = {
 def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_path, settings, sensors):
     # Valves that a policy drives at random soon slam the pistons into their stops: gently, then.
     reach = 0.05 if settings.law == "none" else 0.5
-    network = random_network(observation_size(settings), settings.size, reach, squashed=settings.impedance == "variable")
+    squashed, cells = settings.impedance == "variable", 0 if settings.force_sensor else 7
+    network = random_network(observation_size(settings), settings.size, reach, squashed, cells)
     save_policy(Policy(network, CIRCLE, settings, {}), tmp_path)
     controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5
     arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
@@ -55,8 +55,9 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
     observation, _ = inside.reset(seed=11)
     outside.reset(seed=11)
+    act = network.acting()
     for _ in range(steps):
-        actions = network.actions(observation)
+        actions = act(observation)
         observation, _, terminated, _, info = inside.step(actions)
         for _ in range(round(1000 * settings.policy_period)):
             _, _, _, _, its = outside.step(controller.command(outside.measurement, outside.reference).T)
@@ -155,11 +156,30 @@ def test_a_reset_forgets_the_last_episode(steering, sensors):
     np.testing.assert_array_equal(runs[0], runs[1][:137])
 
 
+def test_a_policy_with_a_memory_forgets_the_lanes_that_are_reset(tmp_path):
+    """Two lanes with the same measurements: what one of them forgets shows in its openings alone."""
+    network = random_network(observation_size(ResidualSettings()), 2, cells=7)
+    save_policy(Policy(network, CIRCLE, ResidualSettings(), {}), tmp_path)
+    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
+    runs = []
+    for lanes in (np.zeros(3, bool), np.array([False, True, False]), None):
+        controller = ResidualController(policy=tmp_path)
+        env.reset(seed=2)
+        for _ in range(50):
+            env.step(controller.command(env.measurement, env.reference).T)
+        controller.reset(lanes)
+        runs.append([controller.command(env.measurement, env.reference) for _ in range(20)])
+    goes_on, one, anew = map(np.array, runs)
+    np.testing.assert_array_equal(one[:, :, [0, 2]], goes_on[:, :, [0, 2]])
+    np.testing.assert_array_equal(one[:, :, 1], anew[:, :, 1])
+    assert (one[-1, :, 1] != goes_on[-1, :, 1]).any()
+
+
 @pytest.fixture
 def asked(monkeypatch):
     """Every observation (N, D) that a policy was asked with."""
     seen, actions = [], PolicyNetwork.actions
-    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows: (seen.append(rows), actions(self, rows))[1])
+    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows, *held: (seen.append(rows), actions(self, rows, *held))[1])
     return seen
 
 

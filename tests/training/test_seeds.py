@@ -127,8 +127,8 @@ def test_shipped_policies_load_fit_and_are_small(name):
 
 
 def test_a_policy_without_a_force_sensor_ignores_what_the_environment_measures():
-    """``--policy circle_honest_blind`` in an environment with a force sensor."""
-    law = make_controller("residual", Parameters(), policy="circle_honest_blind")
+    """``--policy circle_honest_student`` in an environment with a force sensor."""
+    law = make_controller("residual", Parameters(), policy="circle_honest_student")
     port = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors="honest", policy_period=0.001)
     port.reset(seed=0)
     asked = []
@@ -146,7 +146,7 @@ def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_pat
         raise ValueError("enough")
 
     monkeypatch.setattr(command, "run_tasks", refused)
-    arguments = ("--policy", "circle_honest_blind", "--sensors", sensors, "--episodes", "1", "--out", str(tmp_path))
+    arguments = ("--policy", "circle_honest_student", "--sensors", sensors, "--episodes", "1", "--out", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
     with pytest.raises(SystemExit):
         command.main()
@@ -162,7 +162,10 @@ def test_scores_are_of_policies_that_were_trained_with_their_sensors():
 def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkeypatch):
     """Once round the circle each way instead of twice."""
     follow = inspection._follow
-    monkeypatch.setattr(inspection, "_follow", lambda policy, lanes, time, *what: follow(policy, lanes, min(time, 8.0), *what))
+    monkeypatch.setattr(
+        inspection, "_follow",
+        lambda policy, settings, lanes, time, *what: follow(policy, settings, lanes, min(time, 8.0), *what),
+    )  # fmt: skip
     policy = load_policy(best_policy("circle"))
     assert np.corrcoef(*weight_over_workspace(policy))[0, 1] > 0.95
     for unknown, half in zip(*friction_along_circle(policy), strict=True):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from agents.policy.seeds import SHIPPED
+from agents.policy.files import load_policy
+from agents.policy.seeds import SHIPPED, best_policy
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
@@ -50,6 +53,19 @@ def test_the_page_without_a_server_has_it_too(mine: str) -> None:
     assert " " not in own
     assert own.count("/") == 1
     assert len(files) == len({one["policy"]["file"] for one in packed["controllers"].values() if "policy" in one})
+
+
+def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
+    name = "circle_honest_student"
+    file = pack(RIG, Packer())["controllers"][f"residual:{name}"]["policy"]["file"]
+    packed = packed_policies(RIG, Packer())[file]
+    cells = load_policy(best_policy(name)).network.cells
+    assert cells > 0
+    np.testing.assert_array_equal(np.frombuffer(base64.b64decode(packed["memory"])), np.zeros(1 + cells))
+    session = Session(RIG)
+    session.change({"controller": f"residual:{name}", "sensors": "honest"})
+    session.advance(200)
+    assert session.lost is None
 
 
 @pytest.mark.parametrize("where", [[], ["--static", "page"]])

@@ -56,6 +56,7 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
     shared = {"num_envs": LANES, "sensors": sensors, "randomize": True}
     if who == "residual":
         policy = load_policy(best_policy(scenario))
+        act = policy.network.acting()
         env: Any = gymnasium.make_vec(policy.environment, **shared, **policy.settings.to_dict())
     else:
         period = 0.01 if who == "openings" else Parameters().electronics.control_period
@@ -67,7 +68,7 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
         if controller:
             action = controller.command(env.measurement, env.reference).T
         else:
-            action = policy.network.actions(observation) if who == "residual" else rng.uniform(-0.4, 0.4, (LANES, 4))
+            action = act(observation) if who == "residual" else rng.uniform(-0.4, 0.4, (LANES, 4))
         observation, reward, terminated, *_ = env.step(action)
         if controller and terminated.any():
             controller.reset(terminated)

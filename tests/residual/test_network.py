@@ -1,0 +1,140 @@
+"""What a policy's network computes: by hand, against PyTorch, with the same bits for one lane and many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from agents.policy.network import PolicyNetwork
+from tests.residual.policies import INPUTS, network
+
+
+def test_a_network_is_normalization_tanh_layers_and_a_clip():
+    hand = PolicyNetwork(
+        np.array([1.0, 0.0]),
+        np.array([4.0, 0.25]),
+        (
+            (np.array([[1.0, 0.0], [0.0, 2.0]], np.float32), np.array([0.0, 0.5], np.float32)),
+            (np.array([[1.0, 1.0], [0.0, 3.0]], np.float32), np.array([0.1, 0.0], np.float32)),
+        ),
+    )
+    assert (hand.inputs, hand.outputs) == (2, 2)
+    # Actions are singles, rounded by 6e-8 of their size; EPSILON of the variance counts 1.3e-9 to 2e-8.
+    one, other = np.tanh((2 - 1) / 2), np.tanh(2 * -0.5 / 0.5 + 0.5)
+    seen = np.array([[2.0, -0.5], [1e9, 1e9]], np.float32)
+    actions = hand.actions(seen)
+    np.testing.assert_allclose(actions[0], [one + other + 0.1, max(3 * other, -1)], rtol=1e-6)
+    # Far inputs are clipped at ten standard deviations, actions at one.
+    np.testing.assert_array_equal(actions[1], [1, 1])
+    weak = PolicyNetwork(hand.mean, hand.variance, ((np.array([[0.05, 0.0]], np.float32), np.zeros(1, np.float32)),))
+    np.testing.assert_allclose(weak.actions(seen)[:, 0], [0.025, 0.5], rtol=1e-6)
+    assert actions.dtype == np.float32
+
+
+def test_a_squashed_network_ends_with_another_tanh():
+    weight, bias = np.array([[0.5, -2.0]], np.float32), np.array([0.25], np.float32)
+    hand = PolicyNetwork(np.zeros(2), np.ones(2), ((weight, bias),), squashed=True)
+    actions = hand.actions(np.array([[1.0, 0.5], [100.0, -100.0]], np.float32))
+    np.testing.assert_allclose(actions[:, 0], np.tanh([0.5 - 1 + 0.25, 5 + 20 + 0.25]), rtol=1e-6)
+
+
+def unit(torch_unit, hidden, inputs, outputs, seed=0):
+    """A policy whose memory is a unit of PyTorch, in double precision, with weights that are singles."""
+    made = network(inputs, outputs, (hidden,), seed, cells=torch_unit.hidden_size)
+    enters, own = made.memory
+    values = {"weight_ih_l0": enters[0], "bias_ih_l0": enters[1], "weight_hh_l0": own[0], "bias_hh_l0": own[1]}
+    torch_unit.load_state_dict({name: torch.as_tensor(value, dtype=torch.float64) for name, value in values.items()})
+    return made
+
+
+def observations(steps, lanes, inputs, scale=2.0):
+    return np.random.default_rng(1).normal(size=(steps, lanes, inputs), scale=scale).astype(np.float32)
+
+
+def ran(policy, seen):
+    """Actions (T, N, size) and memories (T, N, cells) from the beginning of an episode on."""
+    memory, actions, memories = np.zeros((seen.shape[1], policy.cells)), [], []
+    for rows in seen:
+        actions.append(policy.actions(rows, memory))
+        memories.append(memory.copy())
+    return np.array(actions), np.array(memories)
+
+
+@pytest.mark.parametrize("squashed", [False, True])
+def test_a_memory_is_pytorchs_gated_recurrent_unit(squashed):
+    gru = torch.nn.GRU(7, 5, dtype=torch.float64)
+    made = replace(unit(gru, 7, 9, 2), squashed=squashed)
+    seen = observations(30, 4, 9)
+    actions, memories = ran(made, seen)
+    (enter, bias), (leave, offset) = made.layers
+    with torch.no_grad():
+        entered = torch.tanh(
+            torch.from_numpy(made.normalized(seen)) @ torch.from_numpy(enter).double().T + torch.from_numpy(bias)
+        )
+        held = gru(entered)[0].numpy()
+    # Some twenty operations of 1e-16 each, which a memory below one does not magnify.
+    np.testing.assert_allclose(memories, held, rtol=0, atol=1e-14)
+    last = np.concatenate([entered.numpy(), held], axis=-1) @ leave.astype(float).T + offset
+    np.testing.assert_allclose(actions, np.tanh(last) if squashed else np.clip(last, -1, 1), rtol=0, atol=6e-8)
+    assert np.ptp(memories, axis=0).max() > 0.5
+
+
+def test_a_memory_is_cho_s_equations():
+    """Cho et al. 2014, with PyTorch's biases: exp instead of the kernel's tanh, one lane, written out."""
+    made = network(4, 1, (3,), 2, cells=2)
+    seen = observations(25, 1, 4)
+    actions, memories = ran(made, seen)
+    (first, bias), (last, offset) = made.layers
+    (w, b), (v, c) = made.memory
+    h = np.zeros(2)
+    for rows, action, memory in zip(seen, actions, memories, strict=True):
+        x = np.tanh(first @ np.clip((rows[0] - made.mean) / np.sqrt(made.variance + 1e-8), -10, 10) + bias)
+        r, z = (1 / (1 + np.exp(-(w[k : k + 2] @ x + b[k : k + 2] + v[k : k + 2] @ h + c[k : k + 2]))) for k in (0, 2))
+        n = np.tanh(w[4:] @ x + b[4:] + r * (v[4:] @ h + c[4:]))
+        h = (1 - z) * n + z * h
+        np.testing.assert_allclose(memory[0], h, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(action[0], np.clip(last @ np.concatenate([x, h]) + offset, -1, 1), rtol=0, atol=6e-8)
+
+
+@pytest.mark.parametrize("cells", [0, 32])
+def test_a_lane_has_the_same_bits_alone_and_among_many(cells):
+    made = network(INPUTS, 2, (32,), 3, cells=cells)
+    seen = observations(40, 67, INPUTS)
+    together = made.acting()
+    every = np.array([together(rows) for rows in seen])
+    for lane in (0, 1, 31, 66):
+        alone = made.acting()
+        np.testing.assert_array_equal(np.array([alone(rows[lane : lane + 1])[0] for rows in seen]), every[:, lane])
+
+
+def test_a_reset_forgets_the_lanes_that_it_names():
+    made = network(INPUTS, 2, (8,), 4, cells=6)
+    seen, lanes = observations(30, 5, INPUTS, scale=0.3), np.array([False, True, False, False, True])
+    never, reset = made.acting(), made.acting()
+    for rows in seen[:10]:
+        never(rows), reset(rows)
+    reset.reset(lanes)
+    begun, differs = made.acting(), 0
+    for rows in seen[10:]:
+        goes_on, again, anew = never(rows), reset(rows), begun(rows)
+        np.testing.assert_array_equal(again[~lanes], goes_on[~lanes])
+        np.testing.assert_array_equal(again[lanes], anew[lanes])
+        differs += (again[lanes] != goes_on[lanes]).any()
+    assert differs > 5
+    reset.reset()
+    np.testing.assert_array_equal(reset(seen[0]), made.acting()(seen[0]))
+    np.testing.assert_array_equal(reset(seen[1, :2]), made.acting()(seen[1, :2]), "another number of lanes begins anew")
+    np.testing.assert_array_equal(made.actions(seen[0]), made.acting()(seen[0]))
+
+
+def test_a_network_without_memory_acts_on_what_it_sees_alone():
+    made = network(INPUTS, 2, (8,), 5)
+    act, seen = made.acting(), observations(2, 3, INPUTS)
+    first = act(seen[0])
+    act(seen[1])
+    np.testing.assert_array_equal(act(seen[0]), first)
+    act.reset(np.array([True, False, False]))
+    np.testing.assert_array_equal(act(seen[0]), first)
