@@ -55,6 +55,16 @@ def test_z_width_says_what_is_refused() -> None:
     assert soft["factors"] == [1.0]
 
 
+@pytest.mark.usefixtures("short")
+def test_what_is_refused_depends_on_the_sensors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The law takes 9000 N/m with exact and 7200 N/m with sampled positions (docs/limits.md)."""
+    monkeypatch.setattr(coupled, "ASKED", (7000.0, 8000.0))
+    assert measure_z_width(**SETTINGS)["refused"] == [[None, None]] * 3
+    for said in measure_z_width(**{**SETTINGS, "sensors": "lab"})["refused"]:
+        assert said[0] is None
+        assert "allowed: at most 7200 N/m" in said[1]
+
+
 def test_stable_up_to_the_first_that_is_not() -> None:
     """From the softest that is not refused; nothing after the first miss counts."""
     piece = {

@@ -59,7 +59,10 @@ class Condition:
         """Why the law refuses a stiffness setpoint, N/m, and a damping factor, in words; None where it takes them."""
         factor = None if damping_factor is None else np.array([damping_factor])
         try:
-            RigPort([self.rig], resting([POSES[0]], [stiffness]), self.law(), damping_factor=factor).advance(no_hand)
+            port = RigPort(
+                [self.rig], resting([POSES[0]], [stiffness]), self.law(), self.sensors, self.seed, damping_factor=factor
+            )
+            port.advance(no_hand)
         except ValueError as error:
             return str(error)
         return None
