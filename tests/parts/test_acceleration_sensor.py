@@ -42,7 +42,7 @@ def test_lanes_that_begin_anew_leave_the_others_alone(sensors):
     rig = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
 
     def shown(anew):
-        pull = ForceProfile(lambda t: np.stack([20 * np.sin(30 * t), 20 * np.cos(20 * t)]))
+        pull = ForceProfile([(0.0, 0.0, 10.0), (0.05, 20.0, -10.0), (0.12, -20.0, 5.0)])
         env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors=sensors, parameters=rig, user_force=pull)
         env.reset(seed=[3, 4])
         for k in range(12):
