@@ -106,7 +106,7 @@ class StagedController:
         self.prepare(lanes, measurement.sampled)
         if measurement.acceleration is None and any(one.feels for one in self._made):
             raise ValueError(
-                f"measurement.acceleration = None; allowed: (2, {lanes}) m/s2, since this controller believes in a sensor of it: "
+                f"measurement.acceleration = None; allowed: (2, {lanes}) m/s2, since this controller believes in a sensor: "
                 f"electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
         if self._loop is None:

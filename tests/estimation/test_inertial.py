@@ -68,6 +68,7 @@ def test_late_rare_and_lost_samples_leave_no_error(latency):
 
 def test_it_starts_as_fast_at_any_time():
     """A law that takes over while a rig moves does not know its speed either."""
+
     def found(begin):
         course = lambda t: (0.1 * (t - begin), 0.1)  # noqa: E731
         return run(400, course, lambda t, n: np.full((2, n), 0.1), begin=begin, wrong=(0.0, 0.05, 0.0))[1]

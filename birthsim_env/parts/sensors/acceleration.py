@@ -38,8 +38,8 @@ def feel(
 ) -> float:  # fmt: skip
     """Carries ``memory`` (ROWS, N) of lane ``i`` on by one ``period``, s; returns the acceleration without noise, m/s2.
 
-    ``share`` is that of ``passed``; ``again`` is what ``looked`` says, and then the memory stays. Where an episode begins nothing is known of the motion before it, and the acceleration is
-    taken for zero.
+    ``share`` is that of ``passed``. ``again`` is what ``looked`` says; the memory stays as it is then. Where an episode begins
+    nothing is known of the motion before it, and the acceleration is taken for zero.
     """
     if not again:
         before = velocity if tick == 0 else memory[axis, i]
