@@ -9,8 +9,8 @@ from birthsim_env.physics.rig.quantities import Part, quantity
 NO_LARGER = "an episode draws within +-"
 
 SLOWEST = 40.0
-"""Hz, of an acceleration sensor. In eight drawn circles with ``honest`` sensors ``admittance-adaptive`` is as good with 40 Hz as
-with 300, to 0.2 mm; with 20 Hz its settled error is 1.9 instead of 0.7 mm, and with 10 Hz 9.6 mm."""
+"""Hz, of an acceleration sensor. In eight drawn circles with ``honest`` sensors ``admittance-adaptive`` is as good with 40 Hz
+as with 300, to 0.2 mm; with 20 Hz its settled error is 1.9 instead of 0.7 mm, and with 10 Hz 9.6 mm."""
 
 
 @dataclass(frozen=True)
