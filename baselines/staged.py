@@ -26,11 +26,13 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 @dataclass(frozen=True)
 class LawStage:
-    """A stage of a law: its function, its constants (C,), and the memory (M,) of a lane that starts."""
+    """A stage of a law: its function, its constants (C,), the memory (M,) of a lane that starts, and whether it reads an
+    acceleration."""
 
     function: Callable[..., int]
     constants: Array
     fresh: Array
+    feels: bool = False
 
 
 class StagedController:
@@ -94,7 +96,7 @@ class StagedController:
         Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
         believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
         the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``TOLD``, for signals over different
-        numbers of lanes, and for setpoints that the law cannot render.
+        numbers of lanes, for setpoints that the law cannot render, and without an acceleration where the law needs one.
         """
         if measurement.position.ndim == 1:
             given = (feedforward_force, feedforward_rate, damping_factor)
@@ -102,6 +104,11 @@ class StagedController:
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
+        if measurement.acceleration is None and any(one.feels for one in self._made):
+            raise ValueError(
+                f"measurement.acceleration = None; allowed: (2, {lanes}) m/s2, since this controller believes in a sensor: "
+                f"electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
+            )
         if self._loop is None:
             self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))

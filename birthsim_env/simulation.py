@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.loop import MixedLoop, Place
 from birthsim_env.loop.rows import (
+    ACCELERATION,
     ACTION,
     ASKED,
     FORCE,
     IMPACT,
     MOTION,
     OPENING,
+    PRESSURE,
     REFERENCE,
     SEEN,
     SHOWN,
@@ -164,7 +166,7 @@ class Simulation:
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now."""
-        return measurement_of(self._seen, self._sampled)
+        return measurement_of(self._seen, self._sampled, self._sampled and self._feels)
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
@@ -205,7 +207,16 @@ class Simulation:
         self._motion[:] = self.plant.end_effector()
         self._assemble()
         self._samples = self._samples[:0]
+        felt = self._seen[ACCELERATION:PRESSURE]
+        felt[:] = np.nan
         self._run(self._look, 1)
+        untold = np.isnan(felt)
+        if self._sampled and self._feels and untold.any():
+            raise ValueError(
+                f"sensors {type(self.sensors).__name__} tell no acceleration; allowed: (2, {len(lanes)}) m/s2, "
+                f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
+            )
+        felt[untold] = 0.0
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
@@ -335,6 +346,11 @@ class Simulation:
         now = self.sensors.measure(self.ticks, self.time, self.motion, self.plant.pressures, self.force)
         fill_measurement(self._seen, now)
         self._sampled = now.sampled
+
+    @property
+    def _feels(self) -> bool:
+        """Whether the head has an acceleration sensor, which exact sensors do without."""
+        return self.parameters.electronics.acceleration_bandwidth > 0.0
 
     def reference_at(self, time: Array) -> Reference:
         """What is asked for at ``time`` (N,) of the present episodes, s."""

@@ -29,9 +29,9 @@ BANDWIDTH = 12.0
 START, START_TIME = 50.0, 0.15
 """1/s and s; assumed: at a start, where bias and speed are unknown, w is larger by so much, which decays with this time."""
 
-X, V, BIAS, FRESH, LAST, SLOT, HISTORY = 0, 2, 4, 6, 7, 8, 9
+X, V, BIAS, FRESH, LAST, SLOT, BEGAN, HISTORY = 0, 2, 4, 6, 7, 8, 9, 10
 """Rows at which parts of the memory begin: x, y (m); their rates; biases, m/s2; 1 at a new start; time of the newest sample, s;
-where in the history the present stands; past x, y, a ring."""
+where in the history the present stands; time of the start, s; past x, y, a ring."""
 
 PERIOD, WIDTH, ROWS, CONSTANTS = range(4)
 """Constants of the stage: control period, s; w, 1/s; rows of the memory. ``CONSTANTS`` is their number."""
@@ -56,13 +56,15 @@ def observe(
     for i in range(time.shape[0]):
         slot = (int(memory[SLOT, i]) + 1) % depth
         sampled, fresh = position_time[i] - memory[LAST, i], memory[FRESH, i] > 0.0
+        if fresh:
+            memory[BEGAN, i] = time[i]
         # The memory goes no further back than the rig's own description of its tracker.
         age = min(time[i] - position_time[i], (depth - 2) * period)
         memory[SLOT, i], memory[LAST, i], memory[FRESH, i] = slot, position_time[i], 0.0
         periods = age / period
         back = int(periods)
         part = periods - back
-        width = bandwidth + START * exact.exp(-time[i] / START_TIME)
+        width = bandwidth + START * exact.exp(-(time[i] - memory[BEGAN, i]) / START_TIME)
         kept = exact.exp(-width * max(sampled, 0.0))
         for axis in range(2):
             if fresh:
@@ -109,4 +111,4 @@ def law_stage(rig: Parameters) -> LawStage:
     rows = memory_rows(rig)
     fresh = np.zeros(rows)
     fresh[FRESH] = 1.0
-    return LawStage(stage, np.array([rig.electronics.control_period, BANDWIDTH, rows]), fresh)
+    return LawStage(stage, np.array([rig.electronics.control_period, BANDWIDTH, rows]), fresh, feels=True)

@@ -72,7 +72,7 @@ def law_openings(controller: str, sensors: str, periods: int = PERIODS) -> tuple
     seen = loop_rows("circle", sensors, controller, periods)[:, WORLD : WORLD + ASKED]
     law, openings = make_law(controller), np.empty((periods, 4))
     for opened, now in zip(openings, seen, strict=True):
-        said: Measurement = measurement_of(now[:, None], sensors != "ideal")
+        said: Measurement = measurement_of(now[:, None], sensors != "ideal", False)
         opened[:] = law.command(said, Reference(now[ASKS:ASKED, None]))[:, 0]
     return seen, openings
 

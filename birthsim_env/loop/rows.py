@@ -65,13 +65,14 @@ def fill_measurement(rows: Array, measurement: Measurement) -> None:
     rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
     rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
     rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
-    rows[ACCELERATION:PRESSURE] = 0.0 if measurement.acceleration is None else measurement.acceleration
+    if measurement.acceleration is not None:
+        rows[ACCELERATION:PRESSURE] = measurement.acceleration
 
 
-def measurement_of(rows: Array, sampled: bool) -> Measurement:
-    """The measurement in a copy of the first rows of what is seen."""
+def measurement_of(rows: Array, sampled: bool, feels: bool) -> Measurement:
+    """The measurement in a copy of the first rows of what is seen, with an acceleration where a sensor ``feels`` it."""
     seen = rows[:REFERENCE].copy()
     return Measurement(
         seen[TIME], seen[POSITION:VELOCITY], seen[POSITION_TIME], seen[VELOCITY:POSITION_TIME], seen[PRESSURE:USER_FORCE],
-        seen[USER_FORCE:], sampled, seen[ACCELERATION:PRESSURE],
+        seen[USER_FORCE:], sampled, seen[ACCELERATION:PRESSURE] if feels else None,
     )  # fmt: skip

@@ -94,7 +94,7 @@ class Measurement:
     (2, N) is measured, or, where ``sampled`` is True, only the low-passed difference of rare and late position samples, which
     a controller will want to replace by an observer of its own. ``pressures`` (4, N) are those of chambers P1, N1, P2, N2,
     absolute. ``user_force`` (2, N) is that of a force sensor at the end effector. ``acceleration`` (2, N) is that of a sensor
-    there; zero, or None, without one.
+    there; None without one.
     """
 
     time: Array

@@ -251,7 +251,7 @@ def test_one_lane_and_many_and_a_new_start() -> None:
 
 def lane_of(measured: Measurement, wanted: Reference, lane: int) -> tuple[Measurement, Reference]:
     """Signals of one rig without a lane axis."""
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if name != "sampled"}
+    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
     return Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])
 
 

@@ -23,7 +23,8 @@ def openings(sensors="honest", lanes=3, steps=120, believed=RIG, shown=0.0, rig=
     told = []
     for _ in range(steps):
         seen = env.measurement
-        told.append(law.command(replace(seen, acceleration=seen.acceleration + shown), env.reference))
+        felt = shown if seen.acceleration is None else seen.acceleration + shown
+        told.append(law.command(replace(seen, acceleration=np.zeros((2, lanes)) + felt), env.reference))
         env.step(told[-1].T)
     env.close()
     return np.array(told)
@@ -43,6 +44,15 @@ def test_a_law_that_believes_in_no_such_sensor_does_not_read_it():
 
 def test_exact_speeds_are_not_replaced():
     np.testing.assert_array_equal(openings("ideal", shown=5.0), openings("ideal"))
+
+
+@pytest.mark.parametrize("name", ["admittance-adaptive", "limited:admittance-adaptive"])
+def test_a_law_that_needs_an_acceleration_says_so(name):
+    env = gymnasium.make("BirthSIM/Circle-v1", sensors="honest", policy_period=0.001).unwrapped
+    env.reset(seed=0)
+    wanted = r"measurement\.acceleration = None; allowed: \(2, 1\) m/s2, since .* electronics\.acceleration_bandwidth = 300\.0"
+    with pytest.raises(ValueError, match=wanted):
+        make_controller(name, RIG).command(env.measurement, env.reference)
 
 
 def test_an_acceleration_of_another_shape_is_refused():

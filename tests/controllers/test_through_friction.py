@@ -179,7 +179,7 @@ def recorded(lanes: int, ticks: int, sensors: str) -> list[tuple[Measurement, Re
 
 def lane_of(measured: Measurement, wanted: Reference, lane: int) -> tuple[Measurement, Reference]:
     """Signals of one rig without a lane axis."""
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if name != "sampled"}
+    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
     return Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])
 
 

@@ -12,10 +12,12 @@ LATE_ENOUGH = 20.0
 """s: what makes the observer faster at a start has decayed to e^-130."""
 
 
-def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1, begin=0.0, wrong=(0.0, 0.0, 0.0)):
+def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1, begin=0.0, wrong=(0.0, 0.0, 0.0), old=0.0):
     """Truth and estimate (ticks, 4, lanes), and the errors of position when samples were taken (samples, lanes).
 
     ``motion(t)`` -> (x, v) on both axes; ``acceleration(t, k)`` -> (2, lanes) is felt; ``wrong``: x, v and bias are put off.
+
+    The observer started ``old`` s before ``begin``, s.
     """
     rng, rows = np.random.default_rng(7), inertial.memory_rows(Parameters())
     memory, told, found, errors = np.zeros((rows, lanes)), np.empty((4, lanes)), [], []
@@ -34,6 +36,7 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
             inertial.BANDWIDTH, told,
         )  # fmt: skip
         if k == 0:
+            memory[inertial.BEGAN] -= old
             for row, off in zip((inertial.X, inertial.V, inertial.BIAS), wrong, strict=True):
                 memory[row : row + 2] += off
         truth.append(np.array([[x], [x], [v], [v]]) + np.zeros((4, lanes)))
@@ -44,7 +47,7 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
 
 @pytest.mark.parametrize("wrong", [(1e-3, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.3)])
 def test_an_error_dies_away_by_a_triple_pole(wrong):
-    _, _, errors = run(600, lambda t: (0.0, 0.0), lambda t, n: np.zeros((2, n)), latency=0.0, begin=LATE_ENOUGH, wrong=wrong)
+    _, _, errors = run(600, lambda t: (0.0, 0.0), lambda t, n: np.zeros((2, n)), latency=0.0, old=LATE_ENOUGH, wrong=wrong)
     pole, e = np.exp(-inertial.BANDWIDTH * EVERY * PERIOD), errors[2:, 0, 0]
     left = e[3:] - 3 * pole * e[2:-1] + 3 * pole**2 * e[1:-2] - pole**3 * e[:-3]
     assert np.abs(e).max() > 1e-5
@@ -63,6 +66,16 @@ def test_late_rare_and_lost_samples_leave_no_error(latency):
     np.testing.assert_allclose(found[-500:, 2:], truth[-500:, 2:], atol=2e-5)
 
 
+def test_it_starts_as_fast_at_any_time():
+    """A law that takes over while a rig moves does not know its speed either."""
+
+    def found(begin):
+        course = lambda t: (0.1 * (t - begin), 0.1)  # noqa: E731
+        return run(400, course, lambda t, n: np.full((2, n), 0.1), begin=begin, wrong=(0.0, 0.05, 0.0))[1]
+
+    np.testing.assert_allclose(found(32.0), found(0.0), atol=1e-9)
+
+
 def test_the_speed_is_nearly_as_good_as_a_kalman_filter_of_samples_without_delay():
     spread, noise, lanes = 0.02, 1e-4, 40
     rng = np.random.default_rng(3)
@@ -72,7 +85,7 @@ def test_the_speed_is_nearly_as_good_as_a_kalman_filter_of_samples_without_delay
         lambda t, n: spread * rng.standard_normal((2, n)),
         noise=noise,
         lanes=lanes,
-        begin=LATE_ENOUGH,
+        old=LATE_ENOUGH,
     )
     q, r = spread**2 * PERIOD, noise**2 * EVERY * PERIOD
     best = solve_continuous_are(

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.hands.user_forces import ForceProfile
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
-from birthsim_env.parts.sensors.sensors import LabSensors
+from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors, LabSensors, ideal_stage
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.parts.test_honest_sensors import OFF, board, swing, watch
 
@@ -24,11 +27,71 @@ def told(electronics, ticks, lanes=1, model=HonestSensors, motion=swing):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_it_changes_nothing_else_and_a_rig_without_one_tells_zero(model):
+def test_it_changes_nothing_else_and_a_rig_without_one_tells_none(model):
     without, has = (watch(board(acceleration_bandwidth=hertz), 300, 3, swing, model=model) for hertz in (0.0, 300.0))
     for name, values in without.items():
         np.testing.assert_array_equal(has[name], values, err_msg=name)
-    assert not told(board(), 50, model=model).any()
+    home = np.array([[0.5], [0.0], [0.0], [0.0]])
+    seen = model(board(), 1).measure(np.zeros(1, dtype=int), np.zeros(1), home, np.full((4, 1), 3e5), np.zeros((2, 1)))
+    assert seen.acceleration is None
+
+
+@pytest.mark.parametrize("sensors", ["lab", "honest"])
+def test_lanes_that_begin_anew_leave_the_others_alone(sensors):
+    """All lanes are measured anew where one begins, within the same control period."""
+    rig = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
+
+    def shown(anew):
+        pull = ForceProfile([(0.0, 0.0, 10.0), (0.05, 20.0, -10.0), (0.12, -20.0, 5.0)])
+        env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors=sensors, parameters=rig, user_force=pull)
+        env.reset(seed=[3, 4])
+        for k in range(12):
+            if k % 5 == 4 and anew:
+                env.reset(options={"reset_mask": np.array([False, True])})
+            env.step(np.full((2, 4), 0.05, np.float32))
+            seen = env.measurement
+            yield np.concatenate([seen.acceleration, seen.user_force, seen.position])
+
+    one, other = np.array(list(shown(True))), np.array(list(shown(False)))
+    np.testing.assert_array_equal(one[:, :, 0], other[:, :, 0])
+    assert (one[:, :, 1] != other[:, :, 1]).any()
+
+
+class Untold(IdealSensors):
+    """Sampled positions, and no acceleration."""
+
+    sampled = True
+
+    def measure(self, *signals):
+        return replace(super().measure(*signals), sampled=True)
+
+
+class UntoldInTheLoop(Untold):
+    """The same, compiled."""
+
+    def stage(self):
+        return Stage(ideal_stage)
+
+
+@pytest.mark.parametrize("model", [Untold, UntoldInTheLoop])
+def test_own_sensors_that_tell_none_are_refused_where_the_rig_has_one(model, monkeypatch):
+    monkeypatch.setitem(SENSORS, "own", model)
+    gymnasium.make("BirthSIM/Circle-v1", sensors="own").reset(seed=0)
+    env = gymnasium.make("BirthSIM/Circle-v1", sensors="own", parameters="examples/acceleration_sensor_rig.toml")
+    with pytest.raises(ValueError, match=rf"sensors {model.__name__} tell no acceleration; allowed: \(2, 1\) m/s2, since"):
+        env.reset(seed=0)
+
+
+@pytest.mark.parametrize("name", ["bandwidth", "noise", "bias", "gain_error"])
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 1e7])
+def test_impossible_figures_are_named(name, value):
+    with pytest.raises(ValueError, match=f"acceleration_{name} = .*allowed"):
+        board(**{f"acceleration_{name}": value})
+
+
+def test_a_bandwidth_that_is_of_no_use_is_refused():
+    with pytest.raises(ValueError, match=r"acceleration_bandwidth = 39\.0 .*allowed: 0, which is no sensor, or at least 40 Hz"):
+        board(acceleration_bandwidth=39.0)
 
 
 @pytest.mark.parametrize("model", MODELS)

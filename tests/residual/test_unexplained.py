@@ -86,7 +86,9 @@ def course(record: list[Measurement], lanes: int = LANES) -> Array:
 
 
 def of_lanes(measured: Measurement, lanes: slice) -> Measurement:
-    fields = {name: np.ascontiguousarray(value[..., lanes]) for name, value in vars(measured).items() if name != "sampled"}
+    fields = {
+        name: np.ascontiguousarray(value[..., lanes]) for name, value in vars(measured).items() if isinstance(value, np.ndarray)
+    }
     return Measurement(**fields, sampled=measured.sampled)
 
 

@@ -93,12 +93,14 @@ def _honest(
         slots = late.shape[0]
         whole = math.floor(e[at.DELAY, i] + 1e-9)
         rest = max(0.0, e[at.DELAY, i] - whole)
+        again = acceleration.looked(sensed, i, tick)
         read = tick == 0 or not happens(key, tick, MISSED, e[at.MISSED, i])
         for axis in range(2):
             felt = force[axis, i] + (e[at.GAIN + axis, i] * force[axis, i] + e[at.CROSSTALK + axis, i] * force[1 - axis, i])
             felt += e[at.BIAS + axis, i]
             share = 1.0 if tick == 0 else e[at.PASSED, i]
-            passed[axis, i] = passed[axis, i] + share * (felt - passed[axis, i]) if share < 1.0 else felt
+            if not again:
+                passed[axis, i] = passed[axis, i] + share * (felt - passed[axis, i]) if share < 1.0 else felt
             told = passed[axis, i] + e[at.FORCE_NOISE, i] * normal(key, tick, NOISE_OF_FORCE + axis)
             told = _converted(told, e[at.FORCE_STEP, i], -c[at.FORCE_RANGE], c[at.FORCE_RANGE])
             for k in range(slots if tick == 0 else 1):
@@ -108,7 +110,9 @@ def _honest(
                 shown[9 + axis, i] = newer + rest * (older - newer)
             if c[at.FEELS] > 0.0:
                 gain, bias = e[at.ACCELERATION_GAIN + axis, i], e[at.ACCELERATION_BIAS + axis, i]
-                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], gain, bias, c[at.PERIOD], c[at.FEELS])
+                told = acceleration.feel(
+                    sensed, i, axis, tick, motion[2 + axis, i], gain, bias, c[at.PERIOD], c[at.FEELS], again
+                )
                 if read:
                     shown[11 + axis, i] = told + c[at.ACCELERATION_NOISE] * normal(key, tick, acceleration.NOISE + axis)
         if read:
@@ -254,7 +258,8 @@ class HonestSensors:
             self._velocity, self._passed, self._late, self._shown, self._sensed,
         )  # fmt: skip
         told = self._shown.copy()
-        return Measurement(time, told[:2], told[2], told[3:5], told[5:9], told[9:11], True, told[11:])
+        felt = told[11:] if self._constants[at.FEELS] > 0.0 else None
+        return Measurement(time, told[:2], told[2], told[3:5], told[5:9], told[9:11], True, felt)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""

@@ -94,10 +94,11 @@ def _lab(
         tracker.arrive(queue, shown, velocity, i, time[i], latency)
         for chamber in range(4):
             seen[chamber, i] = pressures[chamber, i] + pressure_noise * normal(key, tick, chamber)
+        again = acceleration.looked(sensed, i, tick)
         for axis in range(2):
             seen[4 + axis, i] = 0.0
             if passed > 0.0:
-                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], 0.0, 0.0, period, passed)
+                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], 0.0, 0.0, period, passed, again)
                 seen[4 + axis, i] = told + acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
 
 
@@ -158,7 +159,8 @@ class LabSensors:
         seen, kept = np.empty((6, len(time))), (self._queue, self._shown, self._velocity, self._sensed)
         _lab(ticks, time, motion, pressures, self._keys, *self._numbers, *kept, seen)
         shown = self._shown.copy()
-        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen[:4], force, True, seen[4:])
+        felt = seen[4:] if self._numbers[5] > 0.0 else None
+        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen[:4], force, True, felt)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
