@@ -124,5 +124,5 @@ def shift(errors: Array, constants: Array, place: Array) -> Array:
     waves = errors[WAVE:HEIGHT].reshape(2, WAVES, 3, -1)
     total = np.sin(waves[:, :, 0] * place[0] + waves[:, :, 1] * place[1] + waves[:, :, 2]).sum(axis=1)
     scaled = errors[SCALED] * (place - constants[AT_X : AT_Y + 1, None])
-    moved: Array = errors[HEIGHT] * total - errors[REGISTERED:] + scaled
+    moved: Array = errors[HEIGHT] * total - errors[REGISTERED : REGISTERED + 2] + scaled
     return moved
