@@ -136,8 +136,10 @@ class Acting:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None or len(self._memory):
-            self._memory[slice(None) if lanes is None else lanes] = 0.0
+        if lanes is None:
+            self._memory = np.zeros((0, self._network.cells))
+        elif len(self._memory):
+            self._memory[lanes] = 0.0
 
 
 def _outputs(name: str, one: Layer, width: int) -> int:

@@ -130,6 +130,16 @@ def test_a_reset_forgets_the_lanes_that_it_names():
     np.testing.assert_array_equal(made.actions(seen[0]), made.acting()(seen[0]))
 
 
+@pytest.mark.parametrize("cells", [0, 6])
+def test_after_a_reset_of_all_lanes_a_mask_of_another_number_counts(cells):
+    made = network(INPUTS, 2, (8,), 4, cells=cells)
+    seen, act = observations(2, 5, INPUTS), made.acting()
+    act(seen[0, :2])
+    act.reset()
+    act.reset(np.array([True, False, False, True, False]))
+    np.testing.assert_array_equal(act(seen[1]), made.acting()(seen[1]))
+
+
 def test_a_network_without_memory_acts_on_what_it_sees_alone():
     made = network(INPUTS, 2, (8,), 5)
     act, seen = made.acting(), observations(2, 3, INPUTS)
