@@ -23,11 +23,13 @@ from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
 from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import load_parameters
 from tests.build.targets import imported, need_linker
 from tests.console import call
 
 fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
 
+ROOT = Path(__file__).parent.parent.parent
 RIG, PERIOD = Parameters(), 1e-3
 OPENINGS, FORCES = [f"opening_{name}" for name in ("P1", "N1", "P2", "N2")], ["force_x", "force_y"]
 CIRCLE = "BirthSIM/Circle-v1"
@@ -128,20 +130,22 @@ def test_the_plant_computes_the_bits_of_python(written, unit, version):
 
 
 @pytest.mark.parametrize(
-    ("controller", "sensors", "periods"),
+    ("controller", "sensors", "file", "periods"),
     [
-        ("backstepping", "lab", 600),
-        ("admittance-adaptive", "honest", 600),
-        pytest.param("backstepping", "ideal", 15_990, marks=pytest.mark.slow, id="all of Fig. 4"),
+        ("backstepping", "lab", None, 600),
+        ("admittance-adaptive", "honest", None, 600),
+        ("admittance-adaptive", "honest", "examples/acceleration_sensor_rig.toml", 600),
+        pytest.param("backstepping", "ideal", None, 15_990, marks=pytest.mark.slow, id="all of Fig. 4"),
     ],
 )
-def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, sensors, periods):
+def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, sensors, file, periods):
     """Under the target and the hand of the circle, as seen from Python."""
-    one = unit(written("--controller", controller, "--sensors", sensors))
-    env = gymnasium.make_vec(CIRCLE, num_envs=1, sensors=sensors, policy_period=PERIOD)
+    described, rig = (("--parameters", ROOT / file), load_parameters(ROOT / file)) if file else ((), RIG)
+    one = unit(written("--controller", controller, "--sensors", sensors, *described))
+    env = gymnasium.make_vec(CIRCLE, num_envs=1, sensors=sensors, parameters=rig, policy_period=PERIOD)
     env.reset(seed=0)
     simulation = env.unwrapped.simulation
-    law = make_controller(controller, RIG)
+    law = make_controller(controller, rig)
     references = [f"reference_{name}" for name in REFERENCE_NAMES]
     for _ in range(periods):
         reference, seen = simulation.reference, simulation.measurement
