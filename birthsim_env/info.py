@@ -7,7 +7,7 @@ import numpy as np
 from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import control_model, dynamics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 FIELDS = {
@@ -39,7 +39,7 @@ SLICES = {name: slice(int(a), int(b)) for name, a, b in zip(FIELDS, _STARTS, _ST
 """Name -> rows of ``describe``."""
 
 
-@kernel
+@helper
 def describe(
     time: Array,
     since: Array,

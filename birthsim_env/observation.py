@@ -14,7 +14,7 @@ from birthsim_env.loop.signals import Measurement, Reference, compliance
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
 
@@ -60,7 +60,7 @@ SIZE = len(ENTRIES)
 SCALES = np.array([entry.scale for entry in ENTRIES])
 
 
-@kernel
+@helper
 def look(
     position: Array, velocity: Array, pressures: Array, reference: Array, force: Array, action: Array, shown: Array, p: Array,
     scales: Array, rows: NDArray[np.float32],

@@ -15,7 +15,7 @@ import math
 from birthsim_env.loop.signals import compliance
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ERROR_UNIT = 1e-3
@@ -49,7 +49,7 @@ TEMPERATURE_RANGE = (100.0, 1000.0)
 REWARD_TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 
-@kernel
+@helper
 def assess(
     state: Array, motion: Array, reference: Array, force: Array, jumped: Array, moved: Array, action: Array,
     last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: Array,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from birthsim_env.loop.signals import compliance
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 SETTLED = 0.5
@@ -15,7 +15,7 @@ SUCCESS_ERROR = 1e-3
 """m, root mean square distance from the compliant target; assumed: a quarter of the paper's law's."""
 
 
-@kernel
+@helper
 def add(
     motion: Array, reference: Array, force: Array, since: Array, failed: Array, tally: Array, success: Array
 ) -> None:  # fmt: skip

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Mask
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 Weights = NDArray[np.float32]
@@ -157,7 +157,7 @@ def _through(x: Array, weight: Weights, bias: Weights, squashed: bool) -> Array:
     return y
 
 
-@kernel
+@helper
 def layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) -> None:
     """Writes x W + b, or its tanh where ``squashed``, for inputs (N, m), W (m, n) and b (n,), into ``y`` (N, n).
 
@@ -174,7 +174,7 @@ def layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) ->
                 y[i, j] = exact.tanh(y[i, j])
 
 
-@kernel
+@helper
 def remember(enters: Array, own: Array, memory: Array) -> None:
     """One step of a gated recurrent unit: ``memory`` h (N, H) goes on, with W x + b and V h + c, both (N, 3H)."""
     cells = memory.shape[1]

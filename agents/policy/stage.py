@@ -12,7 +12,7 @@ from birthsim_env.loop.rows import ACTION, POSITION, POSITION_TIME, PRESSURE, RE
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.loop.stage import Stage, block, numbers, singles, table1, table3
 from birthsim_env.observation import SCALES, SIZE, look
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 
 PERIODS, ACTIONS, MEMORIES, LAYERS, SQUASHED, CELLS, ABOUT = range(7)
@@ -67,7 +67,7 @@ def decide(world: int, seen: int, memory: int, constants: int, tables: int, lane
     return 0
 
 
-@kernel
+@helper
 def _through(tables: int, k: int, squashed: bool, x: Array, y: Array) -> None:
     """The first numbers of ``x`` (N, W), through the ``k``-th layer of the tables, become the first of ``y`` (N, W)."""
     weight, bias = singles(tables, WEIGHTS + 2 * k), singles(tables, WEIGHTS + 2 * k + 1)[0]

@@ -18,7 +18,7 @@ from baselines.backstepping.cartesian_law import across, along
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 LEVEL = 0.1
@@ -57,7 +57,7 @@ FRESH = np.zeros(ROWS)
 FRESH[:SOFTNESS:CYLINDER] = 1.0
 
 
-@kernel
+@helper
 def limit_authority(joints: Array, target: Array, p: Array, period: float, level: float, memory: Array) -> None:
     """Carries ``memory`` (ROWS, N) on by one period: y1, y2, v1, v2 are ``joints`` (4, N), ``target`` rows are a reference's.
 

@@ -39,7 +39,7 @@ from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -98,7 +98,7 @@ def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
     return (*map(str, ENTRIES), *last, *memory_names(settings))
 
 
-@kernel
+@helper
 def stiffen(force: Array, powers: Array, rows: Array) -> None:
     """Changes a reference ``rows`` (15, N) to stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
 
@@ -114,7 +114,7 @@ def stiffen(force: Array, powers: Array, rows: Array) -> None:
                 rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
 
 
-@kernel
+@helper
 def _tell(action: Array, left: Array, most: float, time_constant: float, quickness: float, smooth: Array, told: Array) -> None:
     """Writes forces, N, their rates, N/s, and, of actions that have them, powers of stiffness and the damping factor (7, N);
     ``smooth`` (size, N) goes on by one period towards ``action``."""

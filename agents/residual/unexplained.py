@@ -9,7 +9,7 @@ from __future__ import annotations
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 BANDWIDTH = 60.0
@@ -25,7 +25,7 @@ ROWS = 6
 """Unexplained force now, when last moving out, when last moving in: N, of cylinders 1 and 2 each."""
 
 
-@kernel
+@helper
 def remember(joints: Array, disturbance: Array, p: Array, period: float, seen: Array, met: Array) -> None:
     """``seen`` (4, N) is 1 where cylinder 1, 2 has moved out, in; ``met`` (ROWS, N)."""
     fraction = 1.0 - exact.exp(-period / AVERAGE)

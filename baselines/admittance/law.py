@@ -21,7 +21,7 @@ from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 MEMORY_NAMES = (
@@ -113,7 +113,7 @@ def beyond(error: float, zone: float) -> float:
     return error - max(-zone, min(zone, error))
 
 
-@kernel
+@helper
 def command(
     joints: Array, pressures: Array, motion: Array, target: Array, force: Array, disturbance_force: Array, rest: Array,
     moving: Array, spools: Array, p: Array, period: float, gains: Array, told: Array, memory: Array, openings: Array,

@@ -263,7 +263,7 @@ def openings_for(joints: Array, pressures: Array, intent: Array, p: Array, optio
             two_valve_openings(u, i, 2, intent[1, i], intent[3, i], pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
 
 
-@kernel
+@helper
 def command(
     joints: Array, pressures: Array, reference: Array, believed: Array, p: Array, options: Array, openings: Array
 ) -> int:  # fmt: skip

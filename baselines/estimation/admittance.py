@@ -74,7 +74,7 @@ def advance(
     offset[3, i] += period * (ay + period * (jy / 2.0 + period * sy / 6.0))
 
 
-@kernel
+@helper
 def give_way(
     offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, motion: Array
 ) -> None:  # fmt: skip
@@ -91,7 +91,7 @@ def give_way(
         advance(offset, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
 
 
-@kernel
+@helper
 def mark_moving(motion: Array, moving: Array) -> None:
     """``moving`` (N,) gets 1 where the velocity of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0."""
     for i in range(motion.shape[1]):

@@ -15,7 +15,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 
@@ -37,7 +37,7 @@ def predicted_pressure(
     return expected
 
 
-@kernel
+@helper
 def observe(
     spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, fraction: float,
     fresh: Array,

@@ -14,12 +14,12 @@ from birthsim_env.loop.signals import Mask, Measurement
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
 
 
-@kernel
+@helper
 def observe(
     estimate: Array, position: Array, velocity: Array, pressures: Array, force: Array, believed: Array, p: Array,
     period: float, bandwidth: float, fresh: Array, joints: Array,

@@ -7,7 +7,7 @@ have is not taken off: a hand that was there at the start costs no more than tha
 
 from __future__ import annotations
 
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ROWS = 2
@@ -17,7 +17,7 @@ TIME = 0.25
 """s; assumed: over which the force is averaged. Noise of 0.1 N at 1 kHz leaves 6 mN."""
 
 
-@kernel
+@helper
 def tare(memory: Array, time: Array, measured: Array, most: float, period: float, force: Array) -> None:
     """Writes ``force`` (2, N), N: ``measured`` (2, N) less its mean until ``TIME``, of which +-``most`` N count."""
     for i in range(time.shape[0]):

@@ -13,7 +13,7 @@ from __future__ import annotations
 from baselines.estimation import force_bias
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ROWS = 8
@@ -30,7 +30,7 @@ MOST_BIAS = 60.0
 """N; assumed: 2 kg of mass and 25 N of friction are below it."""
 
 
-@kernel
+@helper
 def observe(
     memory: Array, time: Array, joints: Array, unexplained: Array, p: Array, period: float, fresh: Array, force: Array
 ) -> None:  # fmt: skip

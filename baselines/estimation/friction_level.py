@@ -9,7 +9,7 @@ what the observer found besides, so that it does not depend on what has been lea
 
 from __future__ import annotations
 
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ROWS = 6
@@ -29,7 +29,7 @@ LEAST, MOST = 0.2, 3.0
 """Bounds of the level; assumed."""
 
 
-@kernel
+@helper
 def learn(
     memory: Array, drag: Array, coulomb1: float, coulomb2: float, joints: Array, unexplained: Array, period: float, rate: float,
     fresh: Array,

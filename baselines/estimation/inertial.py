@@ -19,7 +19,7 @@ from baselines.staged import LawStage
 from birthsim_env.loop.rows import ACCELERATION, HANDED, POSITION, POSITION_TIME, SEEN, TIME, VELOCITY
 from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -43,7 +43,7 @@ def memory_rows(rig: Parameters) -> int:
     return HISTORY + 2 * (int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4)
 
 
-@kernel
+@helper
 def observe(
     memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, acceleration: Array, period: float,
     bandwidth: float, motion: Array,

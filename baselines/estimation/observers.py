@@ -25,7 +25,7 @@ from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
@@ -65,7 +65,7 @@ innovations, m; factors of ``REST_TIME``; 1 at a new start; time of the newest s
 stands; past y1, y2, a ring."""
 
 
-@kernel
+@helper
 def observe(
     memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, pressures: Array, p: Array,
     period: float, bandwidth: float, noise: float, force: Array, believed: Array, moving: Array,

@@ -26,7 +26,7 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
     return max(-most, min(most, deflection))
 
 
-@kernel
+@helper
 def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
     """Carries ``bristles`` (2, N) on by one period of ``motion`` (8, N) and writes what they hold back, ``drag`` (2, N), N."""
     one, joints = scratch(4), scratch(4)

@@ -23,7 +23,7 @@ from baselines.estimation.reference_friction import ReferenceFriction
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -31,7 +31,7 @@ BELIEVED_LIMIT = 120.0
 """N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
 
 
-@kernel
+@helper
 def disturbance_forces(joints: Array, believed: Array, disturbance: Array, p: Array, force: Array) -> None:
     """Writes ``force`` (2, N), N: what is ``believed`` to act along the pistons, and what their ``disturbance`` adds, m/s2."""
     for i in range(joints.shape[1]):

@@ -8,7 +8,7 @@ So the samples tell s without a model of the rig, wherever the noise comes from.
 
 from __future__ import annotations
 
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ROWS = 8
@@ -25,7 +25,7 @@ CLIP = 9.0
 """assumed: no e^2 counts for more than so many times its expectation; of normal noise 0.3 % are clipped."""
 
 
-@kernel
+@helper
 def observe(memory: Array, position: Array, position_time: Array, believed: float, fresh: Array) -> None:
     """Carries ``memory`` (ROWS, N) on by one period. ``believed``, m, is the standard deviation at a new start."""
     for i in range(position_time.shape[0]):

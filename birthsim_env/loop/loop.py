@@ -43,7 +43,9 @@ def _run(
         for m in range(moves.shape[0]):
             count, row = moves[m, 1], moves[m, 2]
             array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-            space[row : row + count, :n] = array[:, start : start + n]
+            for k in range(count):
+                for i in range(n):
+                    space[row + k, i] = array[k, start + i]
         for period in range(periods):
             for s in range(stages.shape[0]):
                 if stages[s, 6] == 0 or period == periods - 1:
@@ -57,7 +59,9 @@ def _run(
             count, row = moves[m, 1], moves[m, 2]
             array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
             if moves[m, 3]:
-                array[:, start : start + n] = space[row : row + count, :n]
+                for k in range(count):
+                    for i in range(n):
+                        array[k, start + i] = space[row + k, i]
     return missed
 
 

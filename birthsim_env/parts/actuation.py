@@ -17,7 +17,7 @@ from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import driving_flows
 from birthsim_env.physics.plant import Plant
@@ -101,7 +101,7 @@ class ValveActuation(Forgetful):
         return [Stage(_valve_stage, np.array([float(self._one_valve)]), sees_world=False)]
 
 
-@kernel
+@helper
 def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openings: Array) -> None:
     for i in range(state.shape[1]):
         full = p[at.CONDUCTANCE, i] * p[at.SUPPLY, i] * p[at.RHO0, i] * math.sqrt(p[at.COLDNESS, i])

@@ -65,7 +65,7 @@ class _Planned(Trajectory):
         return few
 
 
-@kernel
+@helper
 def _circle(time: Array, own: Array, rows: Array) -> None:
     """``own`` (4, N): centre x, y (m), radius (m), angular speed (rad/s)."""
     for i in range(time.shape[0]):
@@ -127,7 +127,7 @@ def minimum_jerk(u: float, order: int) -> float:
     return value if order == 0 else slope if order == 1 else bend if order == 2 else jerk
 
 
-@kernel
+@helper
 def _path(time: Array, own: Array, rows: Array) -> None:
     """``own`` (8, N): start x, y, heading (rad), straight length, arc radius (m), arc angle (rad), first and last time (s)."""
     for i in range(time.shape[0]):

@@ -14,7 +14,7 @@ from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
 from birthsim_env.loop.stage import Stage, block, numbers, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 
@@ -109,7 +109,7 @@ class StiffnessSchedule:
         return Stage(_schedule_stage, constants, tables=(self._values,))
 
 
-@kernel
+@helper
 def _sample(time: Array, starts: Array, values: Array, transition: float, rows: Array) -> None:
     for i in range(time.shape[0]):
         phase = 0

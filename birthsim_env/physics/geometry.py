@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import (
     COS_GAMMA3,
     D_PRODUCT,
@@ -179,7 +179,7 @@ def joint_force(force: ArrayLike, piston: ArrayLike, parameters: Parameters) -> 
     return np.asarray(np.einsum("ij...,i...->j...", jacobian(piston, parameters), np.asarray(force, dtype=np.float64)))
 
 
-@kernel
+@helper
 def end_effector_motion(state: Array, p: Array, motion: Array) -> None:
     """Writes x, y, vx, vy of the end effector for states (18, N) into ``motion`` (4, N)."""
     for i in range(state.shape[1]):

@@ -170,7 +170,7 @@ def advance(
             )  # fmt: skip
 
 
-@kernel
+@helper
 def port_motion(state: Array, further: Array, p: Array, motion: Array) -> None:
     """Writes x, y, vx, vy of the end effector (4, N): of the handle where the structure bends."""
     end_effector_motion(state, p, motion)

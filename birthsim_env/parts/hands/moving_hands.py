@@ -16,7 +16,7 @@ from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, UserForce, force_block
 from birthsim_env.parts.references import LONGEST, TURNED, minimum_jerk
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import checked_range, shown
 
@@ -27,7 +27,7 @@ WAVES = 16
 """Sines that noise is made of, per axis."""
 
 
-@kernel
+@helper
 def _waves(time: Array, own: Array, forces: Array) -> None:
     """``own`` (2, W, 3, N): of axis and wave the amplitude (N), angular frequency (rad/s) and phase (rad)."""
     for i in range(time.shape[1]):
@@ -120,7 +120,7 @@ STEP = 0.001
 """s, steps in which the hand's own motion is integrated."""
 
 
-@kernel
+@helper
 def _guide(
     time: Array, position: Array, velocity: Array, own: Array, points: Array, state: Array, grip: Array, forces: Array
 ) -> None:

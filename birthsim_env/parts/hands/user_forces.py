@@ -71,7 +71,7 @@ def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) ->
     return checked("user_force.force(...)", force, (instants, 2, lanes), "N")
 
 
-@kernel
+@helper
 def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> None:
     """``knots`` (M, 3, N): time, Fx, Fy; the first ``counts`` (N,) of them count; constant before and after."""
     for i in range(time.shape[1]):

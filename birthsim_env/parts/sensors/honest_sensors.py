@@ -71,7 +71,7 @@ def _growth(e: Array, c: Array, i: int, x: float, y: float) -> float:
     return exact.exp(0.5 * e[at.GROWTH, i] * exact.log(max(nearer, 1e-12))) if e[at.GROWTH, i] > 0.0 else 1.0
 
 
-@kernel
+@helper
 def _honest(
     ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, force: Array, keys: NDArray[np.uint64], c: Array,
     e: Array, queue: Array, arrived: Array, velocity: Array, passed: Array, late: Array, shown: Array, sensed: Array,
@@ -148,7 +148,7 @@ def _honest_stage(world: int, seen: int, memory: int, constants: int, tables: in
     return 0
 
 
-@kernel
+@helper
 def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Array, last: Array, openings: Array) -> None:
     """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period.
 

@@ -35,7 +35,7 @@ from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.noise import normal
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.electronics import Electronics
 
@@ -75,7 +75,7 @@ class IdealSensors:
         return Stage(ideal_stage)
 
 
-@kernel
+@helper
 def _lab(
     ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
     rate: float, latency: float, position_noise: float, pressure_noise: float, passed: float, acceleration_noise: float,

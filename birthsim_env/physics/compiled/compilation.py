@@ -28,7 +28,9 @@ import llvmlite
 import numba
 from numba.core import event, serialize
 from numba.core.caching import NullCache
-from numba.core.compiler import CompileResult
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
+from numba.core.registry import CPUDispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -166,7 +168,45 @@ def kernel(function: F) -> F:
     return compiled  # type: ignore[no-any-return]
 
 
+class _Inlined(JITCodeLibrary):
+    """Code of a helper. Machine code is made of the kernels that it is inlined into, so it is not optimised by itself."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """None: Python calls the kernel that a helper is when it stands alone."""
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        """What keeps the constants of Python's exceptions beside machine code; here there is none."""
+        return self
+
+    def set_env(self, name: str, environment: Any) -> None:
+        pass
+
+
+class _Inlining(Compiler):
+    def __init__(self, typing: Any, target: Any, _: Any, *others: Any) -> None:
+        super().__init__(typing, target, _Inlined(target.codegen(), "helper"), *others)  # type: ignore[no-untyped-call]
+
+
+class _Helper(CPUDispatcher):
+    """What kernels see of a helper; from Python it is a kernel of its own."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        options = {name: True for name in ("nopython", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper")}
+        super().__init__(function, targetoptions={**options, "error_model": "numpy"}, pipeline_class=_Inlining)
+        self._alone = kernel(function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._alone(*arguments)
+
+
 def helper(function: F) -> F:
-    """Compile a scalar helper that is always inlined into the kernels that call it."""
-    compiled: Any = numba.njit(error_model="numpy", forceinline=True)(function)
-    return compiled  # type: ignore[no-any-return]
+    """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
+    return function if numba.config.DISABLE_JIT else _Helper(function)  # type: ignore[return-value, attr-defined]

@@ -156,5 +156,5 @@ def _number(which: int, x: float) -> float:
 
 
 def number(name: str, x: float) -> float:
-    """``sine``, ``cosine``, ``exp`` or ``log2`` of a number, from Python: a helper called there is compiled anew."""
+    """``sine``, ``cosine``, ``exp`` or ``log2`` of a number, from Python; one kernel for the four."""
     return float(_number(("sine", "cosine", "exp", "log2").index(name), float(x)))
