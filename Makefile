@@ -17,6 +17,8 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
+BASE := $(VENV)/.base
+AGENTS := $(VENV)/.agents
 READY := $(VENV)/.ready
 OUT := out
 TOOLS := $(OUT)/tools
@@ -26,7 +28,9 @@ BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 # Every file of an installation has its hash in requirements/, which make lock writes from constraints.txt.
-LOCKED := install --quiet --no-deps --require-hashes --requirement requirements
+# Python writes the byte code of what is imported, and keeps it: --no-compile leaves out the rest.
+LOCKED := install --quiet --no-deps --no-compile --require-hashes --requirement requirements
+export PYTHONDONTWRITEBYTECODE :=
 LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
   --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
@@ -47,25 +51,36 @@ POLICIES := agents/policies
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
 tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
 
-.PHONY: run test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run figure test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
-# PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this Python, PyPI's with CUDA.
-$(READY): pyproject.toml requirements/project.txt requirements/torch.txt
+# What a picture needs, and the project itself.
+$(BASE): pyproject.toml requirements/base.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
+	$(PIP) $(LOCKED)/base.txt
+	$(PIP) install --quiet --no-deps --no-build-isolation --no-compile --editable .
+	touch $@
+
+# What a training needs. PyTorch's CPU build: from where pip looks anyway, else from its own index. Where neither has one for this
+# Python, PyPI's with CUDA.
+$(AGENTS): $(BASE) requirements/torch.txt requirements/agents.txt
 	$(PIP) $(LOCKED)/torch.txt 2>/dev/null || $(PIP) $(TORCH_CPU) $(LOCKED)/torch.txt \
 	  || { echo "No CPU build of PyTorch within reach: PyPI's comes with CUDA, 2.2 GB more"; $(PIP) $(LOCKED)/torch-cuda.txt; }
+	$(PIP) $(LOCKED)/agents.txt
+	touch $@
+
+# What tests and documentation need besides.
+$(READY): $(AGENTS) requirements/project.txt
 	$(PIP) $(LOCKED)/project.txt
-	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
-	touch $(READY)
+	touch $@
 
 $(TOOLS)/.ready: requirements/tools.txt
 	test -x $(TOOLS)/bin/python || python3 -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip --disable-pip-version-check --no-input $(LOCKED)/tools.txt
 	touch $@
 
-run: $(READY)
-	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
-	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+# PyTorch is installed while Fig. 4 is computed.
+run: $(BASE)
+	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
 	@echo "== 2 of 3: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim-train --config circle_quick --seed 0 --out $(OUT)/policy
@@ -76,6 +91,10 @@ run: $(READY)
 	@echo "$(BIN)/birthsim-live                                       the rig in the browser, to be pulled with the mouse"
 	@echo "$(BIN)/birthsim-evaluate --controller backstepping examples/pd.py:PD --out $(OUT)/mine    a controller of your own"
 	@echo "$(BIN)/birthsim-evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
+
+figure: $(BASE)
+	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
+	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
 
 test: $(READY)
 	$(BIN)/python -m pytest -n 2 -m "not slow"
@@ -133,6 +152,8 @@ $(NPM)/.ready: requirements/npm/package.json requirements/npm/package-lock.json
 
 # Versions are those of constraints.txt. torch.txt is kept by hand: its files are not on PyPI.
 lock: $(TOOLS)/.ready
+	$(LOCK)/base.txt pyproject.toml requirements/build.in
+	$(LOCK)/agents.txt --extra agents $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
 	$(LOCK)/project.txt $(addprefix --extra ,$(EXTRAS)) $(addprefix --no-emit-package ,$(CUDA)) pyproject.toml requirements/build.in
 	$(LOCK)/torch-cuda.txt requirements/torch-cuda.in
 	$(LOCK)/tools.txt requirements/tools.in
