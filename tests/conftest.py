@@ -3,8 +3,10 @@
 import os
 import signal
 
-# LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported.
+# LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported. PyTorch's
+# wait with the processor in their hands: on a busy machine that takes ten times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import gymnasium
 import pytest

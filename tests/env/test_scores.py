@@ -22,14 +22,20 @@ PROBE = environment_id("probe")
 they pay more than it, though their settled error is larger."""
 
 
-@pytest.mark.parametrize("environment", IDS)
+@pytest.mark.parametrize(
+    ("environment", "episodes", "options"),
+    [
+        (environment_id("circle"), 6, {"duration": 4.0}),
+        *(pytest.param(name, 24, {}, marks=pytest.mark.slow, id=name) for name in IDS),
+    ],
+)
 @pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_returns_order_controllers_as_their_errors_do(environment, sensors):
+def test_returns_order_controllers_as_their_errors_do(environment, episodes, options, sensors):
     """Slammed valves, then shut ones, the paper's law, and better ones; ending early never pays, with any discount."""
     names = ("slammed-valves", "shut-valves", *(() if environment == PROBE else ("backstepping",)), "admittance-backstepping")
     rig = birthsim_env.Parameters()
-    setting = {"progress": False, "sensors": sensors, "randomize": True}
-    found = {name: evaluate(environment, make_controller(name, rig), name, 24, 910_000, **setting) for name in names}
+    setting = {"progress": False, "sensors": sensors, "randomize": True, **options}
+    found = {name: evaluate(environment, make_controller(name, rig), name, episodes, 910_000, **setting) for name in names}
     paid = [np.mean(found[name].returns[1.0]) for name in names]
     assert paid == sorted(paid)
     assert all(found["slammed-valves"].lost)

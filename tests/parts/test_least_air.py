@@ -138,12 +138,10 @@ def test_what_cannot_be_is_refused(wrong, message):
         least_air(**arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
-    [
-        ("labour", ("labour.csv",)),
-        pytest.param("least_air", ("--episodes", "2", "--scenarios", "circle"), marks=pytest.mark.slow),
-    ],
+    [("labour", ("labour.csv",)), ("least_air", ("--episodes", "2", "--scenarios", "circle"))],
 )
 def test_the_examples_run(name, options, tmp_path):
     command = [sys.executable, str(EXAMPLES / f"{name}.py"), *options]

@@ -21,8 +21,17 @@ def run(script, folder):
     return subprocess.run([sys.executable, "-c", paths + script], capture_output=True, text=True, timeout=300, check=False)
 
 
-@pytest.mark.parametrize("content", ["", "import nothing_of_the_kind\n", None])
-@pytest.mark.parametrize("script", [MAKE.format(""), MAKE.format("_vec"), COMMAND])
+@pytest.mark.parametrize(
+    ("script", "content"),
+    [
+        (COMMAND, ""),
+        (COMMAND, "import nothing_of_the_kind\n"),
+        (COMMAND, None),
+        (MAKE.format(""), ""),
+        (MAKE.format("_vec"), "import nothing_of_the_kind\n"),
+        pytest.param(MAKE.format(""), None, marks=pytest.mark.slow),
+    ],
+)
 def test_a_foreign_package_is_named(script, content, tmp_path):
     (tmp_path / "agents").mkdir()
     if content is not None:

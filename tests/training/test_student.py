@@ -74,7 +74,7 @@ def told(monkeypatch, capsys):
     return run
 
 
-def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told, monkeypatch, capsys):
+def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told):
     brief = ("--teacher", teachers, "--rounds", 1, "--hidden", 3)
     out = told(*brief, "--seeds", 2, "--out", tmp_path / "both")
     assert "seed 0: " in out
@@ -92,7 +92,12 @@ def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told,
         assert [point["steps"] for point in curve["curve"]] == [0, 4 * 700]
     told(*brief, "--seed", 1, "--out", tmp_path / "one")
     assert (tmp_path / "one" / "seed_1" / WEIGHTS).read_bytes() == (folders[1] / WEIGHTS).read_bytes()
-    monkeypatch.setattr(sys, "argv", ["beside_law", "--policy", str(tmp_path / "both"), "--episodes", "1", "--rigs", "1"])
+
+
+@pytest.mark.slow
+def test_students_are_judged_beside_their_law(tmp_path, teachers, told, monkeypatch, capsys):
+    told("--teacher", teachers, "--rounds", 1, "--hidden", 3, "--seeds", 2, "--out", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["beside_law", "--policy", str(tmp_path), "--episodes", "1", "--rigs", "1"])
     beside_law.main()
     assert "| seed_1 |" in capsys.readouterr().out
 

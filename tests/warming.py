@@ -1,0 +1,50 @@
+"""Compiles what tests run, once, on all processors: ``python -m tests.warming``.
+
+Without it every worker of pytest compiles for itself what it meets first. Kernels with the signature of a stage are compiled by
+their address, without a simulation; the rest is called once.
+"""
+
+from __future__ import annotations
+
+import os
+import pkgutil
+from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
+from multiprocessing import get_context
+
+from numba.core.registry import CPUDispatcher
+
+from birthsim_env.loop.stage import ARGUMENTS, address_of
+from tests.processors import ROOT
+
+PACKAGES = ("birthsim_env", "baselines", "agents")
+
+
+def stages() -> list[str]:
+    """All kernels with the arguments of a stage, as ``module:name``, the longest first."""
+    found = {}
+    for package in PACKAGES:
+        for module in pkgutil.walk_packages([str(ROOT / package)], f"{package}."):
+            if ".commands." in module.name or ".figures." in module.name:
+                continue
+            for name, value in vars(import_module(module.name)).items():
+                if isinstance(value, CPUDispatcher) and value.py_func.__code__.co_varnames[:2] == ("world", "seen"):
+                    assert value.py_func.__code__.co_argcount == ARGUMENTS
+                    found[f"{value.py_func.__module__}:{name}"] = value.py_func.__code__
+    return sorted(found, key=lambda name: -len(found[name].co_code))
+
+
+def warm(name: str) -> None:
+    """Compile a stage, or load it."""
+    module, _, function = name.partition(":")
+    address_of(getattr(import_module(module), function))
+
+
+def main() -> None:
+    """Compile everything."""
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("spawn")) as pool:
+        list(pool.map(warm, stages()))
+
+
+if __name__ == "__main__":
+    main()
