@@ -24,6 +24,7 @@ OUT := out
 TOOLS := $(OUT)/tools
 NPM := $(OUT)/npm
 OLDEST := numba==0.65.0 llvmlite==0.47.0
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --durations 20 --durations-min 1
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -51,7 +52,7 @@ POLICIES := agents/policies
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
 tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
 
-.PHONY: run figure test test-slow kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml requirements/base.txt
@@ -97,10 +98,19 @@ figure: $(BASE)
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
 
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m tests.warming
+	$(PYTEST) -m "not slow"
 
 test-slow: $(READY)
-	$(BIN)/python -m pytest -n 2 -m slow
+	$(BIN)/python -m tests.warming
+	$(PYTEST) -m slow
+
+# Between two edits: what changed, the laws of the project, and the stored bits.
+quick: $(READY)
+	$(BIN)/ruff check --quiet .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+	$(PYTEST) tests/oracles tests/contracts tests/project/test_rooms.py
 
 # Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
 test-weekly:
@@ -112,7 +122,7 @@ portable: $(READY)
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m pytest -n 2 -m "not slow"
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m tests.processors here
 
 verify: $(READY)
 	$(BIN)/birthsim-verify --out $(OUT)/verify

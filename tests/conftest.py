@@ -2,6 +2,7 @@
 
 import os
 import signal
+from collections import Counter
 
 # LAPACK's threads wait for each other longer than the small matrices here take; NumPy reads this when it is imported. PyTorch's
 # wait with the processor in their hands: on a busy machine that takes ten times as long.
@@ -59,6 +60,18 @@ def brief(monkeypatch):
     """Evaluated episodes of 7 s, which have their first push."""
     make_vec = gymnasium.make_vec
     monkeypatch.setattr(gymnasium, "make_vec", lambda *args, **options: make_vec(*args, duration=7.0, **options))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Seconds of the workers, by folder."""
+    folders = Counter()
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            if hasattr(report, "duration"):
+                folders[report.nodeid.split("/")[1]] += report.duration
+    if sum(folders.values()) > 60.0:
+        each = (f"{folder} {seconds:.0f}" for folder, seconds in folders.most_common())
+        terminalreporter.write_line(f"s by folder: {', '.join(each)}; all {sum(folders.values()):.0f}")
 
 
 def pytest_unconfigure(config):

@@ -4,6 +4,7 @@ Kernels are compiled for each, with a cache of its own; PyTorch, NumPy, OpenBLAS
 same instructions. What this machine's processor lacks is left out, and said. A setting can also be taken alone:
     python -m tests.processors x86-64                      its tests
     python -m tests.processors x86-64 -- COMMAND ...       any command under it
+    python -m tests.processors here                        the numeric tests on this processor as it is: ``make oldest``
 """
 
 from __future__ import annotations
@@ -20,13 +21,17 @@ import numpy as np
 from llvmlite.binding import get_host_cpu_features
 
 ROOT = Path(__file__).parent.parent
-NUMERIC = "not page and not live and not video and not rendering and not style"
+NUMERIC = [f"tests/{room}" for room in ("oracles", "physics", "estimation", "backstepping", "controllers", "limiter", "rivals")]
+"""Rooms whose tests depend on the bits of machine code, or on what LLVM makes of it."""
 
 _HASWELL = [
     *("sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2", "popcnt", "avx", "avx2"),
     *("fma", "bmi", "bmi2", "lzcnt", "f16c", "movbe"),
 ]
 _SKYLAKE = [*_HASWELL, "avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"]
+
+WARM = [sys.executable, "-m", "tests.warming"]
+TESTS = [sys.executable, "-m", "pytest", "-n", "2", "--dist", "loadfile", "-m", "not slow", *NUMERIC]
 
 
 @dataclass(frozen=True)
@@ -80,21 +85,22 @@ def main() -> None:
         raise SystemExit(f"these settings are x86-64's; this is {platform.machine()}")
     named, _, command = " ".join(sys.argv[1:]).partition("--")
     names = named.split() or list(PROCESSORS)
-    unknown = [name for name in names if name not in PROCESSORS]
+    unknown = [name for name in names if name not in (*PROCESSORS, "here")]
     if unknown:
-        raise SystemExit(f"{unknown[0]!r}; allowed: {', '.join(PROCESSORS)}")
+        raise SystemExit(f"{unknown[0]!r}; allowed: {', '.join(PROCESSORS)}, here")
     said, failed = [], False
     for name in names:
-        processor = PROCESSORS[name]
-        if processor.missing():
+        processor = PROCESSORS.get(name)
+        if processor and processor.missing():
             said.append(f"{name:8} left out: this processor has no {', '.join(processor.missing())}")
             continue
         print(f"== as {name}", flush=True)
         began = time.monotonic()
-        line = command.split() if command else [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", "-k", NUMERIC]
-        done = subprocess.run(line, cwd=ROOT, env={**os.environ, **processor.environment(name)}, check=False)
-        failed = failed or done.returncode != 0
-        verdict = "passed" if done.returncode == 0 else f"FAILED ({done.returncode})"
+        environment = {**os.environ, **(processor.environment(name) if processor else {})}
+        lines = [command.split()] if command else [WARM, TESTS]
+        status = next(filter(None, (subprocess.run(line, cwd=ROOT, env=environment).returncode for line in lines)), 0)
+        failed = failed or status != 0
+        verdict = "passed" if status == 0 else f"FAILED ({status})"
         said.append(f"{name:8} {verdict} in {time.monotonic() - began:.0f} s")
     print("\n".join(said))
     raise SystemExit(failed)

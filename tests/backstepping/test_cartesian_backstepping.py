@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable
 
 import numpy as np
@@ -233,43 +232,11 @@ def recorded(lanes: int, ticks: int) -> list[tuple[Measurement, Reference]]:
     return record
 
 
-def test_one_lane_and_many_and_a_new_start() -> None:
-    """A rig without lane axis is a lane of many; a reset lane answers like a new controller, the others as if nothing were."""
-    record, fresh = recorded(3, 400), np.array([False, True, False])
-    kept, reset, single, late = (CartesianBackstepping() for _ in range(4))
-    for tick, (measured, wanted) in enumerate(record):
-        if tick == 200:
-            reset.reset(fresh)
-        expected, got = kept.command(measured, wanted), reset.command(measured, wanted)
-        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
-        alone = lane_of(measured, wanted, 1)
-        assert np.array_equal(single.command(*alone), expected[:, 1])
-        if tick >= 200:
-            assert np.array_equal(got[:, 1], late.command(*alone))
-    assert not np.array_equal(expected[:, 0], expected[:, 2]), "every lane has noise of its own"
-
-
-def lane_of(measured: Measurement, wanted: Reference, lane: int) -> tuple[Measurement, Reference]:
-    """Signals of one rig without a lane axis."""
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
-    return Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])
-
-
 @pytest.mark.parametrize("name", ["pneumatic_gain", "sign_width"])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_options_that_are_not_positive_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=rf"{name} = .*; allowed: a positive number"):
         CartesianBackstepping(**{name: value})
-
-
-def test_signals_over_different_lanes_are_refused() -> None:
-    ((measured, wanted),) = recorded(3, 1)
-    for name in ("velocity", "pressures", "user_force"):
-        wrong = dataclasses.replace(measured, **{name: getattr(measured, name)[:, :1]})
-        with pytest.raises(ValueError, match=rf"measurement.{name} has shape \(\d, 1\); allowed: \(\d, 3\)"):
-            CartesianBackstepping().command(wrong, wanted)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
-        CartesianBackstepping().command(measured, Reference(wanted.rows[:, :1]))
 
 
 def test_setpoints_without_gains_are_refused() -> None:

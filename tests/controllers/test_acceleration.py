@@ -30,11 +30,6 @@ def openings(sensors="honest", lanes=3, steps=120, believed=RIG, shown=0.0, rig=
     return np.array(told)
 
 
-@pytest.mark.parametrize("sensors", ["lab", "honest"])
-def test_a_lane_of_many_is_the_single_one(sensors):
-    np.testing.assert_array_equal(openings(sensors)[:, :, :1], openings(sensors, lanes=1))
-
-
 def test_a_law_that_believes_in_no_such_sensor_does_not_read_it():
     plain = RIG.replace({"electronics.acceleration_bandwidth": 0.0})
     without = openings(believed=plain, rig=plain)

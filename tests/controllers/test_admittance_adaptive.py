@@ -37,12 +37,6 @@ def test_without_learning_it_is_the_law_that_it_derives_from():
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("sensors", ["ideal", "honest"])
-def test_a_lane_of_many_is_the_single_one(name, sensors):
-    np.testing.assert_array_equal(openings(name, sensors)[:, :, :1], openings(name, sensors, lanes=1))
-
-
 @pytest.mark.parametrize("sensors", ["ideal", "honest"])
 def test_without_a_force_sensor_the_hands_force_is_not_read(sensors):
     np.testing.assert_array_equal(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -177,34 +175,6 @@ def recorded(lanes: int, ticks: int, sensors: str) -> list[tuple[Measurement, Re
     return record
 
 
-def lane_of(measured: Measurement, wanted: Reference, lane: int) -> tuple[Measurement, Reference]:
-    """Signals of one rig without a lane axis."""
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
-    return Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_one_lane_and_many_and_a_new_start(sensors: str) -> None:
-    """A rig without lane axis is a lane of many; a reset lane answers like a new controller, the others as if nothing were."""
-    record, fresh = recorded(3, 400, sensors), np.array([False, True, False])
-    kept, reset, single, late = (AdmittanceBackstepping(BELIEVED) for _ in range(4))
-    for tick, (measured, wanted) in enumerate(record):
-        if tick == 200:
-            reset.reset(fresh)
-        expected, got = kept.command(measured, wanted), reset.command(measured, wanted)
-        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
-        alone = lane_of(measured, wanted, 1)
-        assert np.array_equal(single.command(*alone), expected[:, 1])
-        if tick >= 200:
-            assert np.array_equal(got[:, 1], late.command(*alone))
-        if tick == 200:
-            assert not np.allclose(got[:, 1], expected[:, 1])
-    reset.reset()
-    again = AdmittanceBackstepping(BELIEVED)
-    assert np.array_equal(reset.command(*record[0]), again.command(*record[0]))
-    assert np.array_equal(reset.gain_fraction, np.ones((2, 3)))
-
-
 @pytest.mark.parametrize(("gain", "value"), [("rest_push", 6.0), ("dead_zone", 5e-5), ("pressure_bandwidth", 40.0)])
 def test_some_gains_are_for_the_tracker_alone(gain: str, value: float) -> None:
     """Where sensors are exact no piston is taken to rest and no pressure averaged: those gains change no bit there."""
@@ -245,14 +215,8 @@ def test_impossible_gains_are_refused(gains: dict[str, float], message: str) -> 
         AdmittanceBackstepping(BELIEVED, **gains)
 
 
-def test_signals_over_different_lanes_and_springs_that_are_none_are_refused() -> None:
+def test_springs_that_are_none_are_refused() -> None:
     ((measured, wanted),) = recorded(3, 1, "ideal")
-    for name in ("velocity", "pressures", "user_force"):
-        wrong = dataclasses.replace(measured, **{name: getattr(measured, name)[:, :1]})
-        with pytest.raises(ValueError, match=rf"measurement.{name} has shape \(\d, 1\); allowed: \(\d, 3\)"):
-            AdmittanceBackstepping(BELIEVED).command(wrong, wanted)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
-        AdmittanceBackstepping(BELIEVED).command(measured, Reference(wanted.rows[:, :1]))
     wanted.rows[14, 2] = 5000.0
     with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 2; allowed: more than 0 N/m in every direction"):
         AdmittanceBackstepping(BELIEVED).command(measured, wanted)

@@ -21,7 +21,7 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.controllers.test_through_friction import lane_of, recorded
+from tests.controllers.test_through_friction import recorded
 from tests.controllers.test_valve_inverse import into_chambers
 from tests.oracles import closed_loop, derived_law, rigid_body
 
@@ -280,28 +280,6 @@ def stiffness_of(plant: Plant) -> Array:
 # Lanes, a new start, and what is refused
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_one_lane_and_many_and_a_new_start(sensors: str) -> None:
-    """A rig without lane axis is a lane of many; a reset lane answers like a new controller, the others as if nothing were."""
-    record, fresh = recorded(3, 30, sensors), np.array([False, True, False])
-    kept, reset, single, late = controllers(4)
-    for tick, (measured, wanted) in enumerate(record):
-        if tick == 15:
-            reset.reset(fresh)
-        expected, got = kept.command(measured, wanted), reset.command(measured, wanted)
-        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
-        alone = lane_of(measured, wanted, 1)
-        assert np.array_equal(single.command(*alone), expected[:, 1])
-        if tick >= 15:
-            assert np.array_equal(got[:, 1], late.command(*alone))
-        if tick == 15:
-            assert not np.allclose(got[:, 1], expected[:, 1])
-    reset.reset()
-    again = NonlinearMPC(RIG)
-    for measured, wanted in record[:5]:
-        assert np.array_equal(reset.command(measured, wanted), again.command(measured, wanted))
-
-
 def test_a_lane_without_numbers_is_left_alone() -> None:
     """Until it is reset no more flows than leaks through shut valves; the others notice nothing."""
     record, (kept, blind) = recorded(3, 12, "ideal"), controllers(2)
@@ -338,10 +316,8 @@ def test_tuned_gains_are_gains_and_every_gain_can_be_given() -> None:
         NonlinearMPC(RIG, **{name: limits[end] for name, limits in NonlinearMPC.TUNABLE.items()})
 
 
-def test_signals_over_different_lanes_and_springs_that_are_none_are_refused() -> None:
+def test_springs_that_are_none_are_refused() -> None:
     ((measured, wanted),), (controller,) = recorded(3, 1, "ideal"), controllers(1)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
-        controller.command(measured, Reference(wanted.rows[:, :1]))
     wanted.rows[14, 2] = 5000.0
     with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 2; allowed: more than 0 N/m in every direction"):
         controller.command(measured, wanted)

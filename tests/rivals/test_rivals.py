@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -130,42 +129,6 @@ def signals(lanes: int, calls: int, sampled: bool) -> list[tuple[Measurement, Re
     return found
 
 
-def of_lanes(pair: tuple[Measurement, Reference], lanes: Any) -> tuple[Measurement, Reference]:
-    """The same signals for some lanes, or for one rig without lanes where ``lanes`` is a number."""
-    measured, reference = pair
-    fields = ("time", "position", "position_time", "velocity", "pressures", "user_force")
-    some = {name: np.array(getattr(measured, name)[..., lanes], order="C") for name in fields}
-    return Measurement(**some, sampled=measured.sampled), Reference(np.ascontiguousarray(reference.rows[:, lanes]))
-
-
-@every_rival
-@pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
-def test_one_rig_is_one_lane_of_many(rival: type[TrackingController], sampled: bool) -> None:
-    path, laws = signals(40, 30, sampled), rivals(rival, 4)
-    together = np.array([laws[0].command(*pair) for pair in path])
-    assert len(np.unique(together[-1])) > 100
-    for lane, alone in zip((0, 31, 39), laws[1:], strict=True):
-        got = np.array([alone.command(*of_lanes(pair, lane)) for pair in path])
-        assert got.shape == (30, 4)
-        assert np.array_equal(got, together[:, :, lane])
-
-
-@every_rival
-def test_reset_of_some_lanes_starts_only_those_anew(rival: type[TrackingController]) -> None:
-    path, masked = signals(3, 40, False), np.array([False, True, False])
-    kept, reset, late = rivals(rival, 3)
-    for tick, pair in enumerate(path):
-        if tick == 20:
-            reset.reset(masked)
-        expected, got = kept.command(*pair), reset.command(*pair)
-        assert np.array_equal(got[:, ~masked], expected[:, ~masked])
-        if tick >= 20:
-            assert np.array_equal(got[:, 1:2], late.command(*of_lanes(pair, slice(1, 2))))
-            assert not np.array_equal(got[:, 1], expected[:, 1])
-    reset.reset()
-    assert np.array_equal(reset.command(*path[0]), rival().command(*path[0])), "reset, it is as good as new"
-
-
 @every_rival
 def test_integrals_rest_while_a_valve_is_full(rival: type[TrackingController]) -> None:
     """Half a second far from the target, then back on it: no more than the integral's start remains (no windup)."""
@@ -239,18 +202,6 @@ def test_gains_that_cannot_be_are_refused(rival: type[TrackingController]) -> No
             with pytest.raises(ValueError, match=f"{name} = {value!r}; allowed: {allowed}"):
                 rival(**{name: value})
     rival(**{name: 0.0 for name, low in least.items() if low == 0})
-
-
-@every_rival
-def test_signals_over_different_lanes_are_refused(rival: type[TrackingController]) -> None:
-    (measured, reference), (law,) = signals(3, 1, False)[0], rivals(rival, 1)
-    fewer, fewer_wanted = of_lanes((measured, reference), slice(1))
-    for name in ("velocity", "pressures", "user_force"):
-        mixed = dataclasses.replace(measured, **{name: getattr(fewer, name)})
-        with pytest.raises(ValueError, match=rf"measurement.{name} has shape \(\d, 1\); allowed: \(\d, 3\)"):
-            law.command(mixed, reference)
-    with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 3\)"):
-        law.command(measured, fewer_wanted)
 
 
 @every_rival
