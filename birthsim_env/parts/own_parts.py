@@ -14,7 +14,6 @@ from traceback import extract_tb
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
@@ -125,6 +124,8 @@ class Through(Trajectory):
     """
 
     def __init__(self, times: Array, positions: Array) -> None:
+        from scipy.interpolate import make_interp_spline  # late: it would double the time of ``import birthsim_env``
+
         degree = min(5, (len(times) - 2) // 2 * 2 + 1)  # an odd one
         spline = make_interp_spline(times, positions, k=degree)
         self._breaks: Array = np.unique(spline.t)

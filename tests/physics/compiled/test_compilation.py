@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -96,6 +97,38 @@ def test_the_stamp_is_of_all_that_a_kernel_imports():
     assert "references" not in imported("physics/dynamics.py"), "an edit there need not compile the plant anew"
     stamps = {source_stamp(ROOT / "birthsim_env" / name) for name in ("physics/dynamics.py", "reward.py")}
     assert len(stamps) == 2
+
+
+ODD = """
+import birthsim_env.reward, numpy as np; from birthsim_env import info
+if True: import birthsim_env.success as s
+def f():
+    from birthsim_env.physics.compiled import ( # exact )
+        lanes as l,  # )
+        exact,
+    )
+    from birthsim_env.loop import \\
+        rows
+"""
+
+
+def test_no_import_that_the_syntax_tree_has_is_overlooked(tmp_path):
+    """Nor any of the project's; a line of a docstring that reads like an import does no harm."""
+
+    def of_tree(path):
+        for node in ast.walk(ast.parse(path.read_bytes())):
+            if isinstance(node, ast.Import):
+                yield from (compilation._file_of(alias.name) for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                for alias in node.names:
+                    yield compilation._file_of(f"{node.module}.{alias.name}") or compilation._file_of(node.module)
+
+    odd = tmp_path / "odd.py"
+    odd.write_text(ODD)
+    for path in [odd, *(path for package in compilation._PACKAGES for path in (ROOT / package).rglob("*.py"))]:
+        assert set(filter(None, of_tree(path))) <= compilation._imports(path), path
+    stems = {path.parent.name if path.stem == "__init__" else path.stem for path in compilation._imports(odd)}
+    assert stems == {"reward", "info", "success", "lanes", "exact", "rows"}
 
 
 def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_path):
