@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 
 from agents.sweep.plan import HeatMap, Range, load_sweep
-from agents.sweep.work import tasks_of
+from agents.training.configuration import TrainingSettings, override
 
 WHOLE = """
 [base]
@@ -145,9 +145,8 @@ def test_odd_values_and_names_without_effect_are_refused_with_what_is_allowed(sw
 
 
 def test_layers_of_a_trained_network_may_be_set(sweep):
-    pytest.importorskip("torch")
-    found = sweep("[base]\ntrain = 'circle_quick'\n'training.hidden' = [8, 16]")
-    assert tasks_of({}, found)[0].settings["training"]["hidden"] == [8, 16]
+    base = sweep("[base]\ntrain = 'circle_quick'\n'training.hidden' = [8, 16]").base
+    assert override(TrainingSettings(), hidden=base["training.hidden"]).hidden == (8, 16)
 
 
 def test_a_grid_is_refused_before_it_takes_memory(sweep):
