@@ -9,33 +9,25 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-NAMES = ("environment", "controller", "policy", "sensors", "randomize", "reference", "user_force", "train")
-"""What may vary as a whole."""
-
-GROUPS = {
-    "rig": "a parameter of the rig as it is",
-    "believed": "one of the rig as its controller believes it, and as it is unless [rig] says otherwise",
-    "gain": "an option of the controller",
-    "training": "a setting of the training",
-    "residual": "what the residual may do",
-}
-"""First part of a dotted name -> what the rest is."""
-
-FIXED = {"episodes": 32, "seed": 0, "parameters": None}
-"""What only [base] may have, and its default: episodes a point, the seed of the first, and a TOML file of the believed rig."""
+from agents.sweep.names import FIXED, NAMES, check_name, check_together, check_value
+from baselines.bench.metrics import UNITS
+from birthsim_env.assembly import one_of
+from birthsim_env.physics.rig.reading import named, read_toml
+from birthsim_env.physics.rig.values import is_within, shown
 
 DEFAULTS = {"environment": "BirthSIM/Circle-v1", "controller": "backstepping", "sensors": "ideal", "randomize": True}
 
 MOST_POINTS = 1_000_000
 """Of a sweep, assumed: more is a mistyped number."""
+
+LARGEST_SEED = 2**32 - 1
 
 Point = dict[str, Any]
 """Name -> value, of all that varies."""
@@ -98,46 +90,60 @@ class Sweep:
 
 def load_sweep(path: Path) -> Sweep:
     """The sweep in a TOML file; ``ValueError`` names the file and what in it cannot be."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ValueError(f"sweep {str(path)!r} is no file; allowed: a TOML file") from None
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"sweep {str(path)!r} is no TOML: {error}") from error
+    content = read_toml("sweep", path)
     try:
         return _sweep(content)
     except ValueError as error:
-        raise ValueError(f"sweep {str(path)!r}: {error}") from error
+        raise ValueError(f"sweep = {named(path)}: {error}") from error
 
 
 def _sweep(content: dict[str, Any]) -> Sweep:
     tables = {"base": dict, "grid": dict, "draw": dict, "search": dict, "map": list}
     for name, value in content.items():
         if not isinstance(value, tables.get(name, ())):
-            raise ValueError(f"{name!r}; allowed: [base], [grid], [draw], [search] and [[map]]")
+            raise ValueError(f"{shown(name)}; allowed: [base], [grid], [draw], [search] and [[map]]")
     given = content.get("base", {})
-    for name in given:
+    for name, value in given.items():
         if name not in FIXED:
-            _check_name(name)
+            check_name(name)
+            check_value(name, value)
     base = {**FIXED, **DEFAULTS, **given}
-    for name, least in (("episodes", 1), ("seed", 0)):
-        _whole(f"[base] {name}", base[name], least)
-    points = _drawn(_grid(content.get("grid", {})), content.get("draw", {}))
-    search = _search(content["search"]) if "search" in content else None
-    varied = {*points[0], *(search.ranges if search else ())}
+    for name, least, most in (("episodes", 1, MOST_POINTS), ("seed", 0, LARGEST_SEED)):
+        _whole(f"[base] {name}", base[name], least, most)
+    grid = _grid(content.get("grid", {}))
+    points = _drawn(grid, content.get("draw", {}))
+    search = _search(content["search"], len(points)) if "search" in content else None
+    draws, ranges = content.get("draw", {}).keys() - _DRAWN.keys(), search.ranges.keys() if search else set()
+    stated: set[str] = set()
+    for table, names in (("base", given.keys()), ("grid", grid[0].keys()), ("draw", draws), ("search", ranges)):
+        if twice := sorted(stated & names):
+            raise ValueError(f"[{table}] {twice[0]} stands in another table too; allowed: once")
+        stated |= names
+    controllers = [one["controller"] for one in (given, *points) if "controller" in one]
+    check_together(sorted(stated), set(controllers))
+    varied = {*points[0], *ranges}
     return Sweep(base, points, [_map(entry, varied) for entry in content.get("map", [])], search)
 
 
+def _axis(table: str, name: str, entry: Any) -> Range | list[Any]:
+    """What a table gives for a name: a range, or for all but a search values."""
+    check_name(name)
+    if isinstance(entry, dict) and name not in NAMES:
+        return _range(name, entry, table == "grid")
+    if table == "search" or not isinstance(entry, list) or not entry:
+        lists = "" if table == "search" else "a list of values, or for numbers "
+        raise ValueError(f"[{table}] {name} = {shown(entry)}; allowed: {lists}{_form(table == 'grid')}")
+    for value in entry:
+        check_value(name, value)
+    return entry
+
+
 def _grid(table: dict[str, Any]) -> list[Point]:
-    axes = {}
-    for name, entry in table.items():
-        _check_name(name)
-        axes[name] = _range(name, entry, True).values() if isinstance(entry, dict) else entry
-        if not isinstance(axes[name], list) or not axes[name]:
-            raise ValueError(f"[grid] {name} = {entry!r}; allowed: a list of values, or {{ from, to, count, log }}")
-    if math.prod(len(values) for values in axes.values()) > MOST_POINTS:
+    axes = {name: _axis("grid", name, entry) for name, entry in table.items()}
+    if math.prod((axis.count or 1) if isinstance(axis, Range) else len(axis) for axis in axes.values()) > MOST_POINTS:
         raise ValueError(f"[grid] has more than {MOST_POINTS} points; allowed: fewer values")
-    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+    values = [axis.values() if isinstance(axis, Range) else axis for axis in axes.values()]
+    return [dict(zip(axes, chosen, strict=True)) for chosen in itertools.product(*values)]
 
 
 def _drawn(points: list[Point], table: dict[str, Any]) -> list[Point]:
@@ -145,17 +151,10 @@ def _drawn(points: list[Point], table: dict[str, Any]) -> list[Point]:
     if not table:
         return points
     rest = dict(table)
-    count, seed = _whole("[draw] count", rest.pop("count", None), 1), _whole("[draw] seed", rest.pop("seed", 0), 0)
+    count, seed = (_whole(f"[draw] {name}", rest.pop(name, default), least) for name, (default, least) in _DRAWN.items())
     if count * len(points) > MOST_POINTS:
         raise ValueError(f"[draw] count = {count} makes {count * len(points)} points; allowed: at most {MOST_POINTS}")
-    axes: dict[str, Range | list[Any]] = {}
-    for name, entry in rest.items():
-        _check_name(name)
-        axes[name] = _range(name, entry, False) if isinstance(entry, dict) else entry
-        if isinstance(entry, list) and entry:
-            continue
-        if not isinstance(entry, dict):
-            raise ValueError(f"[draw] {name} = {entry!r}; allowed: a list to choose from, or {{ from, to, log }}")
+    axes = {name: _axis("draw", name, entry) for name, entry in rest.items()}
     draws = []
     for number in range(count):
         places = np.random.default_rng([seed, number]).random(len(axes))
@@ -166,58 +165,59 @@ def _drawn(points: list[Point], table: dict[str, Any]) -> list[Point]:
     return [{**point, **draw} for point in points for draw in draws]
 
 
-def _search(table: dict[str, Any]) -> Search:
+def _search(table: dict[str, Any], points: int) -> Search:
     rest = dict(table)
     numbers = {name: _whole(f"[search] {name}", rest.pop(name), least) for name, least in _NUMBERS.items() if name in rest}
-    words = {name: str(rest.pop(name)) for name in ("metric", "statistic") if name in rest}
-    ranges = {}
-    for name, entry in rest.items():
-        _check_name(name)
-        if not isinstance(entry, dict):
-            raise ValueError(f"[search] {name} = {entry!r}; allowed: {{ from, to, log }}")
-        ranges[name] = _range(name, entry, False)
+    words = {name: rest.pop(name) for name in _SHOWN if name in rest}
+    _check_shown("[search]", words)
+    ranges: dict[str, Any] = {name: _axis("search", name, entry) for name, entry in rest.items()}
     if not ranges:
         raise ValueError("[search] has no ranges; allowed: names with { from, to, log }")
-    return Search(ranges, **numbers, **words)  # type: ignore[arg-type]
+    search = Search(ranges, **numbers, **words)  # type: ignore[arg-type]
+    if search.trials * points > MOST_POINTS:
+        raise ValueError(f"[search] trials = {search.trials} of {points} points each; allowed: at most {MOST_POINTS} together")
+    return search
 
 
+_DRAWN = {"count": (None, 1), "seed": (0, 0)}
 _NUMBERS = {"trials": 1, "batch": 1, "seed": 0}
+_SHOWN = {"metric": tuple(UNITS), "statistic": ("median", "mean", "q95", "max")}
 
 
-def _map(entry: Any, varied: Sequence[str] | set[str]) -> HeatMap:
-    known = {"x", "y", "metric", "statistic", "per"}
-    if not isinstance(entry, dict) or not {"x", "y"} <= set(entry) <= known:
-        raise ValueError(f"[[map]] {entry!r}; allowed: x, y and perhaps metric, statistic, per")
+def _check_shown(table: str, words: dict[str, Any]) -> None:
+    for name, allowed in _SHOWN.items():
+        if name in words:
+            one_of(f"{table} {name}", words[name], allowed)
+
+
+def _map(entry: Any, varied: Collection[str]) -> HeatMap:
+    if not isinstance(entry, dict) or not {"x", "y"} <= set(entry) <= {"x", "y", "per", *_SHOWN}:
+        raise ValueError(f"[[map]] {shown(entry)}; allowed: x, y and perhaps metric, statistic, per")
     for side in ("x", "y", "per"):
-        if side in entry and entry[side] not in varied:
-            raise ValueError(f"[[map]] {side} = {entry[side]!r}; allowed: what varies, {', '.join(sorted(varied))}")
+        if side in entry and not (isinstance(entry[side], str) and entry[side] in varied):
+            raise ValueError(f"[[map]] {side} = {shown(entry[side])}; allowed: what varies, {', '.join(sorted(varied))}")
+    _check_shown("[[map]]", entry)
     return HeatMap(**entry)
 
 
-def _check_name(name: str) -> None:
-    group, dot, rest = name.partition(".")
-    if name not in NAMES and not (group in GROUPS and dot and rest):
-        groups = ", ".join(f'"{group}.NAME"' for group in GROUPS)
-        raise ValueError(f"{name!r}; allowed: {', '.join(NAMES)}, {groups}; in [base] also {', '.join(FIXED)}")
+def _form(counted: bool) -> str:
+    return "{ from, to, count, log }" if counted else "{ from, to, log }"
 
 
 def _range(name: str, entry: dict[str, Any], counted: bool) -> Range:
-    allowed = "{ from, to, count, log }" if counted else "{ from, to, log }"
-    numbers = [entry.get("from"), entry.get("to")]
-    if not set(entry) <= {"from", "to", "log", *(("count",) if counted else ())} or not all(map(_is_number, numbers)):
-        raise ValueError(f"{name} = {entry!r}; allowed: {allowed}")
-    low, high = float(numbers[0]), float(numbers[1])  # type: ignore[arg-type]
-    if not low < high or (entry.get("log") and low <= 0):
-        raise ValueError(f"{name} = {entry!r}; allowed: from below to, and from above 0 with log")
+    low, high, log = entry.get("from"), entry.get("to"), entry.get("log", False)
+    known = {"from", "to", "log", *(("count",) if counted else ())}
+    if not set(entry) <= known or not all(is_within(bound, least=-1e300, most=1e300) for bound in (low, high)):
+        raise ValueError(f"{name} = {shown(entry)}; allowed: {_form(counted)}, from and to numbers")
+    if not isinstance(log, bool):
+        raise ValueError(f"{name} log = {shown(log)}; allowed: true, false")
+    if not float(low) < float(high) or (log and low <= 0):  # type: ignore[arg-type,operator]
+        raise ValueError(f"{name} = {shown(entry)}; allowed: from below to, and from above 0 with log")
     count = _whole(f"{name} count", entry.get("count"), 2, MOST_POINTS) if counted else None
-    return Range(low, high, count, bool(entry.get("log", False)))
+    return Range(float(low), float(high), count, log)  # type: ignore[arg-type]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
-
-
-def _whole(name: str, value: Any, least: int, most: int = 2**32 - 1) -> int:
+def _whole(name: str, value: Any, least: int, most: int = LARGEST_SEED) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise ValueError(f"{name} = {value!r}; allowed: a whole number from {least} to {most}")
+        raise ValueError(f"{name} = {shown(value)}; allowed: a whole number from {least} to {most}")
     return value

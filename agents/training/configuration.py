@@ -117,8 +117,6 @@ def load_configuration(name: str | Path) -> tuple[TrainingSettings, ResidualSett
         if not isinstance(content[table], dict):
             raise ValueError(f"configuration = {str(path)!r}: {table} = {shown(content[table])}; allowed: a table [{table}]")
     training, residual = content.get("training", {}), content.get("residual", {})
-    if isinstance(training.get("hidden"), list):
-        training["hidden"] = tuple(training["hidden"])
     try:
         return override(TrainingSettings(), **training), override(ResidualSettings(), **residual)
     except ValueError as error:
@@ -126,9 +124,10 @@ def load_configuration(name: str | Path) -> tuple[TrainingSettings, ResidualSett
 
 
 def override(settings: S, **values: Any) -> S:
-    """``settings`` with other values; raises ``ValueError`` for names that they have not."""
+    """``settings`` with other values, lists as tuples; raises ``ValueError`` for names that they have not."""
     known = [field.name for field in fields(settings)]
-    for name in values:
+    for name, value in values.items():
         if name not in known:
-            raise ValueError(f"{in_line(name)} = {shown(values[name])} is unknown; allowed: {', '.join(known)}")
+            raise ValueError(f"{in_line(name)} = {shown(value)} is unknown; allowed: {', '.join(known)}")
+        values[name] = tuple(value) if isinstance(value, list) else value
     return replace(settings, **values)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-from collections.abc import Callable
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,13 @@ from birthsim_env.physics.rig.reading import read
 from birthsim_env.physics.rig.values import in_line, problem, shown
 
 LARGEST = 512 * 2**20
-"""Bytes of a log; an hour at 1 kHz takes some 400 MB as CSV."""
+"""Bytes of a log, of its numbers in memory, and of what a packed one holds; an hour at 1 kHz takes some 400 MB as CSV."""
+
+LONGEST = 2**20
+"""Bytes of a line or a message."""
+
+BATCH = 2**16
+"""Rows that are unpacked at a time."""
 
 
 @dataclass(frozen=True)
@@ -44,32 +50,55 @@ def read_table(path: Path) -> Table:
 def read_csv(path: Path) -> Table:
     """The table of a CSV file whose first line names the columns; lines that begin with # are left out."""
     source = f"log = {str(path)!r}"
+    names: list[str] = []
+    numbers = array("d")
     try:
-        text = read("log", path, LARGEST).decode("utf-8-sig")
-        lines = [
-            (number, line)
-            for number, line in enumerate(csv.reader(io.StringIO(text, newline="")), start=1)
-            if line and not line[0].lstrip().startswith("#")
-        ]
+        for number, text in enumerate(_lines(read("log", path, LARGEST)), start=1):
+            # Line by line: no number has a quoted end of a line in it, and an open quote would gather all that follow.
+            line = next(csv.reader([text]), [])
+            if not line or line[0].lstrip().startswith("#"):
+                continue
+            if names:
+                numbers.extend(_row(source, number, line, names))
+                _check_size(source, len(numbers))
+                continue
+            names = [name.strip() for name in line]
+            _check_names(source, names)
     except (UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{source} is no CSV ({problem(error)})") from error
-    if not lines:
+    if not names:
         raise ValueError(f"{source} is empty; allowed: a line of names, then lines of numbers")
-    names = [name.strip() for name in lines[0][1]]
+    return Table(source, dict(zip(names, np.frombuffer(numbers).reshape(-1, len(names)).T, strict=True)))
+
+
+def _lines(content: bytes) -> Iterator[str]:
+    text = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig", newline="")
+    while line := text.readline(LONGEST + 1):
+        if len(line) > LONGEST:
+            raise csv.Error(f"a line is longer than allowed: at most {LONGEST} characters")
+        yield line
+
+
+def _row(source: str, number: int, line: list[str], names: list[str]) -> list[float]:
+    try:
+        row = [float(value) if value.strip() else np.nan for value in line]
+    except ValueError:
+        row = []
+    if len(row) != len(names):
+        words = f"allowed: {len(names)} numbers, for {', '.join(names)}"
+        raise ValueError(f"{source}, line {number}: {shown(','.join(line))}; {in_line(words)}")
+    return row
+
+
+def _check_names(source: str, names: list[str]) -> None:
     if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
+        twice = next(name for name, count in Counter(names).items() if count > 1)
         raise ValueError(f"{source} has two columns {twice!r}; allowed: one of each name")
-    rows = np.empty((len(lines) - 1, len(names)))
-    for row, (number, line) in zip(rows, lines[1:], strict=True):
-        try:
-            numbers = [float(value) if value.strip() else np.nan for value in line]
-        except ValueError:
-            numbers = []
-        if len(numbers) != len(names):
-            words = f"allowed: {len(names)} numbers, for {', '.join(names)}"
-            raise ValueError(f"{source}, line {number}: {shown(','.join(line))}; {in_line(words)}")
-        row[:] = numbers
-    return Table(source, dict(zip(names, rows.T, strict=True)))
+
+
+def _check_size(source: str, numbers: int) -> None:
+    if 8 * numbers > LARGEST:
+        raise ValueError(f"{source} has at least {numbers} numbers; allowed: {LARGEST // 8}, which take {LARGEST} bytes")
 
 
 def _read_parquet(path: Path) -> Table:
@@ -80,14 +109,23 @@ def _read_parquet(path: Path) -> Table:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
+    kinds = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean)
     try:
-        table = pq.read_table(pa.BufferReader(content))
-        kinds = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean)
-        columns = {
-            field.name: table.column(field.name).to_numpy().astype(np.float64)
-            for field in table.schema
-            if any(kind(field.type) for kind in kinds)
-        }
+        file = pq.ParquetFile(pa.BufferReader(content))
+        names = [field.name for field in file.schema_arrow if any(kind(field.type) for kind in kinds)]
+        _check_names(source, names)
+        _check_size(source, file.metadata.num_rows * len(names))
+        columns = {name: np.empty(file.metadata.num_rows) for name in names}
+        for name, column in columns.items():
+            place = 0
+            for batch in file.iter_batches(BATCH, columns=[name]):
+                part = batch.column(name).to_numpy(zero_copy_only=False)[: len(column) - place]
+                column[place : place + len(part)] = part.astype(np.float64)
+                place += len(batch)
+                if place > len(column):
+                    break
+            if place != len(column):
+                raise pa.ArrowInvalid(f"column {name} has {place} rows, the file says {len(column)}")
     except (pa.ArrowException, OSError) as error:
         raise ValueError(f"{source} is no Parquet ({problem(error)})") from error
     return Table(source, columns)
@@ -98,23 +136,28 @@ def _read_mcap(path: Path) -> Table:
     source = f"log = {str(path)!r}"
     content = read("log", path, LARGEST)
     try:
-        from mcap.reader import make_reader
+        from baselines.logs.messages import json_messages
     except ImportError as error:
         raise ValueError(f"{error}; logs need the extra: pip install 'birthsim[log]'") from error
-    rows: dict[str, list[dict[str, Any]]] = {}
+    topics: dict[str, tuple[list[str], array[float], array[int]]] = {}
+    size = 0
     try:
-        for _, channel, message in make_reader(io.BytesIO(content)).iter_messages():
-            if channel.message_encoding != "json":
-                raise ValueError(f"channel {channel.topic} has messages in {channel.message_encoding}; allowed: json")
-            said = json.loads(message.data)
-            rows.setdefault(channel.topic, []).append({"log_time": 1e-9 * message.log_time, **said})
+        for topic, time, message in json_messages(content, LARGEST, LONGEST):
+            said = {"log_time": 1e-9 * time, **message}
+            if topic not in topics:
+                names = [name for name, value in said.items() if isinstance(value, (int, float))]
+                topics[topic] = names, array("d"), array("Q")
+            names, numbers, order = topics[topic]
+            numbers.extend(_number(said.get(name)) for name in names)
+            order.append(time)
+            size += len(names) + 1
+            _check_size(source, size)
     except Exception as error:
         # Damage trips mcap, struct, its compressors and json in a dozen ways.
         raise ValueError(f"{source} cannot be read as MCAP ({problem(error)})") from error
-    longest = max(rows.values(), key=len, default=[])
-    names = [name for name, value in longest[0].items() if isinstance(value, (int, float))] if longest else []
-    columns = {name: np.array([_number(row.get(name)) for row in longest]) for name in names}
-    return Table(source, columns)
+    names, numbers, order = max(topics.values(), key=lambda topic: len(topic[2]), default=([], array("d"), array("Q")))
+    rows = np.frombuffer(numbers).reshape(len(order), len(names))
+    return Table(source, dict(zip(names, rows[np.argsort(order, kind="stable")].T, strict=True)))
 
 
 def _number(value: object) -> float:

@@ -26,6 +26,8 @@ instant comes in just before."""
 _OPENINGS = range(WORLD + OPENING, WORLD + SHOWN)
 _FORCES = range(FORCE, FORCE + 2)
 _REFERENCE = range(WORLD + REFERENCE, WORLD + REFERENCE + REFERENCES)
+_MOST_FORCE = 1e4
+"""N, assumed: several times what the cylinders of any such rig push with; more is a mistake of the tool that sets it."""
 _TRUTH = range(STATE, STATE + STATES), range(MOTION, MOTION + 4)
 _MEASURED = (range(WORLD + POSITION, WORLD + REFERENCE),)
 
@@ -79,8 +81,9 @@ def _parameter(name: str, rig: Parameters) -> Variable:
 
 
 def _variable(row: Row, causality: str, start: Array) -> Variable:
-    least, most = (-1.0, 1.0) if causality == "input" and row.number in _OPENINGS else (-math.inf, math.inf)
-    return Variable(row.name, causality, row.unit, row.about, float(start[row.number]), least, most)
+    limit = 1.0 if row.number in _OPENINGS else _MOST_FORCE if row.number in _FORCES else math.inf
+    limit = limit if causality == "input" else math.inf
+    return Variable(row.name, causality, row.unit, row.about, float(start[row.number]), -limit, limit)
 
 
 def _header(model: Description, rows: list[Row], words: int, rig: Parameters) -> str:

@@ -63,7 +63,7 @@ def _live(arguments: argparse.Namespace) -> None:
         session.advance(1)  # compiles what is not cached yet, before anybody looks
         session.reset()
         hub = LiveHub(session, arguments.record_dir)
-        serve(hub, listening, arguments.host, "birthsim-live", arguments.record_dir)
+        serve(hub, listening, arguments.host, "birthsim-live", arguments.request_time, arguments.record_dir)
 
 
 def _check(policies: Sequence[str], rig: Parameters) -> None:

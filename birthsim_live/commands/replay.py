@@ -31,7 +31,8 @@ def _replay(arguments: argparse.Namespace) -> None:
     with listen(arguments.host, arguments.port) as listening:
         recording = load_recording(arguments.file)
         title = f"birthsim-replay {arguments.file.name}, {recording.duration:.1f} s"
-        serve(ReplayHub(Player(recording), arguments.file.name), listening, arguments.host, title)
+        hub = ReplayHub(Player(recording), arguments.file.name)
+        serve(hub, listening, arguments.host, title, arguments.request_time)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from baselines.commands.shared import finite_number
 from baselines.commands.start import endings
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
@@ -18,17 +19,24 @@ from birthsim_live.server.addresses import LOOPBACK, is_loopback
 if TYPE_CHECKING:
     from birthsim_live.server.hub import Hub
 
-LARGEST = 1 << 20
-"""Bytes of a message that is still answered by an error; a larger one closes the socket."""
+REQUEST_TIME = 10.0
+"""s, assumed, in which a request must arrive."""
 
 
 def add_address(parser: argparse.ArgumentParser, port: int) -> None:
-    """The options --port and --host."""
+    """The options --port, --host and --request-time."""
     parser.add_argument("--port", type=port_number, default=port, help="0 takes any that is free (default: %(default)s)")
     parser.add_argument(
         "--host",
         default="127.0.0.1",
         help="address or name to serve; other than the loopback it lets in everybody who can reach it (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--request-time",
+        type=request_time,
+        default=REQUEST_TIME,
+        metavar="S",
+        help="seconds in which a request must arrive; then its connection is closed (default: %(default)g)",
     )
 
 
@@ -50,11 +58,22 @@ def need_server() -> None:
         raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
 
 
-def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings: Path | None = None) -> None:
+def request_time(text: str) -> float:
+    """A time for a request, s, for argparse."""
+    seconds = finite_number(text)
+    if not 0 < seconds <= 3600:
+        raise argparse.ArgumentTypeError(f"{shown(text)}; allowed: a number of seconds > 0 and <= 3600")
+    return seconds
+
+
+def serve(
+    hub: Hub, listening: socket.socket, host: str, title: str, request_time: float, recordings: Path | None = None
+) -> None:
     """Serve a hub on a socket of ``listen``, by the name ``host``, until a signal asks it to end; after ``need_server``."""
     import uvicorn
 
     from birthsim_live.server.app import create_app
+    from birthsim_live.server.connections import configured
 
     loopback = is_loopback(host)
     shown = f"[{host}]" if ":" in host else host
@@ -66,10 +85,6 @@ def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings:
             flush=True,
         )
     app = create_app(hub, {host, *LOOPBACK} if loopback else {host}, recordings)
-    options = uvicorn.Config(
-        app, log_level="warning", ws="websockets-sansio", ws_max_size=LARGEST, ws_per_message_deflate=False,
-        timeout_graceful_shutdown=1, proxy_headers=False, server_header=False,
-    )  # fmt: skip
 
     class Server(uvicorn.Server):
         """Closes the hub at the first signal, and ends at once at the second, when recordings lack half a second at most."""
@@ -80,7 +95,7 @@ def serve(hub: Hub, listening: socket.socket, host: str, title: str, recordings:
                 os._exit(128 + sig)
             super().handle_exit(sig, frame)
 
-    server = Server(options)
+    server = Server(configured(app, request_time))
     if hasattr(signal, "SIGHUP"):
         # As the server does with SIGTERM: the hub is closed before the command ends.
         signal.signal(signal.SIGHUP, lambda _, frame: server.handle_exit(signal.SIGTERM, frame))

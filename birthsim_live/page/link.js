@@ -3,11 +3,16 @@
 const GAP = 500; // ms between changes of the address; browsers allow a hundred in half a minute
 const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
 
-/** The settings that an address asks for; what is no setting is refused by the rig, by name. */
+/** The settings that an address asks for; what is no setting, or cannot be read as one, is refused by the rig, by name. */
 export function settingsIn(search, defaults) {
-  const value = (name, text) =>
-    typeof defaults[name] === "number" ? Number(text) : typeof defaults[name] === "boolean" ? text === "true" : text;
-  return Object.fromEntries([...new URLSearchParams(search)].map(([name, text]) => [name, value(name, text)]));
+  return Object.fromEntries([...new URLSearchParams(search)].map(([name, text]) => [name, read(text, typeof defaults[name])]));
+}
+
+/** A value of a type; the text itself where it is none. */
+function read(text, type) {
+  if (type === "boolean" && ["true", "false"].includes(text)) return text === "true";
+  // Number("") is 0, and what is not finite would be null in a message.
+  return type === "number" && text.trim() && Number.isFinite(Number(text)) ? Number(text) : text;
 }
 
 /** What stands in an address for settings. */

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import threading
 from io import FileIO
@@ -15,7 +16,7 @@ import birthsim_env
 from baselines.work.files import whole_file
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_live.rig.frames import COLUMNS, FIELDS
-from birthsim_live.rig.recording import FORMAT, packed
+from birthsim_live.rig.recording import FORMAT, WORDS, packed
 
 if TYPE_CHECKING:
     from birthsim_live.rig.session import Session
@@ -28,6 +29,9 @@ EVERY = 4
 
 LONGEST = 600.0
 """s, assumed: a recording ends by itself."""
+
+MOST_WORDS = WORDS // 2
+"""Bytes of JSON, without rows' numbers, after which a recording ends by itself: a chunk more can still be read back."""
 
 BETWEEN = 0.5
 """s of wall time between two chunks: what a kill costs at most."""
@@ -46,7 +50,7 @@ class Recorder:
         self._rows: list[Array] = []
         self._events: list[dict[str, Any]] = []
         self._known: dict[str, Any] = {"second_lost": None}
-        self._paths, self._periods, self._count, self._length = -1, 0, 0, 0
+        self._paths, self._periods, self._count, self._length, self._words = -1, 0, 0, 0, 0
         self._notes, self._disk = threading.Lock(), threading.Lock()
         self._file: FileIO | None = None
         self._first = b""
@@ -61,8 +65,8 @@ class Recorder:
 
     @property
     def full(self) -> bool:
-        """True at ``LONGEST``, and where the disk takes no more: ``problem`` says why."""
-        return self.seconds >= LONGEST or self.problem is not None
+        """True at ``LONGEST``, at ``MOST_WORDS``, and where the disk takes no more: ``problem`` says why."""
+        return self.seconds >= LONGEST or self._words >= MOST_WORDS or self.problem is not None
 
     def take(self, session: Session) -> None:
         """Take note of the present control period."""
@@ -82,6 +86,7 @@ class Recorder:
     def _note(self, kind: str, value: Any) -> None:
         if kind not in self._known or self._known[kind] != value:
             self._known[kind] = value
+            self._words += len(json.dumps(value))
             self._events.append({"row": self._count, kind: value})
 
     def open(self) -> None:

@@ -26,6 +26,7 @@ import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.reading import read
 from birthsim_live.rig.frames import COLUMNS, FIELDS
 
 FORMAT = "birthsim-recording-3"
@@ -36,7 +37,11 @@ RIGS = {"birthsim-recording-2": 1, FORMAT: 2}
 SUFFIX = ".rec"
 
 LARGEST = 2**27
-"""Bytes, unpacked, that a file may hold."""
+"""Bytes that a file may have, and may hold unpacked."""
+
+WORDS, BRACKETS, CHUNKS = 2**24, 2**20, 2**17
+"""Of JSON that a file may hold: bytes, and lists and objects, each of which takes many times its bytes in memory; and chunks.
+A minute with a slider that never rests is 2 MB, ten minutes at a twentieth of real time are 24,000 chunks."""
 
 EVENTS = ("settings", "path", "lost", "second_lost")
 
@@ -72,15 +77,14 @@ def packed(said: dict[str, Any], rows: Array | None = None) -> bytes:
 
 def load_recording(path: str | Path) -> Recording:
     """Read a file; raises ``ValueError`` naming it and what is missing, damaged or foreign."""
+    content = read("recording", path, LARGEST)
     try:
-        chunks = list(_unpacked(Path(path).read_bytes()))
+        chunks = list(_unpacked(content))
         if not chunks:
             raise ValueError("no chunk is whole")
         header = chunks[0][0]
         events = [event for said, _ in chunks[1:] for event in said["events"]]
         return _checked(np.concatenate([numbers for _, numbers in chunks]), header, events)
-    except OSError as error:
-        raise ValueError(f"recording = {str(path)!r} cannot be read: {error.strerror or error}") from error
     except Exception as error:
         # Damage trips struct, zlib, json and NumPy in a dozen ways.
         raise ValueError(
@@ -90,7 +94,7 @@ def load_recording(path: str | Path) -> Recording:
 
 def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
     """What the chunks say, and the numbers of their rows; the last one is left out where it is not whole."""
-    place, claimed = 0, 0
+    place, claimed, chunks, words, brackets = 0, 0, 0, 0, 0
     while place + _HEAD.size <= len(content):
         length, digest = _HEAD.unpack_from(content, place)
         begin, place = place + _HEAD.size, place + _HEAD.size + length
@@ -105,6 +109,14 @@ def _unpacked(content: bytes) -> Iterator[tuple[Any, Array]]:
         if claimed > LARGEST:
             raise ValueError(f"it holds more than {LARGEST} bytes; allowed: up to {LARGEST}")
         said, _, rows = raw.partition(b"\n")
+        chunks, words, brackets = chunks + 1, words + len(said), brackets + said.count(b"[") + said.count(b"{")
+        for name, count, most in (
+            ("chunks", chunks, CHUNKS),
+            ("bytes of JSON", words, WORDS),
+            ("brackets", brackets, BRACKETS),
+        ):
+            if count > most:
+                raise ValueError(f"it holds more than {most} {name}; allowed: up to {most}")
         yield json.loads(said), np.frombuffer(rows, dtype="<f8").astype(np.float64)
 
 

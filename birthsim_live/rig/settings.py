@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError, create_model
 
 from baselines import about
 from baselines.registry import CONTROLLERS, controller_names
@@ -16,6 +16,7 @@ from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.rig.values import is_within
 
 STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
 """Settings that take the place of the scenario's setpoints, in the order of a reference's rows 8 to 11."""
@@ -161,15 +162,15 @@ class Choices:
         return check
 
 
-def within(low: float, high: float, unit: str = "") -> AfterValidator:
-    """A pydantic check that a number is from ``low`` to ``high``."""
+def within(low: float, high: float, unit: str = "") -> BeforeValidator:
+    """A pydantic check that a value is a number from ``low`` to ``high``."""
 
-    def check(value: float) -> float:
-        if not low <= value <= high:
+    def check(value: object) -> object:
+        if not is_within(value, least=low, most=high):
             raise ValueError(f"{low:g} to {high:g} {unit}".rstrip())
         return value
 
-    return AfterValidator(check)
+    return BeforeValidator(check)
 
 
 def refusal(error: ValidationError, names: str = "without it") -> str:
@@ -183,6 +184,8 @@ def refusal(error: ValidationError, names: str = "without it") -> str:
             return f"{name} is missing; allowed: a message with it"
         case "extra_forbidden":
             return f"{name[:60]} is unknown; allowed: {names}"
+        case "bool_type":
+            allowed = "true, false"
     for start in ("Value error, ", "Input should be "):
         allowed = allowed.removeprefix(start)
     return f"{name or 'message'} = {value if len(value) <= 60 else value[:57] + '...'}; allowed: {allowed}"

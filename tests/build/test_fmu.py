@@ -244,7 +244,16 @@ def test_a_state_comes_back_and_goes_through_bytes(written, unit, version):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("opening_P1", 1.5), ("force_x", np.inf), ("force_y", np.nan), ("rig.mechanics.mass", 4.0), ("x", 0.0), ("time", 1.0)],
+    [
+        ("opening_P1", 1.5),
+        ("force_x", np.inf),
+        ("force_x", 1e308),
+        ("force_y", -10_001.0),
+        ("force_y", np.nan),
+        ("rig.mechanics.mass", 4.0),
+        ("x", 0.0),
+        ("time", 1.0),
+    ],
 )
 def test_what_must_not_be_set_in_a_simulation_is_refused_and_changes_nothing(written, unit, name, value):
     one = unit(written("--fmi", 2))
@@ -253,6 +262,19 @@ def test_what_must_not_be_set_in_a_simulation_is_refused_and_changes_nothing(wri
     with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
         one.set([name], [value])
     assert one.get([name]) == before
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_inputs_say_their_limits_and_are_accepted_at_them(written, unit, version):
+    path = written("--fmi", version)
+    said = {one.name: (one.min, one.max) for one in fmpy.read_model_description(path).modelVariables}
+    assert {tuple(map(float, said[name])) for name in FORCES} == {(-1e4, 1e4)}
+    assert said["measured_x"] == (None, None)
+    one = unit(path)
+    one.set(FORCES, [-1e4, 1e4])
+    one.step()
+    assert one.get(FORCES).tolist() == [-1e4, 1e4]
+    assert np.isfinite(one.get(STATE_NAMES)).all()
 
 
 def test_setpoints_that_the_law_cannot_serve_are_refused_and_a_saved_state_goes_on(written, unit):

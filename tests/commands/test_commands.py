@@ -107,7 +107,7 @@ BAD = [
     ("evaluate", ("--no-studies",), "--no-studies and --studies-only; allowed: with --all"),
     ("evaluate", ("--cluster", "slurm"), "--cluster: 'slurm'; allowed: ray, or ray:ADDRESS of a running cluster"),
     ("evaluate", ("--cluster", "ray:"), "--cluster: 'ray:'; allowed: ray, or ray:ADDRESS of a running cluster"),
-    ("sweep", ("nowhere.toml",), "sweep 'nowhere.toml' is no file; allowed: a TOML file"),
+    ("sweep", ("nowhere.toml",), "sweep = 'nowhere.toml' cannot be read: "),
     ("sweep", ("{tmp}/own.py",), "own.py' is no TOML: "),
     ("sweep", ("{tmp}/rig.toml",), "rig.toml': 'mechanics'; allowed: [base], [grid], [draw], [search] and [[map]]"),
     ("evaluate", ("--all", "--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),

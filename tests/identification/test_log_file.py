@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 
 from baselines.identification.log_file import COLUMNS, FORCES, read_trial, write_trial
+from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import read_table
+from baselines.logs.writing import write_log
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.identification.trials import OWNER, part, trial
@@ -175,6 +178,43 @@ def test_what_is_wrong_with_a_file_is_named(name: str, content: bytes | None, wo
     with pytest.raises(ValueError, match=re.escape(words)) as error:
         read_table(tmp_path / name)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
+def test_what_would_take_too_much_memory_is_refused(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = {"time": np.arange(5000.0), "a": np.zeros(5000)}
+    path = tmp_path / f"log{suffix}"
+    if suffix == ".csv":
+        path.write_text("time,a\n" + ",\n" * 5000)
+    else:
+        pytest.importorskip("mcap.writer" if suffix == ".mcap" else "pyarrow")
+        columns = {name: Column("1", "") for name in rows}
+        write_log(Log(columns, [Series("/rig", rows["time"], rows)], [], {}), path)
+    assert len(read_table(path).columns["a"]) == 5000
+    most = path.stat().st_size + 1000
+    monkeypatch.setattr("baselines.logs.table.LARGEST", most)
+    with pytest.raises(ValueError, match=rf"log{re.escape(suffix)}'.*allowed"):
+        read_table(path)
+
+
+def test_a_csv_file_takes_little_more_memory_than_its_bytes_and_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "log.csv").write_text("time,a\n" + "0.123456,0.123456\n" * 20_000)
+    size = (tmp_path / "log.csv").stat().st_size
+    monkeypatch.setattr("baselines.logs.table.LARGEST", 2 * size)  # which reading sets aside at first
+    tracemalloc.start()
+    table = read_table(tmp_path / "log.csv")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(table.columns["a"]) == 20_000
+    assert peak < 2 * (size + 8 * 2 * 20_000)
+
+
+def test_an_endless_line_is_refused_before_it_is_split(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,a\n" + "1," * 2**20)
+    with pytest.raises(ValueError, match=r"log\.csv'.* allowed: at most 1048576"):
+        read_table(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("value", [None, [1.0], "1", 10**400])

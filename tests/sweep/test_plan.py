@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import pytest
 
 from agents.sweep.plan import HeatMap, Range, load_sweep
+from agents.training.configuration import TrainingSettings, override
 
 WHOLE = """
 [base]
@@ -102,3 +104,56 @@ def test_a_file_without_tables_is_one_point(sweep):
 def test_what_cannot_be_is_refused_by_name(sweep, text, message):
     with pytest.raises(ValueError, match=message):
         sweep(text)
+
+
+SPAN = "{from = 1, to = 2, count = 2, log = 'no'}"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "allowed"),
+    [
+        ("[base]\ncontroller = 1", "controller", "a word"),
+        ("[base]\ntrain = ['x']", "train", "a word"),
+        ("[base]\npolicy = ''", "policy", "a word"),
+        ("[grid]\ncontroller = [1, 'pid']", "controller = 1", "a word"),
+        ("[draw]\ncount = 1\nenvironment = [2000-01-01]", "environment", "a word"),
+        ("[base]\nsensors = 'perfect'", "sensors", "'lab'"),
+        ("[grid]\nrandomize = ['no']", "randomize", "True"),
+        ("[grid]\nsensors = {from = 1, to = 2, count = 2}", "sensors", "a list of values"),
+        ("[search]\nreference = {from = 1, to = 2}", "reference", "from, to, log"),
+        ("[grid]\n'gain.bandwidth' = [[1]]", "gain.bandwidth", "a number"),
+        (f"[grid]\n'gain.bandwidth' = {SPAN}", "gain.bandwidth log", "true, false"),
+        ("[base]\nepisodes = 4000000000", "episodes", "1000000"),
+        ("[search]\ntrials = 2000000\n'gain.bandwidth' = {from = 1, to = 2}", "trials", "1000000"),
+        ("[search]\nmetric = 'best'\n'gain.bandwidth' = {from = 1, to = 2}", "metric", "settled_rms"),
+        ("[[map]]\nx = ['a']\ny = {}", "x", "what varies"),
+        ("[grid]\nsensors = ['lab']\n[[map]]\nx = 'sensors'\ny = 'sensors'\nstatistic = []", "statistic", "'median'"),
+        ("[base]\n'training.seed' = 1", "training.seed", "train"),
+        ("[base]\ntrain = 'circle'\n[grid]\n'training.stepz' = [1]", "training.stepz", "steps"),
+        ("[base]\ntrain = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "without it"),
+        ("[base]\npolicy = 'circle'\n[grid]\ncontroller = ['pid']", "controller", "'residual'"),
+        ("[base]\nsensors = 'lab'\n[draw]\ncount = 1\nsensors = ['ideal']", "sensors", "once"),
+    ],
+)  # fmt: skip
+def test_odd_values_and_names_without_effect_are_refused_with_what_is_allowed(sweep, text, name, allowed):
+    with pytest.raises(ValueError, match=r"sweep\.toml") as refusal:
+        sweep(text)
+    said = str(refusal.value)
+    assert name in said
+    assert allowed in said.partition("allowed")[2]
+    assert "\n" not in said
+
+
+def test_layers_of_a_trained_network_may_be_set(sweep):
+    base = sweep("[base]\ntrain = 'circle_quick'\n'training.hidden' = [8, 16]").base
+    assert override(TrainingSettings(), hidden=base["training.hidden"]).hidden == (8, 16)
+
+
+def test_a_grid_is_refused_before_it_takes_memory(sweep):
+    axes = "\n".join(f"'gain.g{k}' = {{from = 1, to = 2, count = 1000000}}" for k in range(20))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"grid.*allowed"):
+        sweep(f"[grid]\n{axes}")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10e6  # bytes; the values of one axis alone take 32 MB

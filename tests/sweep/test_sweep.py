@@ -144,7 +144,6 @@ def test_points_that_cannot_be_are_named_and_cost_no_other(swept):
     [
         ("'rig.mechanics.mas' = [3.0]", "mechanics.mas"),
         ("'gain.bandwith' = [60.0]", "bandwith"),
-        ("train = ['circle']\n'training.stepz' = [3]", "stepz = 3 is unknown; allowed: "),
         ("policy = ['nowhere']", "nowhere"),
     ],
 )

@@ -5,6 +5,7 @@ import { FIELDS } from "../frame.js";
 
 const RIGS = { "birthsim-recording-2": 1, "birthsim-recording-3": 2 }; // format -> how many rigs a row holds
 const LARGEST = 2 ** 27; // bytes, packed or not
+const [WORDS, CHUNKS] = [2 ** 24, 2 ** 17]; // bytes of JSON, and chunks
 const HEAD = 8; // bytes before a chunk
 const FIRST_COLUMNS = Object.keys(FIELDS).filter((name) => !["friction", "flows"].includes(name)); // what older files hold
 
@@ -24,7 +25,7 @@ export async function readRecording(file) {
 async function unpacked(content) {
   const view = new DataView(content.buffer);
   const chunks = [];
-  let [place, claimed] = [0, 0];
+  let [place, claimed, words] = [0, 0, 0];
   while (place + HEAD <= content.length) {
     const [length, digest] = [view.getUint32(place, true), view.getUint32(place + 4, true)];
     const chunk = content.subarray(place + HEAD, place + HEAD + length);
@@ -36,6 +37,9 @@ async function unpacked(content) {
     const raw = await inflated(chunk, LARGEST - claimed);
     claimed += raw.length;
     const end = raw.indexOf(10);
+    words += end;
+    if (words > WORDS) throw new Error(`it holds more than ${WORDS} bytes of JSON; allowed: up to ${WORDS}`);
+    if (chunks.length === CHUNKS) throw new Error(`it holds more than ${CHUNKS} chunks; allowed: up to ${CHUNKS}`);
     const numbers = new Float64Array(raw.slice(end + 1).buffer);
     chunks.push({ said: JSON.parse(new TextDecoder().decode(raw.subarray(0, end))), numbers });
   }

@@ -190,9 +190,43 @@ def test_what_is_damaged_is_refused_by_name(file: tuple[Path, Any], tmp_path: Pa
 
 
 def test_a_file_that_holds_too_much_is_not_unpacked(file: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "LARGEST", 1000)
-    with pytest.raises(ValueError, match="allowed: up to 1000"):
-        load_recording(file[0])
+    size = file[0].stat().st_size
+    for most, words in ((size, f"allowed: up to {size}"), (size - 1, f"allowed: at most {size - 1}")):
+        monkeypatch.setattr(recording, "LARGEST", most)
+        with pytest.raises(ValueError, match=words):
+            load_recording(file[0])
+
+
+@pytest.mark.parametrize(
+    ("limit", "content"),
+    [
+        ("WORDS", packed({"events": [{"row": 0, "settings": {str(k): 0 for k in range(1000)}}]})),
+        ("BRACKETS", packed({"events": [{}] * 1000})),
+        ("CHUNKS", packed({"events": []}) * 1000),
+    ],
+)
+def test_json_that_would_take_long_is_refused_before_it_is_read(
+    limit: str, content: bytes, file: tuple[Path, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header = file[0].read_bytes()
+    (tmp_path / "long.rec").write_bytes(header + content + packed({"events": [3]}))
+    most = {"WORDS": 8000, "BRACKETS": 900, "CHUNKS": 900}[limit]
+    assert len(load_recording(file[0]).rows) > 1
+    monkeypatch.setattr(recording, limit, most)
+    with pytest.raises(ValueError, match=rf"long\.rec'.*allowed: up to {most}"):
+        load_recording(tmp_path / "long.rec")
+
+
+def test_a_recording_ends_before_it_says_more_than_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder, "MOST_WORDS", 2000)
+    session = Session(RIG)
+    session.recorder = Recorder(session, tmp_path / "busy.rec")
+    for k in range(100):
+        session.change({"mass": 2.0 + 0.01 * k})
+        session.advance(EVERY)
+    assert session.recorder.full
+    session.recorder.finish()
+    assert 1 < len(load_recording(tmp_path / "busy.rec").rows) < 20
 
 
 def test_what_is_written_is_read_while_the_recording_goes_on(tmp_path: Path) -> None:
