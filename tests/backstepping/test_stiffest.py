@@ -23,8 +23,17 @@ def test_the_bound_is_the_mass_over_the_lag():
     assert stiffest(rig, True) == pytest.approx(12.0 * 6.0 / 0.006)
 
 
-@pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize(("sensors", "rig"), [("ideal", Parameters()), ("lab", Parameters()), ("lab", LIGHT)])
+@pytest.mark.parametrize(
+    ("name", "sensors", "rig"),
+    [
+        ("backstepping", "lab", LIGHT),
+        *(
+            pytest.param(name, *case, marks=pytest.mark.slow)
+            for name in LAWS for case in (("ideal", Parameters()), ("lab", Parameters()), ("lab", LIGHT))
+            if (name, *case) != ("backstepping", "lab", LIGHT)
+        ),
+    ],
+)  # fmt: skip
 def test_the_laws_rest_below_the_bound_and_swing_not_far_above(name, sensors, rig):
     """ "Not far": the measured range of the rate, 12 to 34 1/s, and one step of the setpoints tried."""
     limit = rests_up_to(name, rig, sensors)

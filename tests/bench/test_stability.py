@@ -130,6 +130,7 @@ def test_the_corners_of_the_rigs_map() -> None:
     assert stable_up_to(chart, "gains that never yield") == [1.0, 12.0]
 
 
+@pytest.mark.slow
 def test_what_is_stable_with_a_hand() -> None:
     """Less than 0.5 mm and 5 N; friction that is fed forward but not there drives a stiff hand, half of it less so."""
     chart = corners("hand_friction", points=3)
@@ -226,7 +227,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
     out = tmp_path / "deeper" / "maps"
-    options = ("--map", "hand", "--map", "rig", "--points", 2, "--sensors", "lab", "--out", out)
+    options = ("--map", "hand", "--map", "rig", "--points", 2, "--sensors", "lab", "--jobs", 1, "--out", out)
     status, printed, _ = call("stability", monkeypatch, capsys, *options)
     assert status == 0
     content = strict(out / "stability.json")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 import pytest
 
 from agents.commands import beside_law
+from agents.policy.seeds import SHIPPED
 
 
 def told(monkeypatch, capsys, *arguments):
@@ -21,6 +23,17 @@ def rows_of(text):
     return [[[cell.strip() for cell in line.split("|")[1:-1]] for line in table] for table in tables]
 
 
+@pytest.mark.usefixtures("brief")
+def test_one_seed_stands_beside_its_law_and_the_mean_of_one_is_itself(monkeypatch, capsys, tmp_path):
+    shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "seed_0")
+    monkeypatch.setattr(beside_law, "_feel", lambda *_: None)
+    (settled,) = rows_of(told(monkeypatch, capsys, "--policy", str(tmp_path), "--sensors", "ideal", "--episodes", "3").out)
+    assert [row[0] for row in settled] == ["backstepping-force-first", "seed_0", "all seeds"]
+    assert float(settled[1][1]) < float(settled[0][1]), "a law of millimetres, a policy of half of one"
+    assert settled[1][3:5] == settled[2][3:5]
+
+
+@pytest.mark.slow
 def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(monkeypatch, capsys):
     settled, felt = rows_of(
         told(
@@ -40,6 +53,7 @@ def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(monkeypatch, c
     assert gained == pytest.approx([errors[0] - own for own in errors[1:]], abs=0.02), "one rig: its mean is the median"
 
 
+@pytest.mark.slow
 def test_other_laws_and_policies_run_in_the_same_worlds(monkeypatch, capsys):
     settled, _ = rows_of(
         told(

@@ -20,6 +20,7 @@ def rows_of(text):
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
 
 
+@pytest.mark.slow
 def test_the_worst_world_is_that_of_the_evaluation_and_no_figure_changes_it_where_it_is_put_to_itself(monkeypatch, capsys):
     command = ["worst", "--controller", "admittance-adaptive", "--sensors", "ideal", "--episodes", "3", "--seed", str(SEED)]
     monkeypatch.setattr(sys, "argv", command)

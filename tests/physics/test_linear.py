@@ -281,6 +281,7 @@ def test_without_python_control_the_extra_is_named(monkeypatch: pytest.MonkeyPat
         linearize(None, (0.5, 0.0)).to_control()
 
 
+@pytest.mark.slow
 def test_the_example_draws_and_prints_resonance_and_bandwidth(tmp_path: Path) -> None:
     """A sliding rig's resonance is that of its slowest mode: damping moves the peak by zeta^2 < 1 %, the grid by 0.4 %."""
     script = Path(__file__).parents[2] / "examples" / "frequency_responses.py"

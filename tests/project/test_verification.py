@@ -127,6 +127,7 @@ def test_balances_close_at_the_plants_step(monkeypatch):
     assert mechanical["work_j"] > 1
 
 
+@pytest.mark.slow
 def test_stages_run_as_plain_python():
     """What mutants and coverage rely on: a whole closed loop without machine code gives the compiled openings."""
     script = (

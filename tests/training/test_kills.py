@@ -66,16 +66,19 @@ def killed(monkeypatch, settings, folder, method, count):
 STEP, CHECK, ROLLOUT = "_on_step", "_check", "_on_rollout_start"
 
 
+SLOW = pytest.mark.slow
+
+
 @pytest.mark.parametrize(
     ("changes", "places"),
     [
-        ({}, [(STEP, 1), (STEP, 70), (STEP, 127), (CHECK, 2), (CHECK, 5), (ROLLOUT, 5)]),
-        ({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(STEP, 70), (CHECK, 5)]),
+        pytest.param({}, [(STEP, 1), (STEP, 70), (STEP, 127), (CHECK, 2), (CHECK, 5), (ROLLOUT, 5)], marks=SLOW, id="ppo"),
+        pytest.param({}, [(STEP, 70), (CHECK, 5)], id="ppo, two deaths"),
+        pytest.param({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(CHECK, 5)], marks=SLOW, id="ppo lab"),
         # The first 160 steps are drawn from the space of actions.
-        ({"algorithm": "sac", "steps": 384}, [(STEP, 10), (STEP, 40), (CHECK, 4)]),
-        ({"algorithm": "tqc", "steps": 256}, [(STEP, 30)]),
+        pytest.param({"algorithm": "sac", "steps": 384}, [(STEP, 10), (STEP, 40), (CHECK, 4)], marks=SLOW, id="sac"),
+        pytest.param({"algorithm": "tqc", "steps": 256}, [(STEP, 30)], id="tqc"),
     ],
-    ids=["ppo", "ppo lab", "sac", "tqc"],
 )
 @pytest.mark.usefixtures("brief")
 def test_wherever_it_dies_it_ends_with_the_policy_of_one_that_did_not(tmp_path, monkeypatch, capsys, changes, places):

@@ -160,7 +160,7 @@ def test_every_validation_is_in_the_events_at_its_own_step(trained, events):
     assert set(events["validation/pooled_mm"]) == {point["steps"] for point in reached["curve"]}
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac", "tqc"])
+@pytest.mark.parametrize("algorithm", ["ppo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("sac", "tqc"))])
 def test_the_same_seed_twice_gives_the_same_files_and_another_seed_others(tmp_path, short_probe, algorithm):
     results = []
     settings = replace(
