@@ -157,6 +157,8 @@ def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest
 
 def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Valves that drive both pistons out: lost, null in JSON, and said in the picture."""
+    monkeypatch.setattr(stability, "JUDGED", 0.9)
+    monkeypatch.setattr(stability, "END", 1.2)
     verdict = judge(Cases([RIG, RIG], np.array([0.0, 30000.0]), np.full(2, 2000.0)), Constant(1, -1, 1, -1))
     assert verdict.lost.tolist() == [True, False]
     assert not verdict.stable[0]
