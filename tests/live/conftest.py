@@ -11,7 +11,7 @@ from tests.live import browser
 from tests.live.browser import CALM, Server, Window
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def chromium():
     if lack := browser.missing():
         pytest.fail(f"CI=true, and {lack}")
@@ -21,7 +21,7 @@ def chromium():
         yield opened
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def server(tmp_path_factory):
     with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
         yield running
@@ -38,7 +38,7 @@ def window(chromium, server):
         assert opened.foreign == []
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def pictures(tmp_path_factory):
     """Folder for screenshots: BIRTHSIM_SCREENSHOTS, or one that pytest throws away."""
     folder = Path(os.environ.get("BIRTHSIM_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))
