@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
 from tests.live import browser
-from tests.live.browser import CALM, Server, Window
+from tests.live.browser import CALM, PATIENCE, Server, Window
 
 
 @pytest.fixture(scope="session")
@@ -22,9 +23,30 @@ def chromium():
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory):
+def served(tmp_path_factory):
     with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
         yield running
+
+
+@pytest.fixture
+def server(served):
+    """The run's server; its rig begins anew, whatever a test that failed has left."""
+    from websockets.sync.client import connect
+
+    with connect(f"{served.url.replace('http', 'ws')}ws", open_timeout=PATIENCE) as socket:
+        defaults = json.loads(socket.recv())["defaults"]
+        settings = {name: value for name, value in defaults.items() if not name.startswith("K")}
+        for message in (
+            {"type": "set", "settings": settings},
+            {"type": "speed", "speed": 1},
+            {"type": "pause", "paused": False},
+            {"type": "reset"},
+            {"type": "ping", "id": 1},
+        ):
+            socket.send(json.dumps(message))
+        while (said := json.loads(socket.recv()))["type"] != "pong":
+            assert said["type"] != "error", said
+    return served
 
 
 @pytest.fixture
