@@ -24,7 +24,7 @@ OUT := out
 TOOLS := $(OUT)/tools
 NPM := $(OUT)/npm
 OLDEST := numba==0.65.0 llvmlite==0.47.0
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --durations 20 --durations-min 1
+PYTEST := $(BIN)/python -m pytest -n 2 --durations 20 --durations-min 1
 BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input

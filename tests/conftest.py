@@ -74,6 +74,19 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.write_line(f"s by folder: {', '.join(each)}; all {sum(folders.values()):.0f}")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """One worker has the browser, and each module one worker: what its tests share is made once."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Grouped(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            path = nodeid.partition("::")[0]
+            return "browser" if path.startswith(("tests/live/page/", "tests/live/static/")) else path
+
+    return Grouped(config, log) if config.getvalue("dist") == "load" else None
+
+
 def pytest_unconfigure(config):
     """After everything else pytest says whether the page was tested: a skip among thousands of dots is not seen."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")

@@ -31,7 +31,7 @@ _HASWELL = [
 _SKYLAKE = [*_HASWELL, "avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"]
 
 WARM = [sys.executable, "-m", "tests.warming"]
-TESTS = [sys.executable, "-m", "pytest", "-n", "2", "--dist", "loadfile", "-m", "not slow", *NUMERIC]
+TESTS = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", *NUMERIC]
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
+import llvmlite
+import numba
 import numpy as np
 from llvmlite.binding import llvm_version_info
 
 from birthsim_build.image import Words
+from birthsim_env.physics.compiled.compilation import cache_folder, keep, kept, source_stamp
 
 ONE_LANE = {
     **{"BIRTHSIM_BLOCK": "1", "NUMBA_LOOP_VECTORIZE": "0", "NUMBA_SLP_VECTORIZE": "0"},
@@ -36,16 +43,46 @@ def compile_object(
 ) -> None:
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
-    For a Cortex-M7 the assembly stands beside it, ``.s``. Where it is to ``count``, the code counts its operations.
+    For a Cortex-M7 the assembly stands beside it, ``.s``. Where it is to ``count``, the code counts its operations. Objects are
+    kept beside the kernels' machine code: the same one of the same sources is not compiled twice.
     """
+    request = {"functions": list(functions), "target": target, "count": count}
+    arrays = dict(data or {})
+    place = _place(request, arrays)
+    content = place and kept(place)
+    files: dict[str, bytes] = pickle.loads(content) if content else _compiled(request, arrays)
+    if place and not content:
+        keep(place, pickle.dumps(files))
+    for suffix, written in files.items():
+        out.with_suffix(suffix).write_bytes(written)
+
+
+def _compiled(request: dict[str, Any], arrays: dict[str, Words]) -> dict[str, bytes]:
+    """Ending -> content of the files that the process writes."""
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder) / "data.npz"
-        np.savez(place, **dict(data or {}))  # type: ignore[arg-type]
-        request = {"functions": list(functions), "target": target, "data": str(place), "out": str(out), "count": count}
+        place, out = Path(folder) / "data.npz", Path(folder) / "code.o"
+        np.savez(place, **arrays)  # type: ignore[arg-type]
         subprocess.run(
-            [sys.executable, "-m", "birthsim_build.code.emit"], input=json.dumps(request), text=True, check=True,
+            [sys.executable, "-m", "birthsim_build.code.emit"],
+            input=json.dumps({**request, "data": str(place), "out": str(out)}), text=True, check=True,
             env={**os.environ, **ONE_LANE},
         )  # fmt: skip
+        return {path.suffix: path.read_bytes() for path in Path(folder).glob("code.*")}
+
+
+def _place(request: dict[str, Any], arrays: dict[str, Words]) -> Path | None:
+    """Where the files of a request are kept, named by all that they depend on; of other data and sources there are none."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    modules = dict.fromkeys(["birthsim_build.code.emit", __name__, *(name.partition(":")[0] for name in request["functions"])])
+    files = [import_module(module).__file__ for module in modules]
+    sources = hashlib.sha256("".join(source_stamp(Path(str(file))) for file in files).encode())
+    for name, words in arrays.items():
+        sources.update(name.encode() + words.tobytes())
+    versions = (numba.__version__, llvmlite.__version__, llvm_version_info, sys.implementation.cache_tag)
+    kind = hashlib.sha256(repr((request, versions)).encode()).hexdigest()
+    return folder / f"birthsim_build.{request['target']}-{kind[:16]}-{sources.hexdigest()[:16]}.objects"
 
 
 def has_linker() -> bool:

@@ -8,14 +8,14 @@ import numpy as np
 
 from birthsim_env.physics import friction, geometry
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 REST_SPEED = 1e-9
 """m/s: a slower piston starts at rest, without friction. Rounding leaves 1e-17, and its sign must not choose the friction's."""
 
 
-@kernel
+@helper
 def balance(state: Array, stiffness: Array, p: Array) -> None:
     """Fills pressures, temperatures and bristles of a state whose positions and speeds are set."""
     for i in range(state.shape[1]):

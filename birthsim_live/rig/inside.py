@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from birthsim_env.physics import dynamics, friction
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
 ROWS = 6
@@ -21,7 +21,7 @@ def piston_friction(x: Array, p: Array, i: int, speed: int, bristle: int, coulom
     return friction.lugre_force(v, z, rate, s0, p[at.BRISTLE_S1, i], p[viscous, i])
 
 
-@kernel
+@helper
 def look_inside(x: Array, p: Array, rows: Array) -> None:
     """Writes friction of pistons 1 and 2, N, and net flows into chambers P1, N1, P2, N2, kg/s, (ROWS, N).
 

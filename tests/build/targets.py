@@ -6,7 +6,6 @@ import importlib
 import importlib.util
 import os
 import shutil
-import subprocess
 import sys
 
 import numpy as np
@@ -14,6 +13,7 @@ import pytest
 from llvmlite.binding import llvm_version_info
 
 from birthsim_build.code.compiler import LEAST_LLVM
+from birthsim_build.commands.build import main
 
 BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "circle_honest_student", "--sensors", "ideal", "lab")
 
@@ -40,8 +40,10 @@ def need_linker():
 
 
 def build(target, folder, *options):
-    line = [sys.executable, "-m", "birthsim_build.commands.build", target, *options, "--out", str(folder)]
-    subprocess.run(line, check=True, capture_output=True, text=True)
+    """The command, in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["birthsim-build", target, *options, "--out", str(folder)])
+        main()
 
 
 def assert_same_bits(one, other):

@@ -133,15 +133,15 @@ def test_the_plant_computes_the_bits_of_python(written, unit, version):
     ("controller", "sensors", "file", "periods"),
     [
         ("backstepping", "lab", None, 600),
-        ("admittance-adaptive", "honest", None, 600),
-        ("admittance-adaptive", "honest", "examples/acceleration_sensor_rig.toml", 600),
+        pytest.param("admittance-adaptive", "honest", None, 600, marks=pytest.mark.slow),
+        pytest.param("admittance-adaptive", "honest", "examples/acceleration_sensor_rig.toml", 600, marks=pytest.mark.slow),
         pytest.param("backstepping", "ideal", None, 15_990, marks=pytest.mark.slow, id="all of Fig. 4"),
     ],
 )
 def test_the_closed_loop_computes_the_bits_of_python(written, unit, controller, sensors, file, periods):
     """Under the target and the hand of the circle, as seen from Python."""
     described, rig = (("--parameters", ROOT / file), load_parameters(ROOT / file)) if file else ((), RIG)
-    one = unit(written("--controller", controller, "--sensors", sensors, *described))
+    one = unit(written("--controller", controller, "--sensors", sensors, *described, "--fmi", 2))
     env = gymnasium.make_vec(CIRCLE, num_envs=1, sensors=sensors, parameters=rig, policy_period=PERIOD)
     env.reset(seed=0)
     simulation = env.unwrapped.simulation

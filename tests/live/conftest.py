@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
 from tests.live import browser
-from tests.live.browser import CALM, Server, Window
+from tests.live.browser import CALM, PATIENCE, Server, Window
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def chromium():
     if lack := browser.missing():
         pytest.fail(f"CI=true, and {lack}")
@@ -21,10 +22,31 @@ def chromium():
         yield opened
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory):
+@pytest.fixture(scope="session")
+def served(tmp_path_factory):
     with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
         yield running
+
+
+@pytest.fixture
+def server(served):
+    """The run's server; its rig begins anew, whatever a test that failed has left."""
+    from websockets.sync.client import connect
+
+    with connect(f"{served.url.replace('http', 'ws')}ws", open_timeout=PATIENCE) as socket:
+        defaults = json.loads(socket.recv())["defaults"]
+        settings = {name: value for name, value in defaults.items() if not name.startswith("K")}
+        for message in (
+            {"type": "set", "settings": settings},
+            {"type": "speed", "speed": 1},
+            {"type": "pause", "paused": False},
+            {"type": "reset"},
+            {"type": "ping", "id": 1},
+        ):
+            socket.send(json.dumps(message))
+        while (said := json.loads(socket.recv()))["type"] != "pong":
+            assert said["type"] != "error", said
+    return served
 
 
 @pytest.fixture
@@ -38,7 +60,7 @@ def window(chromium, server):
         assert opened.foreign == []
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def pictures(tmp_path_factory):
     """Folder for screenshots: BIRTHSIM_SCREENSHOTS, or one that pytest throws away."""
     folder = Path(os.environ.get("BIRTHSIM_SCREENSHOTS") or tmp_path_factory.mktemp("screenshots"))

@@ -40,7 +40,7 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
 _ROOT = Path(__file__).resolve().parents[3]
-_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build")
+_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -85,7 +85,7 @@ def source_stamp(path: Path) -> str:
 
 
 @cache
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     """The first writable folder: $NUMBA_CACHE_DIR, beside the sources, the user's cache; None when there is none."""
     chosen, home = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
     folders = [Path(chosen)] if chosen else []
@@ -102,8 +102,34 @@ def _cache_folder() -> Path | None:
     return None
 
 
+def kept(path: Path) -> bytes | None:
+    """What ``keep`` wrote; None where a file is missing or damaged."""
+    with contextlib.suppress(OSError):
+        content = path.read_bytes()
+        if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
+            return content[_DIGEST:]
+    return None
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write ``content`` behind its SHA-256, whole or, where there is no room, not at all.
+
+    Files of older sources, whose names differ only after the last ``-``, go.
+    """
+    partial = path.with_suffix(f".{os.getpid()}.partial")
+    try:
+        partial.write_bytes(hashlib.sha256(content).digest() + content)
+        partial.replace(path)
+        for other in path.parent.glob(f"{path.stem.rpartition('-')[0]}-*{path.suffix}"):
+            if other != path:
+                other.unlink(missing_ok=True)
+    except OSError:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
 class _DiskCache(NullCache):
-    """Machine code of one function: a file per signature and processor, which begins with the SHA-256 of the rest."""
+    """Machine code of one function: a file per signature and processor."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._folder = folder
@@ -119,27 +145,11 @@ class _DiskCache(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        try:
-            content = self._path(sig, target_context.codegen()).read_bytes()
-            if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
-                return CompileResult._rebuild(target_context, *pickle.loads(content[_DIGEST:]))  # type: ignore[no-untyped-call]
-        except OSError:
-            pass
-        return None
+        content = kept(self._path(sig, target_context.codegen()))
+        return content and CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        path = self._path(sig, data.codegen)
-        content = serialize.dumps(data._reduce())  # type: ignore[no-untyped-call]
-        partial = path.with_suffix(f".{os.getpid()}.partial")
-        try:
-            partial.write_bytes(hashlib.sha256(content).digest() + content)
-            partial.replace(path)
-            for other in self._folder.glob(f"{path.stem.rpartition('-')[0]}-*.nbc"):
-                if other != path:
-                    other.unlink(missing_ok=True)  # of older sources
-        except OSError:
-            with contextlib.suppress(OSError):
-                partial.unlink(missing_ok=True)
+        keep(self._path(sig, data.codegen), serialize.dumps(data._reduce()))  # type: ignore[no-untyped-call]
 
 
 class _Announcer(event.Listener):
@@ -152,8 +162,8 @@ class _Announcer(event.Listener):
         module = getattr(event.data["dispatcher"].py_func, "__module__", "") or ""
         if not self._said and module.split(".")[0] in _PACKAGES:
             self._said = True
-            kept = "the result is cached" if _cache_folder() else "no folder is writable, so every process compiles anew"
-            print(f"BirthSIM: compiling numerical kernels, usually 10 to 40 s; {kept}.", file=sys.stderr, flush=True)
+            then = "the result is cached" if cache_folder() else "no folder is writable, so every process compiles anew"
+            print(f"BirthSIM: compiling numerical kernels, usually 10 to 40 s; {then}.", file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
         pass
@@ -165,7 +175,7 @@ event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 def kernel(function: F) -> F:
     """Compile a loop over lanes; cached on disk where a folder is writable; releases the interpreter lock."""
     compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    folder = _cache_folder()
+    folder = cache_folder()
     # With the compiler off there is nothing to keep; what a closure or an interactive session holds, no hash of sources knows.
     written = Path(function.__code__.co_filename).is_file()
     if folder is not None and hasattr(compiled, "_cache") and function.__closure__ is None and written:

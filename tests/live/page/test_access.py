@@ -11,11 +11,13 @@ import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES
+from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import EVERY
-from birthsim_live.rig.recording import FORMAT, packed
+from birthsim_live.rig.recording import FORMAT, load_recording, packed
 from birthsim_live.rig.session import Session
+from birthsim_live.server.replay_hub import ReplayHub
 from tests.live import browser
-from tests.live.browser import Server, Window
+from tests.live.browser import Hosted, Server, Window
 
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -149,7 +151,8 @@ def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
     }  # fmt: skip
     said = {"events": [{"row": 0, "settings": session.shown_settings()}, {"row": 0, "path": session.path()}]}
     (tmp_path / "lost.rec").write_bytes(packed(header) + packed(said, lost))
-    with Server("replay", tmp_path / "lost.rec") as server, Window(chromium, server.url) as viewer:
+    hub = ReplayHub(Player(load_recording(tmp_path / "lost.rec")), "lost.rec")
+    with Hosted(hub) as address, Window(chromium, address) as viewer:
         # At its end a replay halts, and plays on from wherever it is put; paused, it stays there.
         viewer.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
         viewer.wait("birthsim.state.paused")
@@ -159,6 +162,7 @@ def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
         assert viewer.complaints == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of 127.0.0.0/8")
 def test_the_address_that_is_printed_is_served(tmp_path):
     with Server("live", "--record-dir", tmp_path, "--host", "127.0.0.2") as server:

@@ -7,11 +7,14 @@ import os
 import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import EVERY, Recorder
+from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
+from birthsim_live.server.replay_hub import ReplayHub
 from tests.live import axe, browser
 from tests.live.axe import violations
-from tests.live.browser import NARROW, WIDE, Server, Window
+from tests.live.browser import NARROW, WIDE, Hosted, Window
 
 LACK = browser.missing()
 pytestmark = [pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
@@ -58,6 +61,7 @@ def test_nothing_is_found_on_a_replay(chromium, tmp_path, theme):
     session.recorder = Recorder(session, tmp_path / "rest.rec")
     session.advance(100 * EVERY)
     session.recorder.finish()
-    with Server("replay", tmp_path / "rest.rec") as replay, Window(chromium, replay.url) as viewer:
+    hub = ReplayHub(Player(load_recording(tmp_path / "rest.rec")), "rest.rec")
+    with Hosted(hub) as address, Window(chromium, address) as viewer:
         viewer.page.emulate_media(color_scheme=theme)
         assert violations(viewer.page) == []

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from birthsim_live.rig.frames import SLICES
+from birthsim_live.rig.player import Player
 from birthsim_live.rig.recording import load_recording
+from birthsim_live.server.replay_hub import ReplayHub
 from tests.live import browser
-from tests.live.browser import Server, Window, displacement, rendered
+from tests.live.browser import Hosted, Server, Window, displacement, rendered
 
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -159,7 +161,7 @@ def test_keys_push_both_with_one_force_pause_and_reset_both(pair):
     assert pair.value("birthsim.frame.second.time === birthsim.frame.time")
 
 
-def test_both_are_recorded_replayed_by_command_and_opened_on_the_page(chromium, pair, tmp_path, pictures):
+def test_both_are_recorded_replayed_by_a_server_and_opened_on_the_page(chromium, pair, tmp_path, pictures):
     page = pair.page
     page.locator("#record").click()
     pair.wait("birthsim.state.recording !== null")
@@ -187,7 +189,7 @@ def test_both_are_recorded_replayed_by_command_and_opened_on_the_page(chromium, 
         assert viewer.value(NAMES) == ["admittance backstepping", "backstepping"]
         return viewer.frame()["second"]
 
-    with Server("replay", file) as replay, Window(chromium, replay.url) as viewer:
+    with Hosted(ReplayHub(Player(recording), file.name)) as address, Window(chromium, address) as viewer:
         played = second_at_the_pull(viewer)
         viewer.page.screenshot(path=pictures / "compare_replay.png")
         assert viewer.complaints == []
@@ -225,6 +227,7 @@ def test_two_rigs_fit_a_window_of_any_size(chromium, server, pair, pictures, wid
         assert window.complaints == []
 
 
+@pytest.mark.slow
 def test_the_command_opens_with_two(chromium, tmp_path):
     arguments = ("--record-dir", tmp_path, "--compare", FIRST)
     with Server("live", *arguments) as server, Window(chromium, server.url) as window:

@@ -10,8 +10,10 @@ import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.session import Session
+from birthsim_live.rig.settings import opening_settings
+from birthsim_live.server.live_hub import LiveHub
 from tests.live import browser
-from tests.live.browser import Server, Window
+from tests.live.browser import Hosted, Window
 
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -22,7 +24,8 @@ LESSON = "document.querySelector('#guide').value"
 
 
 def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, tmp_path, pictures):
-    with Server("live", "--record-dir", tmp_path) as server, Window(chromium, server.url) as window:
+    rig = Parameters()
+    with Hosted(LiveHub(Session(rig, opening_settings(rig)), tmp_path)) as address, Window(chromium, address) as window:
         assert window.value(LESSON) == "Feel the friction"
         assert window.value("birthsim.settings.controller") == "backstepping"
         assert window.value("location.search") == ""

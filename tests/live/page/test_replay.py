@@ -16,8 +16,9 @@ from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import Recorder
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
+from birthsim_live.server.replay_hub import ReplayHub
 from tests.live import browser
-from tests.live.browser import Server, Window
+from tests.live.browser import Hosted, Window
 
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -118,7 +119,8 @@ def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
 
 
 def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, file):
-    with Server("replay", file) as server, Window(chromium, server.url) as viewer:
+    hub = ReplayHub(Player(load_recording(file)), file.name)
+    with Hosted(hub) as address, Window(chromium, address) as viewer:
         first = viewer.value("birthsim.plots.shown.history.view('time')[0]")
         assert first == 0
         assert viewer.page.locator("#file").text_content() == "pull.rec"

@@ -1,30 +1,56 @@
-"""A folder with the page without a server, and its address."""
+"""Folders with the page without a server, and the address of one."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shutil
+import sys
 
 import pytest
 
-from agents.policy.seeds import SHIPPED
+from agents.policy import seeds
 from tests.build.targets import need_linker
-from tests.console import run
 from tests.live.browser import Folder
 
+FEW = ["backstepping", "admittance-backstepping", "residual"]
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """The folder, made by the command."""
+
+def _built(tmp_path_factory, patch):
+    """A folder, made by the command."""
     need_linker()
+    from birthsim_live.commands.live import main
+
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
-    own = shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
-    done = run("live", "--static", folder, "--policy", own)
-    assert done.returncode == 0, done.stderr
-    assert f"written to {folder}" in done.stdout
+    own = shutil.copytree(seeds.SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
+    patch.setattr(sys, "argv", ["birthsim-live", "--static", str(folder), "--policy", str(own)])
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        main()
+    assert f"written to {folder}" in said.getvalue()
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory):
+    """With all that is offered, which takes a minute to compile."""
+    with pytest.MonkeyPatch.context() as patch:
+        return _built(tmp_path_factory, patch)
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory):
+    """With a few controllers."""
+    from birthsim_live.rig import settings
+    from birthsim_live.static import pack
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings, "controller_names", lambda: FEW)
+        for module in (seeds, pack):
+            patch.setattr(module, "shipped_names", lambda: ["circle"])
+        return _built(tmp_path_factory, patch)
+
+
+@pytest.fixture(scope="session")
 def address(built):
     """Of the page on a server of files, which has it below another folder."""
     with Folder(built.parent) as served:

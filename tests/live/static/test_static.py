@@ -18,7 +18,7 @@ from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
 from tests.build.targets import need_linker
-from tests.console import run
+from tests.console import call
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
 from tests.live.static.lack import lack
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", r
 
 LARGEST = 1.5e6  # bytes
 SOONEST = 2.0  # s from the address to a rig that moves
-PERIODS = 400  # of each pair of rigs that are compared
+BUILT = {"backstepping", "admittance-backstepping", "residual:circle"}
 ROWS = """async (cases) => {
   const { Machine } = await import(new URL("static/worker/machine.js", location));
   const { Session } = await import(new URL("static/worker/session.js", location));
@@ -110,8 +110,12 @@ def rows_of(settings, periods, hold=None):
     return rows
 
 
-def test_the_folder_is_small_and_the_rig_moves_soon(chromium, built, address):
-    assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
+@pytest.mark.slow
+def test_the_folder_is_small(whole):
+    assert sum(path.stat().st_size for path in whole.rglob("*") if path.is_file()) < LARGEST
+
+
+def test_the_rig_moves_soon(chromium, address):
     soonest = []
     for _ in range(3):  # a busy machine may be late once
         with Window(chromium, address) as window:
@@ -119,26 +123,37 @@ def test_the_folder_is_small_and_the_rig_moves_soon(chromium, built, address):
     assert min(soonest) < 1e3 * SOONEST
 
 
-def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(window):
+@pytest.mark.parametrize(
+    ("page", "controllers", "periods"),
+    [("built", BUILT, 100), pytest.param("whole", {*BUILT, "lqr", "pid", "residual:circle_lab"}, 400, marks=pytest.mark.slow)],
+)
+def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(chromium, request, page, controllers, periods):
+    """``periods`` of each rig or pair of rigs."""
+    with Folder(request.getfixturevalue(page)) as served, Window(chromium, served + CALM) as window:
+        assert_bits_of_python(window, controllers, periods)
+        assert window.complaints == []
+
+
+def assert_bits_of_python(window, controllers, periods):
     offered = window.value("birthsim.hello.choices.controller.filter(({ missing }) => !missing).map(({ name }) => name)")
     offered = [name for name in offered if not name.endswith("own")]  # a copy of one that is shipped
-    assert {"backstepping", "admittance-backstepping", "lqr", "residual:circle", "residual:circle_lab"} <= set(offered)
+    assert controllers <= set(offered)
     pushed = {"scenario_force": True}
     cases = [{"scenario": name, "sensors": sensors} for name in SCENARIOS for sensors in SENSORS]
     cases += [
         {"scenario": "circle", "controller": name, "sensors": sensors} for name in offered for sensors in ("ideal", "lab")
     ]
     cases += [{"scenario": "circle", "mass": 4.3, "friction": 1.37, "Kclx": 3150.0, "valves": "one_valve", "damping": 1.5}]
-    several = [{"settings": {**case, **pushed}, "periods": PERIODS} for case in cases]
+    several = [{"settings": {**case, **pushed}, "periods": periods} for case in cases]
     holds = [{"position": [0.56, 0.02]}, {"position": [0.7, -0.2]}, {"force": [20, -5]}, {"force": [90, 90]}]
-    several += [{"settings": {}, "periods": PERIODS, "hold": hold} for hold in holds]
+    several += [{"settings": {}, "periods": periods, "hold": hold} for hold in holds]
     pairs = [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")]
-    for controller, compare in pairs:
+    for controller, compare in ((one, other) for one, other in pairs if {one, other} <= set(offered)):
         settings = {"controller": controller, "compare": compare, "scenario": "circle", "sensors": "lab", "mass": 4.0}
-        several.append({"settings": {**settings, **pushed}, "periods": PERIODS, "hold": holds[0]})
+        several.append({"settings": {**settings, **pushed}, "periods": periods, "hold": holds[0]})
     texts = window.page.evaluate(ROWS, several)
     for one, text in zip(several, texts, strict=True):
-        found = np.frombuffer(base64.b64decode(text)).reshape(PERIODS, -1)
+        found = np.frombuffer(base64.b64decode(text)).reshape(periods, -1)
         assert same(found, rows_of(**one)), one
 
 
@@ -156,7 +171,7 @@ def test_displacement_is_force_over_stiffness(window):
     window.wait(f"birthsim.monitor.report().drawn > {drawn + 20} && birthsim.frame.real_time > 0.5")
 
 
-@pytest.mark.parametrize("compare", ["nothing", "backstepping"])
+@pytest.mark.parametrize("compare", [pytest.param("nothing", marks=pytest.mark.slow), "backstepping"])
 def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path, compare):
     page = window.page
     page.locator("select[name=compare]").select_option(compare)
@@ -258,18 +273,19 @@ def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
         page.close()
 
 
-def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path):
+def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path, monkeypatch, capsys):
     need_linker()
     (tmp_path / "rig.toml").write_text("[valves]\ndeadband = 0.02\n")
-    done = run("live", "--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
-    assert done.returncode == 2
-    assert "imperfect valves" in done.stderr.splitlines()[-1]
+    options = ("--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
+    status, _, complained = call("live", monkeypatch, capsys, *options)
+    assert status == 2
+    assert "imperfect valves" in complained.splitlines()[-1]
     assert not (tmp_path / "page").exists()
 
 
-def test_a_folder_with_something_in_it_is_refused(tmp_path):
+def test_a_folder_with_something_in_it_is_refused(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine.txt").write_text("mine")
-    done = run("live", "--static", tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
+    status, _, complained = call("live", monkeypatch, capsys, "--static", tmp_path)
+    assert status == 2
+    assert complained.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

@@ -84,7 +84,7 @@ def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(pack
 
 def test_the_stamp_is_of_all_that_a_kernel_imports():
     def imported(name):
-        seen, waiting = set(), [ROOT / "birthsim_env" / name]
+        seen, waiting = set(), [(ROOT / "birthsim_env" / name).resolve()]
         while waiting:
             path = waiting.pop()
             if path not in seen:
@@ -94,6 +94,7 @@ def test_the_stamp_is_of_all_that_a_kernel_imports():
 
     assert {"dynamics", "chambers", "friction", "geometry", "mechanics", "valves", "lanes"} <= imported("physics/dynamics.py")
     assert "signals" in imported("reward.py"), "compliance is made there"
+    assert "inside" in imported("../birthsim_live/static/stages.py")
     assert "references" not in imported("physics/dynamics.py"), "an edit there need not compile the plant anew"
     stamps = {source_stamp(ROOT / "birthsim_env" / name) for name in ("physics/dynamics.py", "reward.py")}
     assert len(stamps) == 2
@@ -140,6 +141,6 @@ def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
     monkeypatch.setattr(compilation, "_ROOT", tmp_path / "file")
-    assert compilation._cache_folder.__wrapped__() is None
+    assert compilation.cache_folder.__wrapped__() is None
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
-    assert compilation._cache_folder.__wrapped__() == tmp_path / "own"
+    assert compilation.cache_folder.__wrapped__() == tmp_path / "own"
