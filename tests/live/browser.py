@@ -41,6 +41,7 @@ OF_PLAYWRIGHT = (
 )
 """Where ``playwright install chromium`` puts programs below its folder, by system and version."""
 INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
+FONT = "Liberation Sans"
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -92,6 +93,13 @@ def _revision(path):
     return max(int(number) for number in re.findall(r"chromium(?:_headless_shell)?-(\d+)", str(path)))
 
 
+def has_font():
+    """Whether text is as wide as the page was laid out for; where nothing tells, it is believed to be."""
+    matcher = shutil.which("fc-match")
+    found = subprocess.run([matcher, FONT], capture_output=True, text=True).stdout if matcher else FONT
+    return any(name in found for name in (FONT, "Arial", "Helvetica"))
+
+
 def missing():
     """What these tests lack and how to install it, in words, or an empty string."""
     lacks = []
@@ -102,6 +110,8 @@ def missing():
         lacks.append(f"{error.name} (pip install 'birthsim[live,dev]')")
     if find_chromium() is None:
         lacks.append(f"Chromium ({INSTALLATION})")
+    if not has_font():
+        lacks.append(f"a font as wide as {FONT} (apt-get install fonts-liberation)")
     return f"the page's tests need {' and '.join(lacks)}" if lacks else ""
 
 
