@@ -1,3 +1,4 @@
+# make quick  lints, and runs the contracts and the stored bits: half a minute, between two edits
 # make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
@@ -52,7 +53,7 @@ POLICIES := agents/policies
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
 tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run figure next-kernels test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml requirements/base.txt
@@ -79,9 +80,9 @@ $(TOOLS)/.ready: requirements/tools.txt
 	$(TOOLS)/bin/python -m pip --disable-pip-version-check --no-input $(LOCKED)/tools.txt
 	touch $@
 
-# PyTorch is installed while Fig. 4 is computed.
+# While Fig. 4 is computed, PyTorch is installed, and what the next steps run is compiled.
 run: $(BASE)
-	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
+	@$(MAKE) --no-print-directory --jobs 2 figure next-kernels
 	@echo "== 2 of 3: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim-train --config circle_quick --seed 0 --out $(OUT)/policy
@@ -96,6 +97,9 @@ run: $(BASE)
 figure: $(BASE)
 	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+
+next-kernels: $(AGENTS)
+	@$(BIN)/python -m tests.warming agents.residual.law:_stage baselines.admittance.stage:control baselines.estimation.stages:_comply 2>/dev/null
 
 test: $(READY)
 	$(BIN)/python -m tests.warming

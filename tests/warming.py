@@ -1,13 +1,14 @@
-"""Compiles what tests run, once, on all processors: ``python -m tests.warming``.
+"""Compiles stages, once, on all processors: ``python -m tests.warming``, or those named as ``module:name``.
 
-Without it every worker of pytest compiles for itself what it meets first. Kernels with the signature of a stage are compiled by
-their address, without a simulation; the rest is called once.
+Without it every worker of pytest compiles for itself what it meets first. Stages are compiled by their address, without a
+simulation; other kernels are left to whoever calls them.
 """
 
 from __future__ import annotations
 
 import os
 import pkgutil
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
 from multiprocessing import get_context
@@ -41,7 +42,10 @@ def warm(name: str) -> None:
 
 
 def main() -> None:
-    """Compile everything."""
+    """Compile the stages named, one after the other, or all of them side by side."""
+    if named := sys.argv[1:]:
+        list(map(warm, named))
+        return
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("spawn")) as pool:
         list(pool.map(warm, stages()))
 
