@@ -60,7 +60,16 @@ CONTRASTS = """[...document.querySelectorAll('h1, label, legend, dt, dd, small, 
 """Texts whose contrast is less than WCAG's AA asks for."""
 
 
-@pytest.mark.parametrize("place", ["select[name=controller]", "#set-friction", "input[name=scenario_force]", "#rig"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "#rig",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("select[name=controller]", "#set-friction", "input[name=scenario_force]")
+        ),
+    ],
+)
 def test_r_resets_and_space_pauses_wherever_the_focus_is(window, place):
     target = window.page.locator(place)
     before = window.value("birthsim.settings")
@@ -113,7 +122,14 @@ def test_high_contrast_keeps_the_pictures_readable_and_the_sliders_visible(chrom
         window.page.screenshot(path=pictures / "forced.png")
 
 
-@pytest.mark.parametrize(("width", "height"), [(320, 640), (400, 800), (768, 1024), (1280, 800), (1366, 768), (1920, 1080)])
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [
+        (320, 640),
+        (1280, 800),
+        *(pytest.param(*size, marks=pytest.mark.slow) for size in ((400, 800), (768, 1024), (1366, 768), (1920, 1080))),
+    ],
+)
 def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, server, width, height):
     with Window(chromium, server.url, {"width": width, "height": height}) as window:
         assert window.value("document.documentElement.scrollWidth") <= width

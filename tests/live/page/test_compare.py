@@ -77,7 +77,7 @@ def test_a_choice_brings_a_second_rig_and_takes_it_away(window):
     window.wait("!location.search.includes('compare')")
 
 
-@pytest.mark.parametrize("k", [0, 1])
+@pytest.mark.parametrize("k", [1, pytest.param(0, marks=pytest.mark.slow)])
 def test_whichever_head_is_dragged_one_place_of_the_hand_pulls_both(pair, pictures, k):
     spring = pair.page.locator("#set-drag_stiffness")
     spring.press("Home")
@@ -203,7 +203,10 @@ def test_both_are_recorded_replayed_by_a_server_and_opened_on_the_page(chromium,
     pair.wait(f"birthsim.hello.mode === 'live' && {BESIDE}")
 
 
-@pytest.mark.parametrize(("width", "height"), [(320, 640), (768, 1024), (1280, 800), (1366, 768)])
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [(320, 640), (1280, 800), *(pytest.param(*size, marks=pytest.mark.slow) for size in ((768, 1024), (1366, 768)))],
+)
 def test_two_rigs_fit_a_window_of_any_size(chromium, server, pair, pictures, width, height):
     with Window(chromium, server.url, {"width": width, "height": height}) as window:
         window.wait(BESIDE)

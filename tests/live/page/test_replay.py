@@ -96,7 +96,9 @@ def test_a_recording_can_be_chosen(window, file):
     window.wait("birthsim.hello.mode === 'live'")
 
 
-@pytest.mark.parametrize("damage", ["foreign", "checksum", "large", "shape"])
+@pytest.mark.parametrize(
+    "damage", ["checksum", *(pytest.param(name, marks=pytest.mark.slow) for name in ("foreign", "large", "shape"))]
+)
 def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
     whole = file.read_bytes()
     content, words = {
