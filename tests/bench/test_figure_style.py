@@ -75,7 +75,14 @@ DRAWINGS = {
 }
 
 
-@pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
+LONG = ("learning", "studies")
+"""Figures that take seconds to draw twice."""
+
+
+@pytest.mark.parametrize(
+    ("draw", "names"),
+    [pytest.param(*case, id=name, marks=[pytest.mark.slow] * (name in LONG)) for name, case in DRAWINGS.items()],
+)
 def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_path):
     for folder in (tmp_path / "one", tmp_path / "other"):
         folder.mkdir()

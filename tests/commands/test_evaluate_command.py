@@ -185,6 +185,7 @@ class Waits(Slam):
 """
 
 
+@pytest.mark.slow
 def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
     """Two pieces side by side: one is complete at Ctrl-C, the other one waits for what comes only afterwards."""
     own, out = tmp_path / "own.py", tmp_path / "out"

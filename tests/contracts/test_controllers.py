@@ -16,7 +16,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
 NAMES = [*controller_names(), *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
-CASES = [pytest.param(name, sensors, RIG, id=f"{name}-{sensors}") for name in NAMES for sensors in SENSORS]
+CASES = [
+    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW and sensors != "lab"))
+    for name in NAMES for sensors in SENSORS
+]  # fmt: skip
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 RANDOM = {"random-valves"}
 """Its openings are drawn from one stream for all lanes."""

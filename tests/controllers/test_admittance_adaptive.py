@@ -44,7 +44,7 @@ def test_without_a_force_sensor_the_hands_force_is_not_read(sensors):
     )
 
 
-@pytest.mark.parametrize("factor", [0.5, 1.6])
+@pytest.mark.parametrize("factor", [0.5, pytest.param(1.6, marks=pytest.mark.slow)])
 def test_friction_that_is_not_as_believed_is_learned_on_a_circle(factor):
     rig = Parameters()
     changes = {f"cylinder{k}.coulomb_friction": factor * rig_cylinder.coulomb_friction
