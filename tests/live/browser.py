@@ -227,11 +227,22 @@ class Window:
     def wait(self, expression, seconds=PATIENCE):
         """Wait until an expression holds (the page's policy forbids the eval of playwright's own waiting)."""
         end = time.monotonic() + seconds
-        while not (found := self.value(expression)):
+        while not (found := self._value_by_now(expression)):
             if time.monotonic() > end:
                 raise AssertionError(f"never within {seconds} s: {expression}; last seen {found!r}; {self.value('birthsim')}")
             self.page.wait_for_timeout(30)
         return found
+
+    def _value_by_now(self, expression):
+        """Of an expression that may ask for what is not there yet: between two rigs there is no frame."""
+        from playwright.sync_api import Error
+
+        try:
+            return self.value(expression)
+        except Error as error:
+            if "properties of null" not in str(error):
+                raise
+            return None
 
     def frame(self):
         return self.value("birthsim.frame")
