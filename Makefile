@@ -114,7 +114,7 @@ quick: $(READY)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
-	$(PYTEST) tests/oracles tests/contracts tests/project/test_rooms.py
+	$(PYTEST) -m "not slow" tests/oracles tests/contracts tests/project/test_rooms.py
 
 # Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
 test-weekly:
