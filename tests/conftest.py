@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 
 from tests.console import run
+from tests.live import browser
 
 # A process that a script starts in the background ignores Ctrl-C; tests that raise it need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -55,6 +56,17 @@ def trained(tmp_path_factory, small):
     return folder, run("train", "--config", small, "--steps", 4096, "--seed", 3, "--authority", 60, "--out", folder)
 
 
+@pytest.fixture(scope="session")
+def chromium():
+    """A browser for all tests of a worker: a second one beside it would not start."""
+    if lack := browser.missing():
+        pytest.fail(f"CI=true, and {lack}")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright, browser.launch(playwright) as opened:
+        yield opened
+
+
 @pytest.fixture
 def brief(monkeypatch):
     """Evaluated episodes of 7 s, which have their first push."""
@@ -82,7 +94,8 @@ def pytest_xdist_make_scheduler(config, log):
     class Grouped(LoadScopeScheduling):
         def _split_scope(self, nodeid):
             path = nodeid.partition("::")[0]
-            return "browser" if path.startswith(("tests/live/page/", "tests/live/static/")) else path
+            shown = ("tests/live/page/", "tests/live/static/", "tests/project/test_docs.py")
+            return "browser" if path.startswith(shown) else path
 
     return Grouped(config, log) if config.getvalue("dist") == "load" else None
 

@@ -8,18 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.live import browser
 from tests.live.browser import CALM, PATIENCE, Server, Window
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    if lack := browser.missing():
-        pytest.fail(f"CI=true, and {lack}")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright, browser.launch(playwright) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="session")

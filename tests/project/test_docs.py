@@ -130,20 +130,16 @@ def test_a_data_file_is_chosen_from_and_sorted(page_of):
 
 
 @pytest.fixture
-def page_of():
+def page_of(chromium):
     """A function that shows HTML in a browser."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = browser.launch(playwright)
+    with chromium.new_context() as context:
 
         def shown(content):
-            page = chromium.new_page()
+            page = context.new_page()
             page.set_content(content)
             return page
 
         yield shown
-        chromium.close()
 
 
 def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands_write():
