@@ -53,7 +53,7 @@ POLICIES := agents/policies
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
 tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
 
-.PHONY: run figure next-kernels test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml requirements/base.txt
@@ -80,9 +80,9 @@ $(TOOLS)/.ready: requirements/tools.txt
 	$(TOOLS)/bin/python -m pip --disable-pip-version-check --no-input $(LOCKED)/tools.txt
 	touch $@
 
-# While Fig. 4 is computed, PyTorch is installed, and what the next steps run is compiled.
+# PyTorch is installed while Fig. 4 is computed.
 run: $(BASE)
-	@$(MAKE) --no-print-directory --jobs 2 figure next-kernels
+	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
 	@echo "== 2 of 3: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim-train --config circle_quick --seed 0 --out $(OUT)/policy
@@ -97,9 +97,6 @@ run: $(BASE)
 figure: $(BASE)
 	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
 	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
-
-next-kernels: $(AGENTS)
-	@$(BIN)/python -m tests.warming agents.residual.law:_stage baselines.admittance.stage:control baselines.estimation.stages:_comply 2>/dev/null
 
 test: $(READY)
 	$(BIN)/python -m tests.warming

@@ -1,4 +1,4 @@
-"""Compiles stages, once, on all processors: ``python -m tests.warming``, or those named as ``module:name``.
+"""Compiles all stages, once, on all processors: ``python -m tests.warming``.
 
 Without it every worker of pytest compiles for itself what it meets first. Stages are compiled by their address, without a
 simulation; other kernels are left to whoever calls them.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import pkgutil
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
 from multiprocessing import get_context
@@ -42,10 +41,7 @@ def warm(name: str) -> None:
 
 
 def main() -> None:
-    """Compile the stages named, one after the other, or all of them side by side."""
-    if named := sys.argv[1:]:
-        list(map(warm, named))
-        return
+    """Compile them side by side."""
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("spawn")) as pool:
         list(pool.map(warm, stages()))
 
