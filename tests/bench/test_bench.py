@@ -14,6 +14,7 @@ from baselines.commands import bench
 from tests.console import call
 
 
+@pytest.mark.slow
 def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypatch, capsys):
     # Machine code goes by the contents of the sources, so that the copy need not compile.
     shutil.copytree(speed.HERE / "birthsim_env", tmp_path / "birthsim_env")

@@ -27,6 +27,7 @@ def frames_of(path):
     return np.stack([np.frombuffer(frame, dtype=np.uint8).reshape(height, width, 3) for frame in reader]), about["fps"]
 
 
+@pytest.mark.slow
 def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_path):
     pictures = {"render_mode": "rgb_array", "picture_size": SIZE}
     env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.02, max_episode_steps=STEPS, **pictures)

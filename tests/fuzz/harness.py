@@ -10,6 +10,7 @@ A case is what a kind draws from its own random generator, so that a case is its
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import re
@@ -168,6 +169,7 @@ def _work(
     signal.signal(signal.SIGALRM, late)
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1), os.dup2(silent, 2)
+    faulthandler.disable()  # pytest's writes past them
     with open("/proc/self/statm", encoding="ascii") as statm:
         size = int(statm.read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY, resource.RLIM_INFINITY))

@@ -29,6 +29,7 @@ KNOWN = TRUE.replace({one.name: value_of(OWNER, one.name) for one in SOME} | {LA
 """What the owner of ``TRUE`` knows where only ``SOME`` is unknown and positions are shown at once."""
 
 
+@pytest.mark.slow
 def test_without_noise_the_rig_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(starts, "CLOSE", 1e-3)
     windows = cut(part(trial("ideal"), 0, 2500), KNOWN, 0.1).some(np.array([5, 8, 11, 14, 17, 20]))

@@ -92,7 +92,8 @@ def test_what_is_missing_is_named_with_the_command_that_installs_it(bare):
     assert browser.missing() == ""
 
 
-@pytest.mark.parametrize("ci", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("ci", [False, True])
 def test_without_a_browser_the_last_line_says_so_and_in_ci_it_fails(ci, tmp_path):
     (tmp_path / "hidden.py").write_text("from tests.live import browser\nbrowser.find_chromium = lambda: None\n")
     line = [sys.executable, "-m", "pytest", "-n1", "-p", "hidden", "-p", "no:cacheprovider", "-k", "slow_motion"]

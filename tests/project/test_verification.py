@@ -115,6 +115,7 @@ def test_measurements_are_json_that_others_read():
         json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda word, path=path: pytest.fail(f"{path.name}: {word}"))
 
 
+@pytest.mark.slow
 def test_balances_close_at_the_plants_step(monkeypatch):
     monkeypatch.setattr(balances, "SECONDS", 0.2)
     found = balances.chambers(2.5e-4, collide=False)

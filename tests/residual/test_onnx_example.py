@@ -59,6 +59,7 @@ def test_the_example_forgets_lanes(tmp_path):
         theirs.reset(lanes), own.reset(lanes)
 
 
+@pytest.mark.slow
 def test_the_example_runs_without_torch_and_prints_a_table(tmp_path):
     exported(policy(), tmp_path)
     program = (

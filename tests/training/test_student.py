@@ -74,6 +74,7 @@ def told(monkeypatch, capsys):
     return run
 
 
+@pytest.mark.slow
 def test_every_teacher_gets_a_student_that_is_a_policy(tmp_path, teachers, told):
     brief = ("--teacher", teachers, "--rounds", 1, "--hidden", 3)
     out = told(*brief, "--seeds", 2, "--out", tmp_path / "both")
@@ -102,6 +103,7 @@ def test_students_are_judged_beside_their_law(tmp_path, teachers, told, monkeypa
     assert "| seed_1 |" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_same_command_goes_on_with_the_seeds_that_are_not_done(tmp_path, teachers, told, monkeypatch):
     taught, teach = [], distill.teach
 

@@ -215,6 +215,7 @@ def slowly(log, number):
     return square(log, number)
 
 
+@pytest.mark.slow
 def test_processes_on_one_folder_divide_the_work_and_all_have_the_results(log, tmp_path):
     line = [sys.executable, "-c", PROCESS, str(log), str(tmp_path / "out")]
     processes = [subprocess.Popen(line, stderr=subprocess.DEVNULL) for _ in range(3)]

@@ -144,6 +144,7 @@ def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, se
         window.wait("birthsim.state.recording === null")
 
 
+@pytest.mark.slow
 def test_a_pointer_that_rests_keeps_its_hold(chromium, server):
     with Window(chromium, server.url) as window:
         window.hold(across=30)

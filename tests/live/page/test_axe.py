@@ -27,7 +27,14 @@ def test_a_picture_without_a_name_is_found(chromium):
     page.close()
 
 
-@pytest.mark.parametrize(("theme", "size"), [("light", WIDE), ("dark", WIDE), ("light", NARROW)])
+@pytest.mark.parametrize(
+    ("theme", "size"),
+    [
+        ("light", WIDE),
+        pytest.param("dark", WIDE, marks=pytest.mark.slow),
+        pytest.param("light", NARROW, marks=pytest.mark.slow),
+    ],
+)
 def test_nothing_is_found_on_the_page(chromium, server, theme, size):
     with Window(chromium, server.url, size) as window:
         page = window.page

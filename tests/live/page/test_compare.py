@@ -161,6 +161,7 @@ def test_keys_push_both_with_one_force_pause_and_reset_both(pair):
     assert pair.value("birthsim.frame.second.time === birthsim.frame.time")
 
 
+@pytest.mark.slow
 def test_both_are_recorded_replayed_by_a_server_and_opened_on_the_page(chromium, pair, tmp_path, pictures):
     page = pair.page
     page.locator("#record").click()

@@ -202,6 +202,7 @@ def test_a_server_that_comes_back_is_found_again(chromium, tmp_path):
             window.wait("birthsim.connected && document.querySelector('#offline').hidden && birthsim.frame?.pointer === null")
 
 
+@pytest.mark.slow
 def test_a_recording_is_saved_played_and_searched(chromium, window, tmp_path, pictures):
     page = window.page
     page.locator("#record").click()

@@ -120,6 +120,7 @@ def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
     window.wait("birthsim.hello.mode === 'live'")
 
 
+@pytest.mark.slow
 def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, file):
     hub = ReplayHub(Player(load_recording(file)), file.name)
     with Hosted(hub) as address, Window(chromium, address) as viewer:

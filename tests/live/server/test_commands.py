@@ -15,6 +15,7 @@ from birthsim_live.rig.recording import load_recording
 from tests.console import PATIENCE, call
 
 
+@pytest.mark.slow
 def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path: Path) -> None:
     from websockets.sync.client import connect
 

@@ -12,7 +12,7 @@ from tests.live.browser import Window
 from tests.live.static.lack import lack
 
 LACK = lack()
-pytestmark = [pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

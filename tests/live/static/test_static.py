@@ -17,17 +17,14 @@ from birthsim_live.rig.hand import Hold, Push
 from birthsim_live.rig.recording import load_recording
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
-from tests.build.targets import need_linker
-from tests.console import call
 from tests.live.browser import CALM, NARROW, Folder, Window, displacement, rendered
 from tests.live.static.lack import lack
 
 LACK = lack()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)]
 
 LARGEST = 1.5e6  # bytes
 SOONEST = 2.0  # s from the address to a rig that moves
-BUILT = {"backstepping", "admittance-backstepping", "residual:circle"}
 ROWS = """async (cases) => {
   const { Machine } = await import(new URL("static/worker/machine.js", location));
   const { Session } = await import(new URL("static/worker/session.js", location));
@@ -110,7 +107,6 @@ def rows_of(settings, periods, hold=None):
     return rows
 
 
-@pytest.mark.slow
 def test_the_folder_is_small(whole):
     assert sum(path.stat().st_size for path in whole.rglob("*") if path.is_file()) < LARGEST
 
@@ -123,14 +119,11 @@ def test_the_rig_moves_soon(chromium, address):
     assert min(soonest) < 1e3 * SOONEST
 
 
-@pytest.mark.parametrize(
-    ("page", "controllers", "periods"),
-    [("built", BUILT, 100), pytest.param("whole", {*BUILT, "lqr", "pid", "residual:circle_lab"}, 400, marks=pytest.mark.slow)],
-)
-def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(chromium, request, page, controllers, periods):
-    """``periods`` of each rig or pair of rigs."""
-    with Folder(request.getfixturevalue(page)) as served, Window(chromium, served + CALM) as window:
-        assert_bits_of_python(window, controllers, periods)
+def test_rigs_under_every_controller_sensor_and_scenario_have_the_bits_of_python(chromium, whole):
+    with Folder(whole) as served, Window(chromium, served + CALM) as window:
+        assert_bits_of_python(
+            window, {"backstepping", "admittance-backstepping", "residual:circle", "lqr", "pid", "residual:circle_lab"}, 400
+        )
         assert window.complaints == []
 
 
@@ -171,7 +164,7 @@ def test_displacement_is_force_over_stiffness(window):
     window.wait(f"birthsim.monitor.report().drawn > {drawn + 20} && birthsim.frame.real_time > 0.5")
 
 
-@pytest.mark.parametrize("compare", [pytest.param("nothing", marks=pytest.mark.slow), "backstepping"])
+@pytest.mark.parametrize("compare", ["nothing", "backstepping"])
 def test_a_recorded_episode_has_the_bits_of_python(window, tmp_path, compare):
     page = window.page
     page.locator("select[name=compare]").select_option(compare)
@@ -271,21 +264,3 @@ def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
         page.goto(served)
         page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
         page.close()
-
-
-def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path, monkeypatch, capsys):
-    need_linker()
-    (tmp_path / "rig.toml").write_text("[valves]\ndeadband = 0.02\n")
-    options = ("--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
-    status, _, complained = call("live", monkeypatch, capsys, *options)
-    assert status == 2
-    assert "imperfect valves" in complained.splitlines()[-1]
-    assert not (tmp_path / "page").exists()
-
-
-def test_a_folder_with_something_in_it_is_refused(tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.txt").write_text("mine")
-    status, _, complained = call("live", monkeypatch, capsys, "--static", tmp_path)
-    assert status == 2
-    assert complained.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

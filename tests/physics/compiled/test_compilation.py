@@ -62,6 +62,7 @@ def displaced(package, largest_file=10**9):
     return float(done.stdout), "compiling" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(package):
     assert displaced(package) == (pytest.approx(5.17), True)
     assert displaced(package) == (pytest.approx(5.17), False)

@@ -95,7 +95,10 @@ class OtherOptions:
         return self.body[:2] - self.sag if self.handle else self.inner.state[:2]
 
 
-@pytest.mark.parametrize("changes", [LINE, HANDLE, {**LINE, **HANDLE}], ids=["line", "handle", "both"])
+BOTH = pytest.param({**LINE, **HANDLE}, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("changes", [LINE, HANDLE, BOTH], ids=["line", "handle", "both"])
 def test_a_plant_with_reservoir_and_handle_moves_as_the_second_model_with_them(changes):
     rig = Parameters().replace(changes)
     plant, plain = Plant(rig), Plant()

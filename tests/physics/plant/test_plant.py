@@ -212,6 +212,7 @@ print(*kernel.inspect_asm().values())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instruction names")
 def test_kernel_is_vectorised() -> None:
     """Each division and root stands there twice, packed and for leftover lanes; scalar code would have no packed ones.
