@@ -224,4 +224,4 @@ class _Helper(CPUDispatcher):
 
 def helper(function: F) -> F:
     """Compile a function that is always inlined into the kernels that call it; called from Python it is a kernel."""
-    return function if numba.config.DISABLE_JIT else _Helper(function)  # type: ignore[return-value, attr-defined]
+    return kernel(function) if numba.config.DISABLE_JIT else _Helper(function)  # type: ignore[return-value, attr-defined]
