@@ -144,7 +144,6 @@ def test_what_is_stable_with_a_hand() -> None:
     assert found["half the friction fed forward"]["motion_mm"][0][2] < found["as it is"]["motion_mm"][0][2]
 
 
-@pytest.mark.slow
 def test_a_small_motion_under_a_stiff_hand_is_an_oscillation(monkeypatch: pytest.MonkeyPatch) -> None:
     """0.2 mm peak to peak are 0.2 N of a hand of 1000 N/m and 6 N of one of 30,000 N/m; 0.6 mm are too much for any."""
     spans = iter(np.array([[2e-4, 2e-4, 2e-4, 6e-4, np.nan], [1e-4, 1e-4, 1e-4, 1e-4, 1e-4]]) for _ in range(2))
