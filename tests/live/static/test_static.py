@@ -248,6 +248,7 @@ def test_a_hand_that_falls_silent_lets_go(window):
 
 def test_what_is_not_allowed_is_named_and_changes_nothing(chromium, address):
     with Window(chromium, address, NARROW) as window:
+        window.wait("birthsim.settings.controller.endsWith('own')")  # the policy arrives after the page
         before = window.value("birthsim.settings")
         window.page.evaluate("() => window.birthsim.send({ type: 'set', settings: { mass: 900 } })")
         window.wait("document.querySelector('#notices').textContent.includes('mass = 900; allowed: 1.5 to 6 kg')")
