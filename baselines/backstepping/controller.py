@@ -190,7 +190,7 @@ class BacksteppingController(StagedController):
         gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
         flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
         backstepping_law.inspect(
-            joints, measurement.pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent
+            joints, np.ascontiguousarray(measurement.pressures), reference.rows, believed, self._p, self._options, wanted, *flat, intent
         )
         return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
 

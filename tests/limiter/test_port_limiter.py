@@ -66,6 +66,7 @@ def test_one_that_gives_energy_loses_its_authority():
     assert run(-20.0, PortLimiter(Full(), RIG, capacity=math.inf), 3.0) == (1.0, 1.0)
 
 
+@pytest.mark.slow
 def test_a_stiffer_spring_that_is_asked_for_is_paid_by_who_asks():
     """Held 20 mm out while the setpoint doubles, then let back: the hand gets 0.8 J of which it gave 0.4 J."""
     limiter, ends = PortLimiter(Full(), RIG, speed=math.inf), []
