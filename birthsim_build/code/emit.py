@@ -18,7 +18,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from birthsim_build.code.advance import advance_code
+from birthsim_build.code import advance
 from birthsim_build.code.counting import counted
 from birthsim_build.code.targets import TARGETS, Target
 from birthsim_env.loop.stage import SIGNATURE
@@ -48,8 +48,9 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
     )
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
     kernels = [_kernel_code(function) for function in functions]
-    module = llvm.parse_assembly(head + advance_code([symbol for symbol, _ in kernels]) + _constants(data))
-    for _, code in kernels:
+    runs, own = _code_of(advance.advance, advance.SIGNATURE)
+    module = llvm.parse_assembly(head + advance.advance_code([symbol for symbol, _ in kernels], runs) + _constants(data))
+    for _, code in [*kernels, (runs, own)]:
         module.link_in(llvm.parse_assembly(head + code))
     for one in [*module.functions, *module.global_variables]:
         if not one.is_declaration and not one.name.startswith(EXPORTED):
@@ -66,12 +67,16 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
 
 
 def _kernel_code(function: str) -> tuple[str, str]:
-    """Symbol and LLVM code of a kernel with the signature of a stage, without what belongs to this processor or to Python."""
+    """Symbol and LLVM code of the stage ``module:name``."""
     module, _, name = function.partition(":")
-    kernel: Any = getattr(import_module(module), name)
-    if SIGNATURE.args not in kernel.overloads:
-        kernel.compile(SIGNATURE)
-    compiled = kernel.overloads[SIGNATURE.args]
+    return _code_of(getattr(import_module(module), name), SIGNATURE)
+
+
+def _code_of(kernel: Any, signature: Any) -> tuple[str, str]:
+    """Symbol and LLVM code of a kernel, without what belongs to this processor or to Python."""
+    if signature.args not in kernel.overloads:
+        kernel.compile(signature)
+    compiled = kernel.overloads[signature.args]
     code = str(compiled.library._get_module_for_linking())
     code = re.sub(r"^target .*$|^source_filename.*$", "", code, flags=re.MULTILINE)
     code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code).replace("= common ", "= internal ")
