@@ -189,9 +189,8 @@ class BacksteppingController(StagedController):
         wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
         gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
         flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
-        backstepping_law.inspect(
-            joints, measurement.pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent
-        )
+        pressures = np.ascontiguousarray(measurement.pressures)  # whatever the caller's layout, one kernel is compiled
+        backstepping_law.inspect(joints, pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent)
         return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
 
     def _joints(

@@ -141,7 +141,7 @@ def layouts_of(stage: Any) -> list[type[Rows] | None]:
     """The layout with which each argument of a stage is annotated; None for a whole number."""
     function = getattr(stage, "py_func", stage)
     hints = get_type_hints(function)
-    named = [hints.get(name) for name in function.__code__.co_varnames[:ARGUMENTS]]
+    named = [hints.get(name) for name in function.__code__.co_varnames[: function.__code__.co_argcount]]
     return [one if isinstance(one, type) and issubclass(one, Rows) else None for one in named]
 
 
