@@ -143,7 +143,6 @@ MET_ROWS = LIMITER + authority.ROWS
 WAYS = MET_ROWS + unexplained.ROWS
 PISTONS = WAYS + 4
 """Rows of memory at which its parts begin: smoothed action; authority; forces met; which ways pistons have moved; observer."""
-MEASURED_ROWS = 5
 
 
 @kernel
@@ -152,15 +151,15 @@ def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane
     p, size, sampled, period = about[len(CONSTANTS) :], int(about[SIZE]), about[SAMPLED] > 0.0, about[PERIOD]
     m = block(memory, PISTONS + int(about[OBSERVER]))[:, :n]
     own = scratch(17)[:, :n]
-    joints, disturbance, told, nothing, moving = own[:4], own[4:6], own[6:13], own[13:15], own[15]
+    joints, disturbance, told, nothing, moving, noise = own[:4], own[4:6], own[6:13], own[13:15], own[15], own[16]
     for i in range(n):
-        nothing[0, i], nothing[1, i], moving[i] = 0.0, 0.0, 1.0
+        nothing[0, i], nothing[1, i], moving[i], noise[i] = 0.0, 0.0, 1.0, about[NOISE]
     force, pistons = s[USER_FORCE:REFERENCE, :n], m[PISTONS:]
     position, velocity, pressures = s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n], s[PRESSURE:USER_FORCE, :n]
     if sampled:
         observers.observe(
             pistons, s[TIME, :n], position, s[POSITION_TIME, :n], velocity, pressures, p, period, observers.BANDWIDTH,
-            about[NOISE], force, nothing, moving,
+            noise, force, nothing, moving,
         )  # fmt: skip
     else:
         disturbance_observer.observe(
@@ -212,17 +211,16 @@ class ResidualLaw(StagedController):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
-        rows = observers.memory_rows(self.parameters) if sampled else MEASURED_ROWS
+        pistons = observers.fresh_memory(self.parameters) if sampled else np.array([0.0, 0.0, 0.0, 0.0, 1.0])
         constants = {
-            **{"sampled": sampled, "rows": rows, "period": board.control_period, "noise": board.position_noise},
+            **{"sampled": sampled, "rows": len(pistons), "period": board.control_period, "noise": board.position_noise},
             **{"size": settings.size, "authority": settings.authority, "time_constant": settings.time_constant},
             **{"quickness": 1.0 - exact.number("exp", -board.control_period / settings.time_constant)},
             **{"level": authority.LEVEL, "unit": FORCE_UNIT, "has_law": self._law is not None},
             **{"stiffens": settings.impedance != "fixed", "damps": settings.impedance == "variable"},
         }
-        fresh = np.zeros(PISTONS + rows)
+        fresh = np.concatenate([np.zeros(PISTONS), pistons])
         fresh[LIMITER:MET_ROWS] = authority.FRESH
-        fresh[PISTONS + (observers.FRESH if sampled else 4)] = 1.0
         own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *self._p]), fresh)
         return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
 

@@ -3,7 +3,7 @@
 The law of ``cartesian_law`` with one gain c for all directions, with the measured force and with what is known of the rest:
     j = jr - 3 c (a - ar) - (3 c^2 + 2) (v - vr) - (c^3 + 2 c) (x - xr),   m a = J^-T L + m g + Fu,
     L_i = F_i - Fext_i - Fv v_i + unseen_i
-with the disturbance forces of ``state_estimator``: believed friction and what an observer finds besides.
+with the forces unseen of ``knowledge``: believed friction and what an observer finds besides.
 
 - While pistons rest (``observers``) position errors weigh ``rest_push`` times as much, since stiction, not inertia, has to be
   overcome, and those within ``dead_zone`` move nothing. Once the reference rests the loop has a gain of its own, softer: what
@@ -121,8 +121,8 @@ def command(
     """Writes ``openings`` (4, N) and carries ``memory`` (MEMORY, N) on by one period.
 
     ``joints``, ``pressures``, ``motion``, ``force``, ``disturbance_force``, ``rest``, ``moving`` and ``spools`` are those of
-    ``state_estimator.Estimate``; ``target`` (15, N) is the reference; ``gains`` has the
-    order of ``GAIN_NAMES``; ``told`` is what ``controller.feedforward_rows`` gives.
+    ``knowledge``; ``target`` (15, N) is the reference; ``gains`` has the order of ``GAIN_NAMES``; ``told`` is what
+    ``controller.feedforward_rows`` gives.
     """
     c4, gain, rest_gain, rest_push, dead_zone = gains[0], gains[1], gains[2], gains[3], gains[4]
     quickness, level, fall, least, most = gains[5], gains[6], gains[7], gains[8], gains[9]

@@ -13,11 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import feedforward_rows, require_stiffness
-from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
 
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""
@@ -99,17 +96,15 @@ def mark_moving(motion: Array, moving: Array) -> None:
 
 
 @kernel
-def _forecast(
-    offset: Array,
-    reference: Array,
-    force: Array,
-    mass: float,
-    ratio: float,
-    period: float,
-    ticks: NDArray[np.int64],
+def forecast(
+    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, ticks: NDArray[np.int64],
     ahead: Array,
-) -> None:
-    """``offset`` (4, N) one period from now; ``ticks`` (M,) increasing; writes ``ahead`` (M, 4, N): x, y, vx, vy."""
+) -> None:  # fmt: skip
+    """Writes ``ahead`` (M, 4, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
+
+    The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` (4, N) is that of one
+    period from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
+    """
     z = offset.copy()
     for i in range(offset.shape[1]):
         kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
@@ -125,47 +120,3 @@ def _forecast(
                 v, a, j = reference[2 + axis, i], reference[4 + axis, i], reference[6 + axis, i]
                 ahead[k, axis, i] = reference[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0)) + z[axis, i]
                 ahead[k, 2 + axis, i] = v + t * (a + t * j / 2.0) + z[2 + axis, i]
-
-
-class Admittance:
-    """The reference motion of N lanes, one control period at a time.
-
-    Arguments: ``parameters``, the rig as believed (its mass and control period); ``damping_ratio``, zeta, more than 0.
-    """
-
-    def __init__(self, parameters: Parameters, damping_ratio: float = DAMPING_RATIO) -> None:
-        if not (math.isfinite(damping_ratio) and damping_ratio > 0):
-            raise ValueError(f"damping_ratio = {damping_ratio!r}; allowed: a positive number")
-        self._numbers = (parameters.mechanics.mass, float(damping_ratio), parameters.electronics.control_period)
-        self._offset: Array = np.empty((4, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Start anew on the target: all lanes, or those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._offset = np.empty((4, 0))
-        elif self._offset.shape[1]:
-            self._offset[:, lanes] = 0.0
-
-    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
-        """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
-
-        Called once per control period, with signals over N lanes. ``damping_factor`` (N,) multiplies B; below 1 it is 1. Raises
-        ``ValueError`` for a stiffness that is not positive definite, and for a factor of another shape.
-        """
-        require_stiffness(reference, 0.0)
-        lanes = reference.rows.shape[1]
-        if self._offset.shape[1] != lanes:
-            self._offset = np.zeros((4, lanes))
-        motion, factor = np.empty((8, lanes)), feedforward_rows(lanes, None, None, damping_factor)[4]
-        give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, motion)
-        return motion
-
-    def forecast(self, reference: Reference, force: Array, ticks: NDArray[np.int64]) -> Array:
-        """x, y (m), vx, vy (m/s) of the motion so many periods after the last ``update``, (M, 4, N), if nothing new happens:
-        the force (2, N), N, and the stiffness stay, and the target goes on with the jerk that it has.
-
-        ``ticks`` (M,) are increasing whole numbers from 1 on.
-        """
-        ahead = np.empty((len(ticks), 4, reference.rows.shape[1]))
-        _forecast(self._offset, reference.rows, force, *self._numbers, ticks, ahead)
-        return ahead

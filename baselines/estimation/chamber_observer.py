@@ -8,10 +8,7 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from __future__ import annotations
 
-import numpy as np
-
 from baselines.valve_inverse import driving_flows
-from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -62,39 +59,3 @@ def observe(
                 measured[chamber, i] if new else fraction * measured[chamber, i] + (1.0 - fraction) * expected
             )
             spools[chamber, i] = 0.0 if new else openings[chamber, i] + kept * away
-
-
-class ChamberObserver:
-    """Spools and chamber pressures of N lanes as they are believed to be, one control period at a time.
-
-    Arguments: the control ``period``, s, the rig (PARAMETERS,), and ``bandwidth``, w in 1/s, infinite for exact cells.
-    ``spools`` (4, N) start shut; ``openings`` (4, N), which the next ``update`` takes for commanded, are for the controller to
-    fill.
-    """
-
-    def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
-        self._p, self._period, self._fraction = lane_parameters, period, 1.0 - exact.number("exp", -bandwidth * period)
-        self.spools: Array = np.empty((4, 0))
-        self.openings: Array = np.empty((4, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self.spools = np.empty((4, 0))
-        elif self.spools.shape[1]:
-            self._fresh[lanes] = 1.0
-
-    def update(self, measured: Array, joints: Array) -> Array:
-        """Pressures (4, N), Pa, after one more period, from those ``measured`` (4, N) at its end.
-
-        ``joints`` (4, N): y1, y2 (m), v1, v2 (m/s) at its start.
-        """
-        lanes = measured.shape[1]
-        if self.spools.shape[1] != lanes:
-            self.spools, self.openings = np.zeros((4, lanes)), np.zeros((4, lanes))
-            self._pressures, self._fresh = np.zeros((4, lanes)), np.ones(lanes)
-        observe(
-            self.spools, self._pressures, self.openings, measured, joints, self._p, self._period, self._fraction, self._fresh
-        )  # fmt: skip
-        self._fresh[:] = 0.0
-        return self._pressures

@@ -6,9 +6,7 @@ It is there before an observer sees it, and since it never looks at the measured
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from birthsim_env.loop.signals import Mask
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled import lanes as at
@@ -40,8 +38,9 @@ def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) ->
 
 
 @kernel
-def _forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
-    """``ahead`` (M, 4, N): x, y, vx, vy at the ends of the M ``steps``, s; writes ``drag`` (M, 2, N)."""
+def forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
+    """Writes the friction ``drag`` (M, 2, N), N, along a motion ``ahead`` (M, 4, N) with x, y, vx, vy at the ends of the M
+    ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them."""
     one, joints = np.empty((4, 1)), np.empty((4, 1))
     for i in range(ahead.shape[2]):
         z1, z2 = bristles[0, i], bristles[1, i]
@@ -52,33 +51,3 @@ def _forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array
             z1 = bristle(z1, joints[2, 0], p[at.FC1], p[at.FS1], p, steps[k])
             z2 = bristle(z2, joints[3, 0], p[at.FC2], p[at.FS2], p, steps[k])
             drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z1, p[at.BRISTLE_S0] * z2
-
-
-class ReferenceFriction:
-    """Dry friction of both pistons, N, (2, N), along a reference motion. Arguments: control period, s, rig (PARAMETERS,)."""
-
-    def __init__(self, period: float, lane_parameters: Array) -> None:
-        self._period, self._p = period, lane_parameters
-        self._bristles: Array = np.empty((2, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Relax the bristles of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._bristles = np.empty((2, 0))
-        elif self._bristles.shape[1]:
-            self._bristles[:, lanes] = 0.0
-
-    def update(self, motion: Array) -> Array:
-        """Friction after one more period of ``motion`` (8, N), as ``Admittance.update`` gives it."""
-        lanes = motion.shape[1]
-        if self._bristles.shape[1] != lanes:
-            self._bristles = np.zeros((2, lanes))
-        drag = np.empty((2, lanes))
-        rub(motion, self._p, self._period, self._bristles, drag)
-        return drag
-
-    def forecast(self, ahead: Array, ticks: NDArray[np.int64]) -> Array:
-        """Friction, N, (M, 2, N), along the motion ``ahead`` (M, 4, N) that ``Admittance.forecast`` gives for these ticks."""
-        drag = np.empty((len(ticks), 2, ahead.shape[2]))
-        _forecast(ahead, self._p, self._period * np.diff(ticks, prepend=0), self._bristles, drag)
-        return drag

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.estimation.admittance import DAMPING_RATIO, give_way, is_stiffer, mark_moving
-from baselines.estimation.observers import BANDWIDTH, ESTIMATE, FRESH, memory_rows, observe
+from baselines.estimation.observers import BANDWIDTH, ESTIMATE, fresh_memory, observe
 from baselines.staged import LawStage
 from birthsim_env.loop.rows import (
     ASKED,
@@ -73,13 +73,13 @@ def _locate(world: int, seen: int, memory: int, constants: int, tables: int, lan
     if rows == 0:
         piston_motion(s[POSITION:POSITION_TIME], p, s[JOINTS:OWN], n)
         return 0
-    nothing, m = scratch(3)[:, :n], block(memory, rows)[:, :n]
+    nothing, m = scratch(4)[:, :n], block(memory, rows)[:, :n]
     for i in range(n):
-        nothing[0, i], nothing[1, i], nothing[2, i] = 0.0, 0.0, 1.0
+        nothing[0, i], nothing[1, i], nothing[2, i], nothing[3, i] = 0.0, 0.0, 1.0, about[NOISE]
     informed = about[INFORMED] > 0.0
     observe(
         m, s[TIME, :n], s[POSITION:VELOCITY, :n], s[POSITION_TIME, :n], s[VELOCITY:POSITION_TIME, :n],
-        s[PRESSURE:USER_FORCE, :n], p, about[TICK], BANDWIDTH, about[NOISE],
+        s[PRESSURE:USER_FORCE, :n], p, about[TICK], BANDWIDTH, nothing[3],
         s[USER_FORCE:REFERENCE, :n] if informed else nothing[:2], nothing[:2], s[MOVING, :n] if informed else nothing[2],
     )  # fmt: skip
     for row in range(4):
@@ -93,8 +93,6 @@ def pistons(rig: Parameters, sampled: bool, informed: bool) -> LawStage:
 
     Where it is ``informed`` it knows the user's force, and lets pistons rest while ``MOVING`` says that nothing moves.
     """
-    board, rows = rig.electronics, memory_rows(rig) if sampled else 0
-    about = (rows, board.control_period, board.position_noise, informed)
-    fresh = np.zeros(rows)
-    fresh[FRESH : FRESH + 1] = 1.0
+    board, fresh = rig.electronics, fresh_memory(rig) if sampled else np.zeros(0)
+    about = (len(fresh), board.control_period, board.position_noise, informed)
     return LawStage(_locate, np.array([*about, *parameter_column(rig)]), fresh)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance import law as admittance_law
-from baselines.admittance.controller import LEAST_FRACTION, AdmittanceBackstepping
+from baselines.admittance.controller import LEAST_FRACTION, AdmittanceController
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.geometry import inverse_geometry
@@ -286,7 +286,7 @@ def test_the_gain_fraction_is_that_of_the_direction() -> None:
     beam = wanted.position / np.hypot(*wanted.position)
     across = np.array([-beam[1], beam[0]])
     way = across * np.array([1.0, 0.0, 1.0, 0.0]) + beam * np.array([0.0, 1.0, 1.0, 0.0])
-    law, rate = AdmittanceBackstepping(rig, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
+    law, rate = AdmittanceController(rig, learn=False, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
     for time in TIMES[:1000]:
         clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
         place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
@@ -301,7 +301,7 @@ def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, A
     the law is told of the forces ``told`` (2, N), N, along them, and not that a hand pushes with ``unmeasured`` (2, N), N."""
     rig, lanes = closed_loop.FRICTIONLESS, told.shape[1]
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
-    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceBackstepping(rig)
+    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceController(rig, learn=False)
     start = plant.piston.copy()
 
     def blind(plant: Plant, time: float, force: Array) -> Measurement:
@@ -324,7 +324,7 @@ def test_a_belief_holds_the_pistons_against_it_whatever_the_observer_finds() -> 
 
     A force that is really there and unknown is observed anyway, and what is told comes on top: lanes 5 to 7 are told the truth.
     """
-    rig, c = closed_loop.FRICTIONLESS, AdmittanceBackstepping.TUNED["ideal"]["gain"]
+    rig, c = closed_loop.FRICTIONLESS, AdmittanceController.TUNED["ideal"]["gain"]
     told = np.array([[12.0, -12.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 12.0, -12.0, 0.0, 0.0, 0.0, 0.0]])
     push = np.zeros((2, 8))
     push[:, 4:] = [[10.0, 10.0, 0.0, -8.0], [0.0, 0.0, 10.0, 5.0]]
@@ -343,7 +343,7 @@ def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
     lanes = 3
     wanted = closed_loop.holding(np.array([[0.5, 0.45, 0.55], [0.0, 0.05, -0.1]]), 2000.0)
     plant = closed_loop.resting_at(wanted, Parameters())
-    plain, zero, several, single = (AdmittanceBackstepping() for _ in range(4))
+    plain, zero, several, single = (AdmittanceController(learn=False) for _ in range(4))
     rng = np.random.default_rng(0)
     for tick in range(50):
         push = rng.uniform(-5, 5, (2, lanes))

@@ -15,7 +15,8 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_arra
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.estimation.test_observers import PERIOD, lane_of, observer, rms
+from tests.estimation.test_observers import PERIOD, lane_of, rms
+from tests.oracles.observed import Sampled
 
 STUCK = np.array([[0.02], [-0.05]])
 """m: where friction holds both pistons."""
@@ -47,7 +48,7 @@ def apparent(rig: Parameters) -> Array:
 
 def spread(moving: float, rig: Parameters = Parameters(), lanes: int = 16) -> dict[str, Array]:  # noqa: B008
     """RMS over lanes and the last second of 2.5 s: errors of position, speed and of the force that friction bears, (2,)."""
-    estimator, kept = observer(rig), []
+    estimator, kept = Sampled(rig), []
     for measured in stuck(rig, lanes, 2.5):
         estimate = estimator.update(measured, moving=np.full(lanes, moving))
         if measured.time[0] >= 1.5:
@@ -72,7 +73,7 @@ def test_a_stuck_piston_is_seen_with_less_noise() -> None:
 def test_a_piston_that_may_not_rest_never_does() -> None:
     """``moving`` 1 is the observer without rest, bit by bit; and 1 again in the middle of a rest ends it at once."""
     rig, lanes = Parameters(), 3
-    plain, told, sometimes = observer(rig), observer(rig), observer(rig)
+    plain, told, sometimes = Sampled(rig), Sampled(rig), Sampled(rig)
     for measured in stuck(rig, lanes, 1.2):
         late = measured.time[0] >= 1.0
         expected = plain.update(measured).copy()
@@ -92,7 +93,7 @@ def test_a_piston_that_slips_is_noticed(speed: float) -> None:
     position trails by 0.06 mm.
     """
     rig, lanes, woken, errors = Parameters(), 16, np.full(16, np.inf), []
-    estimator = observer(rig)
+    estimator = Sampled(rig)
     for measured in stuck(rig, lanes, 1.5, speed):
         estimate, time = estimator.update(measured, moving=np.zeros(lanes)), measured.time[0]
         woken = np.where((time >= 1.0) & (estimator.rest[1] < 0.5) & np.isinf(woken), time - 1.0, woken)
@@ -107,7 +108,7 @@ def test_a_piston_that_slips_is_noticed(speed: float) -> None:
 
 def settling(told: bool) -> float:
     """Time in which cylinder 2 comes to rest by 63 % after a slip of 40 ms, of which the observer is told or not, s."""
-    estimator, times, rests = observer(Parameters()), [], []
+    estimator, times, rests = Sampled(Parameters()), [], []
     for measured in stuck(Parameters(), 8, 2.6, 0.05, 0.04):
         time = measured.time[0]
         estimator.update(measured, moving=np.full(8, float(told and 1.0 <= time < 1.08)))
@@ -141,7 +142,7 @@ def test_other_control_periods(period: float) -> None:
 def test_at_rest_friction_takes_up_the_load_with_a_double_pole() -> None:
     """Without samples: d goes to what friction must bear, in steps with the pole exp(-wr T) twice."""
     rig = Parameters().replace({"electronics.position_noise": 0.0, "electronics.pressure_noise": 0.0})
-    estimator, loads = observer(rig), []
+    estimator, loads = Sampled(rig), []
     for tick, measured in enumerate(stuck(rig, 1, 0.1)):
         frozen = dataclasses.replace(measured, position_time=np.zeros(1))
         if tick == 1:
@@ -158,11 +159,11 @@ def test_resting_lanes_do_not_know_of_each_other() -> None:
     """Lanes of which one rests, one may not and one slips: each as if alone; and a reset one wakes like a new observer."""
     rig, moving = Parameters(), np.array([0.0, 1.0, 0.0])
     measurements = list(stuck(rig, 3, 1.4, 0.05, 0.9))
-    together, reset = observer(rig), observer(rig)
+    together, reset = Sampled(rig), Sampled(rig)
     estimates = np.array([together.update(m, moving=moving).copy() for m in measurements])
-    late = observer(rig)
+    late = Sampled(rig)
     for lane in range(3):
-        alone = observer(rig)
+        alone = Sampled(rig)
         own = [alone.update(lane_of(m, lane), moving=moving[lane : lane + 1])[:, 0].copy() for m in measurements]
         assert np.array_equal(own, estimates[:, :, lane])
     for tick, measured in enumerate(measurements):
