@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge, law, stage
+from baselines.admittance import knowledge, stage
+from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.controller import check_flags, check_gains, require_stiffness
 from baselines.estimation import inertial
@@ -114,7 +115,8 @@ class AdmittanceController(StagedController):
     @property
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
-        return self._memories[-1][[stage.LAW + row for row in law.GAIN_SHARES]]
+        follower = Memory(self._memories[-1]).follower
+        return np.stack([follower.across.fraction, follower.along.fraction])
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
@@ -126,22 +128,18 @@ class AdmittanceController(StagedController):
         inert = sampled and learns_force and board.acceleration_bandwidth > 0
         sampled = sampled and not inert
         kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
-        g, yields = self._gains[kind], sampled and learns_force
-        known = knowledge.constants(
-            rig, sampled, noisy, g, force_sensor=self._force_sensor, learn=self._learn, place=HANDED if inert else POSITION,
-            force_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
-            friction_rate=g["friction_rate"] if learns_force else 0.0,
-        )  # fmt: skip
+        g = self._gains[kind]
+        least, falls = (SAMPLED_LEAST, MOST_FALLS) if sampled and learns_force else (LEAST_FRACTION, 1.0)
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
-        own = {
-            **{"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, **g},
-            **{"least_fraction": SAMPLED_LEAST if yields else LEAST_FRACTION, "most_falls": MOST_FALLS if yields else 1.0},
-        }
-        shares = np.zeros(law.MEMORY)
-        shares[law.GAIN_SHARES] = 1.0
-        fresh = np.concatenate([knowledge.fresh_memory(), shares, knowledge.pistons_memory(rig, sampled)])
-        follow = LawStage(stage.control, np.array([*known, *(own[name] for name in law.GAIN_NAMES), *self._p]), fresh)
-        return [inertial.law_stage(rig), follow] if inert else [follow]
+        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, "least_fraction": least, "most_falls": falls, **g}
+        about = knowledge.beliefs(
+            rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
+            place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
+            most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
+        )  # fmt: skip
+        constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
+        law = LawStage(stage.control, constants, knowledge.fresh_memory(rig, sampled))
+        return [inertial.law_stage(rig), law] if inert else [law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose stiffness is not positive definite."""

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.admittance import knowledge as at
+from baselines.admittance import knowledge
+from baselines.admittance.rows import Beliefs, Known, Memory
 from baselines.admittance.stage import inform
 from baselines.controller import require_stiffness
-from baselines.estimation import admittance, reference_friction
+from baselines.estimation import admittance, reference_friction, stages
+from baselines.estimation.admittance import Compliance
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import HANDED
 from birthsim_env.loop.signals import Measurement, Reference
@@ -19,10 +21,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 
 class Informed(StagedController):
-    """``update`` takes the signals of a control period; ``known`` (KNOWN, N) and ``memory`` are then those of ``knowledge``.
+    """After ``update`` with the signals of a control period, ``known`` and ``memory`` are what the law then knows.
 
-    The planner writes its openings to ``memory[OPENED:JOINTS]``. Arguments: the rig as believed, and for ``ideal`` and ``lab``
-    sensors the gains that ``knowledge.constants`` asks for.
+    The planner writes its openings to ``memory.chambers.opening``. Arguments: the rig as believed, and for ``ideal`` and
+    ``lab`` sensors the gains that ``knowledge.beliefs`` asks for.
     """
 
     def __init__(self, parameters: Parameters, gains: Mapping[str, Mapping[str, float]]) -> None:
@@ -32,12 +34,12 @@ class Informed(StagedController):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         rig, gains = self.parameters, self._gains["lab" if sampled else "ideal"]
         self._fraction = gains["friction_fraction"]
-        fresh = np.concatenate([at.fresh_memory(), at.pistons_memory(rig, sampled)])
-        return [LawStage(inform, np.array([*at.constants(rig, sampled, sampled, gains), *self._p]), fresh)]
+        about = Beliefs.numbers(**knowledge.beliefs(rig, sampled, sampled, gains))
+        return [LawStage(inform, about, knowledge.fresh_memory(rig, sampled))]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        self.known: Array = np.zeros((at.KNOWN, lanes))
-        return [(self.known, HANDED)]
+        self.known = Known(np.zeros((Known.size, lanes)))
+        return [(self.known.rows, HANDED)]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose stiffness is not positive definite."""
@@ -49,20 +51,16 @@ class Informed(StagedController):
             self.explain(measurement, reference)
 
     @property
-    def memory(self) -> Array:
-        """What the stage remembers, (M, N)."""
-        return self._memories[0]
+    def memory(self) -> Memory:
+        """What the stage remembers."""
+        return Memory(self._memories[0])
 
     def forecast(self, reference: Reference, ticks: NDArray[np.int64]) -> tuple[Array, Array]:
         """The motion's x, y (m), vx, vy (m/s), (M, 4, N), and the forces unseen along it, N, (M, 2, N), ``ticks`` (M,) periods
         after the last ``update``: friction follows the motion, what was observed besides stays."""
-        known, memory, mechanics = self.known, self.memory, self.parameters.mechanics
-        period, count = self.parameters.electronics.control_period, known.shape[1]
-        ahead, drag = np.empty((len(ticks), 4, count)), np.empty((len(ticks), 2, count))
-        admittance.forecast(
-            memory[at.OFFSET : at.FRESH], reference.rows, known[at.FORCE : at.BELIEVED], mechanics.mass,
-            admittance.DAMPING_RATIO, period, ticks, ahead,
-        )  # fmt: skip
-        steps = period * np.diff(ticks, prepend=0)
-        reference_friction.forecast(ahead, self._p, steps, memory[at.BRISTLES : at.SPOOLS], drag)
-        return ahead, known[at.UNSEEN : at.DRAG] - known[at.BELIEVED : at.UNSEEN] - self._fraction * drag
+        known, memory, about = self.known, self.memory, Compliance(stages.compliance(self.parameters))
+        lanes, steps = known.drag.shape[1], self.parameters.electronics.control_period * np.diff(ticks, prepend=0)
+        ahead, drag = np.empty((len(ticks), 4, lanes)), np.empty((len(ticks), 2, lanes))
+        admittance.forecast(memory.offset, reference, known.given.force, about, ticks, ahead)
+        reference_friction.forecast(ahead, self._p, steps, memory.bristle, drag)
+        return ahead, known.unseen - known.given.believed - self._fraction * drag

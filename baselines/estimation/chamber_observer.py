@@ -8,12 +8,14 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from __future__ import annotations
 
+from baselines.estimation.rows import Joints
 from baselines.valve_inverse import driving_flows
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, rows
 
 
 @helper
@@ -34,12 +36,23 @@ def predicted_pressure(
     return expected
 
 
+class Chambers(Rows):
+    """What is believed of valves and chambers P1, N1, P2, N2."""
+
+    spool = rows(4, "1", "opening of the spool")
+    pressure = rows(4, "Pa", "pressure of the chamber, absolute")
+    opening = rows(4, "1", "opening that was commanded")
+
+
 @helper
 def observe(
-    spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, fraction: float,
-    fresh: Array,
+    chambers: Chambers, measured: Array, joints: Joints, p: Array, period: float, fraction: float, fresh: Array
 ) -> None:  # fmt: skip
-    """Carries ``spools`` (4, N) and ``pressures`` (4, N) on by one period, in which ``openings`` (4, N) were commanded."""
+    """Carries ``chambers`` on by one period to whose end pressures (4, N), Pa, were ``measured``, with a trust ``fraction`` in
+    them.
+
+    ``joints`` are those of its start. Where ``fresh`` (N,) is 1 valves are shut and pressures as measured.
+    """
     kept = exact.exp(-period / p[at.TAU])
     # Of the way that is left to the command, the mean over the period.
     mean = (1.0 - kept) * p[at.TAU] / period
@@ -48,14 +61,13 @@ def observe(
         half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         area_p, area_n = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         area = area_p if chamber % 2 == 0 else area_n
-        for i in range(spools.shape[1]):
-            away = spools[chamber, i] - openings[chamber, i]
+        for i in range(fresh.shape[0]):
+            opening = chambers.opening[chamber, i]
+            away = chambers.spool[chamber, i] - opening
             expected = predicted_pressure(
-                pressures[chamber, i], openings[chamber, i] + mean * away, area, half + sign * joints[cylinder, i],
-                sign * joints[2 + cylinder, i], period, p,
+                chambers.pressure[chamber, i], opening + mean * away, area, half + sign * joints.position[cylinder, i],
+                sign * joints.speed[cylinder, i], period, p,
             )  # fmt: skip
-            new = fresh[i] > 0.0
-            pressures[chamber, i] = (
-                measured[chamber, i] if new else fraction * measured[chamber, i] + (1.0 - fraction) * expected
-            )
-            spools[chamber, i] = 0.0 if new else openings[chamber, i] + kept * away
+            new, shown = fresh[i] > 0.0, measured[chamber, i]
+            chambers.pressure[chamber, i] = shown if new else fraction * shown + (1.0 - fraction) * expected
+            chambers.spool[chamber, i] = 0.0 if new else opening + kept * away

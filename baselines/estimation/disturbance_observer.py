@@ -8,7 +8,7 @@ the compliance error in disguise.
 
 from __future__ import annotations
 
-from birthsim_env.loop.stage import scratch
+from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -18,13 +18,13 @@ from birthsim_env.physics.inverse_kinematics import piston_motion
 
 @helper
 def accelerations(
-    y1: float, y2: float, v1: float, v2: float, i: int, pressures: Array, force: Array, believed: Array, p: Array
+    y1: float, y2: float, v1: float, v2: float, i: int, pressures: Array, given: Given, p: Array
 ) -> tuple[float, float, float]:
-    """What pressures (4, N), the user's ``force`` (2, N) and forces ``believed`` (2, N) along the pistons explain of the
-    pistons' accelerations in lane ``i``, m/s2; and kappa."""
+    """What pressures (4, N) and forces explain of the pistons' accelerations in lane ``i``, m/s2; and kappa."""
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
     )
+    force, believed = given.force, given.believed
     load1 = (
         mechanics.piston_force(pressures[0, i], pressures[1, i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
         - p[at.FV1] * v1
@@ -42,22 +42,20 @@ def accelerations(
 
 
 @helper
-def observe(
-    estimate: Array, position: Array, velocity: Array, pressures: Array, force: Array, believed: Array, p: Array,
-    period: float, bandwidth: float, fresh: Array, joints: Array,
-) -> None:  # fmt: skip
-    """One control period. ``estimate`` (4, N): v1, v2, d1, d2; ``joints`` (4, N) gets y1, y2, v1, v2 as measured."""
-    motion, one = scratch(4), scratch(4)
-    for i in range(estimate.shape[1]):
-        motion[0, 0], motion[1, 0], motion[2, 0], motion[3, 0] = position[0, i], position[1, i], velocity[0, i], velocity[1, i]
-        piston_motion(motion, p, one, 1)
-        y1, y2, v1, v2 = one[0, 0], one[1, 0], one[2, 0], one[3, 0]
-        joints[0, i], joints[1, i], joints[2, i], joints[3, i] = y1, y2, v1, v2
-        if fresh[i] > 0.0:
-            estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i] = v1, v2, 0.0, 0.0
-        a1, a2, _ = accelerations(y1, y2, v1, v2, i, pressures, force, believed, p)
-        off1, off2 = v1 - estimate[0, i], v2 - estimate[1, i]
-        estimate[0, i] += period * (a1 + estimate[2, i] + 2.0 * bandwidth * off1)
-        estimate[1, i] += period * (a2 + estimate[3, i] + 2.0 * bandwidth * off2)
-        estimate[2, i] += period * bandwidth * bandwidth * off1
-        estimate[3, i] += period * bandwidth * bandwidth * off2
+def observe(pistons: Pistons, point: Point, pressures: Array, given: Given, about: Belief, joints: Joints) -> None:
+    """One control period of at most a block of lanes, of which ``point`` is measured; ``joints`` gets what that says.
+
+    Carries speed and disturbance of ``pistons`` on.
+    """
+    p, period, bandwidth, speed, disturbance = about.rig, about.period, about.bandwidth, pistons.speed, pistons.disturbance
+    piston_motion(point.rows, p, joints.rows, pistons.fresh.shape[0])
+    for i in range(pistons.fresh.shape[0]):
+        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
+        if pistons.fresh[i] > 0.0:
+            speed[0, i], speed[1, i], disturbance[0, i], disturbance[1, i], pistons.fresh[i] = v1, v2, 0.0, 0.0, 0.0
+        a1, a2, _ = accelerations(y1, y2, v1, v2, i, pressures, given, p)
+        off1, off2 = v1 - speed[0, i], v2 - speed[1, i]
+        speed[0, i] += period * (a1 + disturbance[0, i] + 2.0 * bandwidth * off1)
+        speed[1, i] += period * (a2 + disturbance[1, i] + 2.0 * bandwidth * off2)
+        disturbance[0, i] += period * bandwidth * bandwidth * off1
+        disturbance[1, i] += period * bandwidth * bandwidth * off2

@@ -21,13 +21,15 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.estimation.disturbance_observer import accelerations
+from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.inverse_kinematics import piston_motion, pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
 BANDWIDTH = 70.0
@@ -59,75 +61,67 @@ STIR = 1.9
 """Low-passed innovation that ends a rest, in standard deviations of the position noise: 4.5 of the low-passed noise."""
 
 
-ESTIMATE, SPEED, DISTURBANCE, REST, INNOVATION, RELUCTANT, FRESH, LAST, SLOT, HISTORY = 0, 2, 4, 6, 8, 10, 12, 13, 14, 15
-"""Rows at which parts of an observer's memory begin: y1, y2, m; v1, v2, m/s; d1, d2, m/s2; how far each piston rests, 0 to 1;
-low-passed innovations, m; factors of ``REST_TIME``; 1 at a new start; time of the newest sample, s; where in the history the
-present stands; past y1, y2, a ring."""
-
-
 @helper
-def begin(memory: Array, i: int, motion: Array, p: Array, joints: Array) -> None:
-    """Starts lane ``i`` anew where ``motion`` (4, 1), x, y, vx, vy, places the pistons; ``joints`` (4, 1) is scratch."""
-    history = memory[HISTORY:]
-    piston_motion(motion, p, joints, 1)
-    memory[FRESH, i] = 0.0
+def begin(pistons: Pistons, i: int, point: Point, p: Array, joints: Joints) -> None:
+    """Starts lane ``i`` anew where the one lane of ``point`` places the pistons; ``joints`` is scratch."""
+    past = pistons.past
+    piston_motion(point.rows, p, joints.rows, 1)
+    pistons.fresh[i] = 0.0
     for cylinder in range(2):
-        memory[ESTIMATE + cylinder, i], memory[SPEED + cylinder, i] = joints[cylinder, 0], joints[2 + cylinder, 0]
-        memory[DISTURBANCE + cylinder, i], memory[REST + cylinder, i], memory[INNOVATION + cylinder, i] = 0.0, 0.0, 0.0
-        memory[RELUCTANT + cylinder, i] = 1.0
-        for k in range(history.shape[0] // 2):
-            history[2 * k + cylinder, i] = joints[cylinder, 0]
+        pistons.position[cylinder, i], pistons.speed[cylinder, i] = joints.position[cylinder, 0], joints.speed[cylinder, 0]
+        pistons.disturbance[cylinder, i], pistons.rest[cylinder, i], pistons.innovation[cylinder, i] = 0.0, 0.0, 0.0
+        pistons.reluctance[cylinder, i] = 1.0
+        for k in range(past.shape[0] // 2):
+            past[2 * k + cylinder, i] = joints.position[cylinder, 0]
 
 
 @helper
-def predict(memory: Array, i: int, pressures: Array, force: Array, believed: Array, p: Array, period: float) -> float:
+def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Array, period: float) -> float:
     """Carries positions and speeds of lane ``i`` on by one period of the model; returns kappa where it began."""
-    y1, y2, v1, v2 = memory[ESTIMATE, i], memory[ESTIMATE + 1, i], memory[SPEED, i], memory[SPEED + 1, i]
-    a1, a2, kappa = accelerations(y1, y2, v1, v2, i, pressures, force, believed, p)
-    a1, a2 = a1 + memory[DISTURBANCE, i], a2 + memory[DISTURBANCE + 1, i]
-    memory[ESTIMATE, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
-    memory[ESTIMATE + 1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
-    memory[SPEED, i], memory[SPEED + 1, i] = v1 + period * a1, v2 + period * a2
+    position, speed = pistons.position, pistons.speed
+    y1, y2, v1, v2 = position[0, i], position[1, i], speed[0, i], speed[1, i]
+    a1, a2, kappa = accelerations(y1, y2, v1, v2, i, pressures, given, p)
+    a1, a2 = a1 + pistons.disturbance[0, i], a2 + pistons.disturbance[1, i]
+    position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
+    position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
+    speed[0, i], speed[1, i] = v1 + period * a1, v2 + period * a2
     return kappa
 
 
 @helper
-def rest(memory: Array, i: int, moving: float, period: float, held: float) -> None:
+def rest(pistons: Pistons, i: int, moving: float, period: float, held: float) -> None:
     """Brakes resting pistons of lane ``i``, and finds how far they rest; ``held`` is exp(-wr period)."""
     for cylinder in range(2):
-        speed, resting, reluctance = memory[SPEED + cylinder, i], memory[REST + cylinder, i], memory[RELUCTANT + cylinder, i]
-        memory[SPEED + cylinder, i] = speed - resting * (1.0 - held * held) * speed
-        memory[DISTURBANCE + cylinder, i] -= resting * (1.0 - held) ** 2 / period * speed
+        speed, resting, reluctance = pistons.speed[cylinder, i], pistons.rest[cylinder, i], pistons.reluctance[cylinder, i]
+        pistons.speed[cylinder, i] = speed - resting * (1.0 - held * held) * speed
+        pistons.disturbance[cylinder, i] -= resting * (1.0 - held) ** 2 / period * speed
         reluctance += (1.0 - reluctance) * min(period / TRUST_TIME, 1.0)
         settling = min(period / (REST_TIME * reluctance), 1.0)
-        slow = abs(memory[SPEED + cylinder, i]) < REST_SPEED
-        memory[RELUCTANT + cylinder, i] = reluctance
-        memory[REST + cylinder, i] = (1.0 - moving) * (resting + (1.0 - resting) * settling if slow else resting)
+        slow = abs(pistons.speed[cylinder, i]) < REST_SPEED
+        pistons.reluctance[cylinder, i] = reluctance
+        pistons.rest[cylinder, i] = (1.0 - moving) * (resting + (1.0 - resting) * settling if slow else resting)
 
 
 @helper
-def correct(
-    memory: Array, i: int, joints: Array, sampled: float, age: float, period: float, bandwidth: float, explained1: float,
-    explained2: float,
-) -> None:  # fmt: skip
-    """Takes a sample: the pistons stood at ``joints`` (2 or more, 1) an ``age`` ago, ``sampled`` s after the last one.
+def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float, about: Belief, explained: Array) -> None:
+    """Takes a sample: the pistons stood at the one lane of ``joints`` an ``age`` ago, ``sampled`` s after the last one.
 
-    A low-passed innovation beyond ``explained1`` or ``explained2``, m, ends the rest of that piston.
+    A low-passed innovation beyond ``explained`` (2, 1), m, ends the rest of that piston.
     """
-    history, slot = memory[HISTORY:], int(memory[SLOT, i])
-    depth, periods = history.shape[0] // 2, age / period
+    past, slot, period = pistons.past, int(pistons.slot[i]), about.period
+    depth, periods = past.shape[0] // 2, age / period
     back = min(int(periods), depth - 2)
     part = min(periods - back, 1.0)
     for cylinder in range(2):
-        newer = history[2 * ((slot - back) % depth) + cylinder, i]
-        older = history[2 * ((slot - back - 1) % depth) + cylinder, i]
-        innovation = joints[cylinder, 0] - (newer + part * (older - newer))
-        memory[INNOVATION + cylinder, i] += INNOVATION_FRACTION * (innovation - memory[INNOVATION + cylinder, i])
-        resting = memory[REST + cylinder, i]
-        if abs(memory[INNOVATION + cylinder, i]) > (explained1 if cylinder == 0 else explained2):
-            memory[RELUCTANT + cylinder, i] *= 1.0 + RELUCTANCE * resting
-            memory[REST + cylinder, i], resting = 0.0, 0.0
-        kept = exact.exp(-bandwidth * sampled)
+        newer = past[2 * ((slot - back) % depth) + cylinder, i]
+        older = past[2 * ((slot - back - 1) % depth) + cylinder, i]
+        innovation = joints.position[cylinder, 0] - (newer + part * (older - newer))
+        pistons.innovation[cylinder, i] += INNOVATION_FRACTION * (innovation - pistons.innovation[cylinder, i])
+        resting = pistons.rest[cylinder, i]
+        if abs(pistons.innovation[cylinder, i]) > explained[cylinder, 0]:
+            pistons.reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
+            pistons.rest[cylinder, i], resting = 0.0, 0.0
+        kept = exact.exp(-about.bandwidth * sampled)
         to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
         to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
         to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
@@ -135,63 +129,55 @@ def correct(
         for k in range(depth):
             since = age - k * period
             change = to_position + since * (to_speed + 0.5 * since * to_disturbance)
-            history[2 * ((slot - k) % depth) + cylinder, i] += change * innovation
-        memory[ESTIMATE + cylinder, i] = history[2 * slot + cylinder, i]
-        memory[SPEED + cylinder, i] += (to_speed + to_disturbance * age) * innovation
-        memory[DISTURBANCE + cylinder, i] += to_disturbance * innovation
+            past[2 * ((slot - k) % depth) + cylinder, i] += change * innovation
+        pistons.position[cylinder, i] = past[2 * slot + cylinder, i]
+        pistons.speed[cylinder, i] += (to_speed + to_disturbance * age) * innovation
+        pistons.disturbance[cylinder, i] += to_disturbance * innovation
 
 
 @helper
-def observe(
-    memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, pressures: Array, p: Array,
-    period: float, bandwidth: float, noise: Array, force: Array, believed: Array, moving: Array,
-) -> None:  # fmt: skip
-    """One control period; carries ``memory`` (M, N) on.
-
-    ``noise`` (N,), m, of a position sample; ``force`` (2, N) the user's, N, and ``believed`` (2, N), N along the pistons, as
-    known; ``moving`` (N,) 1 where no piston may rest.
-    """
-    history, held = memory[HISTORY:], exact.exp(-REST_BANDWIDTH * period)
-    depth, motion, joints = history.shape[0] // 2, scratch(4), scratch(4)
-    for i in range(time.shape[0]):
-        slot = (int(memory[SLOT, i]) + 1) % depth
-        sampled = position_time[i] - memory[LAST, i]
+def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, about: Belief) -> None:
+    """One control period of N lanes, in which positions are samples and pressures (4, N), Pa, are known."""
+    p, period, held = about.rig, about.period, exact.exp(-REST_BANDWIDTH * about.period)
+    past, point, joints, explained = pistons.past, Point(scratch(Point.size)), Joints(scratch(Joints.size)), scratch(2)
+    depth = past.shape[0] // 2
+    for i in range(signals.time.shape[0]):
+        slot = (int(pistons.slot[i]) + 1) % depth
+        sampled = signals.position_time[i] - pistons.newest[i]
         # The memory goes no further back than the rig's own description of its tracker.
-        age = min(time[i] - position_time[i], (depth - 1) * period)
-        memory[SLOT, i], memory[LAST, i] = slot, position_time[i]
-        motion[0, 0], motion[1, 0], motion[2, 0], motion[3, 0] = position[0, i], position[1, i], velocity[0, i], velocity[1, i]
-        if memory[FRESH, i] > 0.0:
-            begin(memory, i, motion, p, joints)
+        age = min(signals.time[i] - signals.position_time[i], (depth - 1) * period)
+        pistons.slot[i], pistons.newest[i] = slot, signals.position_time[i]
+        for axis in range(2):
+            point.position[axis, 0], point.velocity[axis, 0] = signals.position[axis, i], signals.velocity[axis, i]
+        if pistons.fresh[i] > 0.0:
+            begin(pistons, i, point, p, joints)
             continue
-        kappa = predict(memory, i, pressures, force, believed, p, period)
-        rest(memory, i, moving[i], period, held)
-        history[2 * slot, i], history[2 * slot + 1, i] = memory[ESTIMATE, i], memory[ESTIMATE + 1, i]
+        kappa = predict(pistons, i, pressures, given, p, period)
+        rest(pistons, i, given.moving[i], period, held)
+        past[2 * slot, i], past[2 * slot + 1, i] = pistons.position[0, i], pistons.position[1, i]
         if sampled > 0.0:
-            piston_motion(motion, p, joints, 1)
-            correct(memory, i, joints, sampled, age, period, bandwidth, STIR * noise[i] / kappa, STIR * noise[i])
-
-
-@kernel
-def _measured_joints(position: Array, velocity: Array, p: Array, joints: Array) -> None:
-    motion, one = np.empty((4, 1)), np.empty((4, 1))
-    for i in range(position.shape[1]):
-        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
-        motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
-        piston_motion(motion, p, one, 1)
-        for row in range(4):
-            joints[row, i] = one[row, 0]
+            piston_motion(point.rows, p, joints.rows, 1)
+            explained[0, 0], explained[1, 0] = STIR * given.noise[i] / kappa, STIR * given.noise[i]
+            correct(pistons, i, joints, sampled, age, about, explained)
 
 
 def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
     """y1, y2 (m), v1, v2 (m/s), (4, N), where position and velocity are measured at every control period."""
-    joints = np.empty((4, measurement.position.shape[1]))
-    _measured_joints(measurement.position, measurement.velocity, lane_parameters, joints)
+    joints = np.empty((Joints.size, measurement.position.shape[1]))
+    pistons_at(np.concatenate([measurement.position, measurement.velocity]), lane_parameters, joints)
     return joints
 
 
-def fresh_memory(rig: Parameters) -> Array:
-    """The memory of a lane that starts, as deep as a rig's tracker asks for."""
+def fresh_memory(rig: Parameters, sampled: bool) -> Array:
+    """``Pistons`` of a lane that starts, which remember as much as a rig's tracker asks for where positions are samples."""
     board = rig.electronics
-    fresh = np.zeros(HISTORY + 2 * (int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4))
-    fresh[FRESH] = 1.0
-    return fresh
+    periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4 if sampled else 0
+    return np.concatenate([Pistons.lane(fresh=1.0), np.zeros(2 * periods)])
+
+
+def belief(rig: Parameters, bandwidth: float = BANDWIDTH) -> Array:
+    """``Belief`` in a rig."""
+    board = rig.electronics
+    return Belief.numbers(
+        period=board.control_period, bandwidth=bandwidth, noise=board.position_noise, rig=parameter_column(rig)
+    )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.estimation.rows import Joints, Motion
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled import lanes as at
@@ -25,15 +26,16 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
 
 
 @helper
-def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
-    """Carries ``bristles`` (2, N) on by one period of ``motion`` (8, N) and writes what they hold back, ``drag`` (2, N), N."""
-    one, joints = scratch(4), scratch(4)
-    for i in range(motion.shape[1]):
-        for row in range(4):
-            one[row, 0] = motion[row, i]
-        piston_motion(one, p, joints, 1)
-        bristles[0, i] = bristle(bristles[0, i], joints[2, 0], p[at.FC1], p[at.FS1], p, period)
-        bristles[1, i] = bristle(bristles[1, i], joints[3, 0], p[at.FC2], p[at.FS2], p, period)
+def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -> None:
+    """Carries ``bristles`` (2, N) on by one period of ``motion`` and writes what they hold back, ``drag`` (2, N), N.
+
+    N is at most that of a block.
+    """
+    joints, lanes = Joints(scratch(Joints.size)), bristles.shape[1]
+    piston_motion(motion.rows, p, joints.rows, lanes)
+    for i in range(lanes):
+        bristles[0, i] = bristle(bristles[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, period)
+        bristles[1, i] = bristle(bristles[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, period)
         drag[0, i], drag[1, i] = p[at.BRISTLE_S0] * bristles[0, i], p[at.BRISTLE_S0] * bristles[1, i]
 
 
@@ -41,13 +43,11 @@ def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) ->
 def forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
     """Writes the friction ``drag`` (M, 2, N), N, along a motion ``ahead`` (M, 4, N) with x, y, vx, vy at the ends of the M
     ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them."""
-    one, joints = np.empty((4, 1)), np.empty((4, 1))
-    for i in range(ahead.shape[2]):
-        z1, z2 = bristles[0, i], bristles[1, i]
-        for k in range(ahead.shape[0]):
-            for row in range(4):
-                one[row, 0] = ahead[k, row, i]
-            piston_motion(one, p, joints, 1)
-            z1 = bristle(z1, joints[2, 0], p[at.FC1], p[at.FS1], p, steps[k])
-            z2 = bristle(z2, joints[3, 0], p[at.FC2], p[at.FS2], p, steps[k])
-            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z1, p[at.BRISTLE_S0] * z2
+    z, lanes = bristles.copy(), bristles.shape[1]
+    joints = Joints(np.empty((Joints.size, lanes)))
+    for k in range(ahead.shape[0]):
+        piston_motion(ahead[k], p, joints.rows, lanes)
+        for i in range(lanes):
+            z[0, i] = bristle(z[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, steps[k])
+            z[1, i] = bristle(z[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, steps[k])
+            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z[0, i], p[at.BRISTLE_S0] * z[1, i]

@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.admittance import knowledge as at
 from baselines.admittance.informed import Informed
 from baselines.controller import check_gains
 from baselines.estimation.admittance import DAMPING_RATIO
@@ -157,19 +156,19 @@ class NonlinearMPC:
         informed, planner = self._informed, self._planners["lab" if measurement.sampled else "ideal"]
         informed.update(measurement, reference)
         known, memory = informed.known, informed.memory
-        lanes, pressures = known.shape[1], memory[at.PRESSURES : at.OPENED]
+        lanes, pressures = known.drag.shape[1], memory.chambers.pressure
         if len(self._plan) != lanes:
             self._plan = np.zeros((lanes, FLOWS * len(self._steps)))
-        low, high, flows = (q / FLOW for q in flow_ranges(pressures, memory[at.SPOOLS : at.PRESSURES], self._p))
+        low, high, flows = (q / FLOW for q in flow_ranges(pressures, memory.chambers.spool, self._p))
         ahead, unseen = informed.forecast(reference, self._ticks)
         asked = reference.pneumatic_stiffness + self._period * self._ticks[:, None, None] * reference.pneumatic_stiffness_rate
-        now = [memory[at.JOINTS : at.TRACKER], pressures / PRESSURE, flows, known[at.FORCE : at.BELIEVED]]
+        now = [memory.joints.rows, pressures / PRESSURE, flows, known.given.force]
         given = np.concatenate([*now, *(along.reshape(-1, lanes) for along in (unseen, ahead, asked))])
         for lane in range(lanes):
             self._plan[lane] = planner.improve(self._plan[lane], given[:, lane], low[:, lane], high[:, lane])
         openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), pressures, self._p)
         self._advance_plan()
-        memory[at.OPENED : at.JOINTS] = openings
+        memory.chambers.opening[:] = openings
         return openings
 
     def _advance_plan(self) -> None:

@@ -9,8 +9,13 @@ import pytest
 
 from baselines.admittance import law as admittance_law
 from baselines.admittance.controller import LEAST_FRACTION, AdmittanceController
-from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
+from baselines.admittance.knowledge import fresh_memory
+from baselines.admittance.rows import Gains, Known, Memory
+from baselines.estimation.observers import belief
+from baselines.estimation.rows import Belief
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import SPOOLS, Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -26,11 +31,9 @@ ANOTHER = Parameters().replace(
 )  # fmt: skip
 
 
-def remembered(lanes: int) -> Array:
+def remembered(lanes: int) -> Memory:
     """The memory of a law that has just started."""
-    memory = np.zeros((admittance_law.MEMORY, lanes))
-    memory[admittance_law.GAIN_SHARES] = 1.0
-    return memory
+    return Memory(np.repeat(fresh_memory(Parameters(), False)[:, None], lanes, axis=1))
 
 
 @dataclasses.dataclass
@@ -49,25 +52,26 @@ class Law:
 
     def command(
         self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
-        rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
+        rest: Array | None = None, moving: float = 1.0, memory: Memory | None = None, spools: Array | None = None,
         told: Array | None = None, pneumatic: Array | None = None,
     ) -> Array:  # fmt: skip
         lanes = motion.shape[1]
-        target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
-        target[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
+        seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
+        memory = remembered(lanes) if memory is None else memory
+        seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
+        seen.feedforward.rows[:] = 0.0 if told is None else told
+        memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures
+        memory.chambers.spool[:], memory.pistons.rest[:] = 0.0 if spools is None else spools, 0.0 if rest is None else rest
+        known.motion.rows[:], known.given.force[:], known.unseen[:] = motion, user, disturbance_force
+        known.given.moving[:] = moving
         # A spool that follows as fast as it does by itself is told where to go, no further.
         quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
-        admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
-            np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
-            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
-            np.array([
-                30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_FRACTION, 1.0
-            ]),
-            np.zeros((4, lanes)) if told is None else told,
-            remembered(lanes) if memory is None else memory, openings,
+        gains = Gains.numbers(
+            pneumatic_gain=30.0, gain=self.gain, rest_gain=self.rest_gain, rest_push=self.rest_push, dead_zone=self.dead_zone,
+            quickness=quickness, oscillation=0.06, yielding=0.9, least_fraction=LEAST_FRACTION, most_falls=1.0,
         )  # fmt: skip
-        return openings
+        admittance_law.command(seen, memory, known, Gains(gains), Belief(belief(self.rig)))
+        return seen.opening
 
 
 def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fraction: float = 1.0) -> tuple[Array, Measurement]:
@@ -211,8 +215,9 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 
 def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
-    memory, row = remembered(1), admittance_law.WATCH_N
-    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least, most) for error in errors])
+    gains = Gains(Gains.lane(oscillation=level, yielding=fall, least_fraction=least, most_falls=most))
+    one = remembered(1).follower.along
+    return np.array([admittance_law.watch(one, 0, float(error), PERIOD, gains) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)
@@ -272,7 +277,7 @@ def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(di
     for way in (pose.across, pose.beam):
         motion = resting.copy()
         motion[:2] -= error * way
-        openings = law.command(now, motion, nothing, nothing, memory=memory.copy())
+        openings = law.command(now, motion, nothing, nothing, memory=Memory(memory.rows.copy()))
         jerk = (rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1] * way).sum()
         left = 0.9**3 * c if way is shaken else c
         assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)

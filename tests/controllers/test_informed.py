@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.admittance import knowledge as at
 from baselines.admittance.informed import Informed
-from baselines.estimation import observers
+from baselines.admittance.knowledge import BELIEVED_LIMIT
 from baselines.estimation.admittance import MOVING_SPEED
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
@@ -36,17 +35,15 @@ class Aware(Informed):
 
     def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
         self.update(measurement, reference)
-        pistons = self.memory[at.MEMORY :]
+        given, memory = self.known.given, self.memory
         return SimpleNamespace(
-            motion=self.known[: at.MOVING], moving=self.known[at.MOVING], force=self.known[at.FORCE : at.BELIEVED],
-            believed=self.known[at.BELIEVED : at.UNSEEN], unseen=self.known[at.UNSEEN : at.DRAG],
-            joints=self.memory[at.JOINTS : at.TRACKER], spools=self.memory[at.SPOOLS : at.PRESSURES],
-            pressures=self.memory[at.PRESSURES : at.OPENED], disturbance=pistons[observers.DISTURBANCE : observers.REST],
-            rest=pistons[observers.REST : observers.INNOVATION],
+            motion=self.known.motion.rows, moving=given.moving, force=given.force, believed=given.believed,
+            unseen=self.known.unseen, joints=memory.joints.rows, spools=memory.chambers.spool,
+            pressures=memory.chambers.pressure, disturbance=memory.pistons.disturbance, rest=memory.pistons.rest,
         )  # fmt: skip
 
     def commanded(self, openings: Array) -> None:
-        self.memory[at.OPENED : at.JOINTS] = openings
+        self.memory.chambers.opening[:] = openings
 
 
 def aware(rig: Parameters = RIG, **gains: float) -> Aware:
@@ -274,11 +271,11 @@ def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> Non
     kappa = np.linalg.norm(rigid_body.jacobians(PISTON, RIG)[:, :, 0], axis=1)
     mass = RIG.mechanics.mass * np.stack([kappa**2, np.ones(2)])
     part.now(seen(0, PISTON, pressures, user, False), wanted)
-    part.memory[at.MEMORY + observers.DISTURBANCE : at.MEMORY + observers.REST] = force / mass
+    part.memory.pistons.disturbance[:] = force / mass
     now = part.now(seen(1, PISTON, pressures, user, False), wanted)
     np.testing.assert_allclose(now.unseen[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
     np.testing.assert_allclose(now.unseen[:, 0], force[:, 0], rtol=0.05)
-    np.testing.assert_array_equal(now.unseen[:, 1] - now.believed[:, 1], [at.BELIEVED_LIMIT, -at.BELIEVED_LIMIT])
+    np.testing.assert_array_equal(now.unseen[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
 
 
 def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, sqrtm
 
 from baselines.estimation import admittance
-from baselines.estimation.admittance import DAMPING_RATIO, square_root
+from baselines.estimation.admittance import DAMPING_RATIO, Compliance, Offset, square_root
+from baselines.estimation.rows import Motion
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -34,21 +35,22 @@ def asked(position: Array, stiffness: Array) -> Reference:
     return Reference(rows)
 
 
-class Motion:
+class Follower:
     """The kernels with the offset that a stage keeps for them, over N lanes."""
 
     def __init__(self, lanes: int = 1, ratio: float = DAMPING_RATIO, period: float = PERIOD, mass: float = MASS) -> None:
-        self.offset, self._numbers = np.zeros((4, lanes)), (mass, ratio, period)
+        self.offset = Offset(np.zeros((Offset.size, lanes)))
+        self._about = Compliance(Compliance.numbers(mass=mass, damping_ratio=ratio, period=period))
 
     def update(self, force: Array, reference: Reference, factor: Array | None = None) -> Array:
-        lanes = self.offset.shape[1]
-        motion, factor = np.empty((8, lanes)), np.zeros(lanes) if factor is None else factor
-        admittance.give_way(self.offset, reference.rows, force, *self._numbers, factor, motion)
-        return motion
+        lanes = force.shape[1]
+        motion, factor = Motion(np.empty((Motion.size, lanes))), np.zeros(lanes) if factor is None else factor
+        assert admittance.give_way(self.offset, reference, force, self._about, factor, motion) == 0
+        return motion.rows
 
     def forecast(self, reference: Reference, force: Array, ticks: Array) -> Array:
-        ahead = np.empty((len(ticks), *self.offset.shape))
-        admittance.forecast(self.offset, reference.rows, force, *self._numbers, ticks, ahead)
+        ahead = np.empty((len(ticks), *self.offset.rows.shape))
+        admittance.forecast(self.offset, reference, force, self._about, ticks, ahead)
         return ahead
 
 
@@ -89,7 +91,7 @@ def test_motion_is_that_of_mass_damper_and_spring() -> None:
     ticks, matrices = 400, np.concatenate([springs(7), [COUPLED]])
     rng = np.random.default_rng(1)
     levels = rng.uniform(-40, 40, (20, 2, len(matrices)))
-    model, reference = Motion(len(matrices)), asked(np.full((2, len(matrices)), 0.1), matrices)
+    model, reference = Follower(len(matrices)), asked(np.full((2, len(matrices)), 0.1), matrices)
     got = np.array([model.update(levels[tick // 20], reference) for tick in range(ticks)])
     got[:, :2] -= 0.1
     for lane, matrix in enumerate(matrices):
@@ -121,7 +123,7 @@ def test_a_moving_target_carries_the_motion_along() -> None:
     times = PERIOD * np.arange(800)
     start = np.concatenate([target(0)[0], target(0)[1]])
     truth = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-10, atol=1e-13).y.T
-    model, got = Motion(), []
+    model, got = Follower(), []
     for time in times:
         reference = asked(np.zeros((2, 1)), COUPLED[None])
         reference.rows[:8, 0] = target(time).ravel()
@@ -142,7 +144,7 @@ def test_a_jump_of_the_setpoint_moves_nothing_at_once() -> None:
     """Position and speed go on from where they are, with the new spring, also while the motion is under way."""
     ticks, force = 300, np.array([30.0, 10.0])
     plan = [np.diag([2000.0, 2000.0]), COUPLED, np.diag([800.0, 4000.0])]
-    model, got = Motion(), []
+    model, got = Follower(), []
     for tick in range(ticks):
         got.append(model.update(force[:, None], asked(np.zeros((2, 1)), plan[tick // 100][None]))[:, 0])
     expected = exact_motion(lambda tick: force, plan, ticks)
@@ -155,7 +157,7 @@ def test_at_rest_it_stands_on_the_compliant_target(period: float) -> None:
     """(19), whatever the control period, and without a creep."""
     matrices, rng = np.concatenate([springs(30), [COUPLED]]), np.random.default_rng(2)
     force, position = rng.uniform(-40, 40, (2, 31)), rng.uniform(-0.1, 0.6, (2, 31))
-    model = Motion(31, period=period)
+    model = Follower(31, period=period)
     reference = asked(position, matrices)
     for _ in range(round(4.0 / period)):
         motion = model.update(force, reference)
@@ -169,7 +171,7 @@ def test_at_rest_it_stands_on_the_compliant_target(period: float) -> None:
 def test_damping_ratio_and_mass_are_those_asked_for(ratio: float) -> None:
     """A step of force overshoots by exp(-pi zeta / sqrt(1 - zeta^2)) after pi / (w sqrt(1 - zeta^2)), or not at all."""
     mass, stiffness = 5.0, 2000.0
-    model = Motion(ratio=ratio, mass=mass)
+    model = Follower(ratio=ratio, mass=mass)
     reference = asked(np.zeros((2, 1)), stiffness * np.eye(2)[None])
     path = np.array([model.update(np.array([[20.0], [0.0]]), reference)[:2, 0] for _ in range(2000)])
     assert np.all(path[:, 1] == 0)
@@ -186,8 +188,8 @@ def test_a_damping_factor_multiplies_the_damping_of_each_lane() -> None:
     """Lane by lane the motion of an admittance with that much more damping, bit for bit; below 1 it says nothing."""
     factors, force = np.array([0.0, 1.0, 1.5, 2.0]), np.full((2, 4), 20.0)
     reference = asked(np.zeros((2, 4)), np.repeat([COUPLED], 4, axis=0))
-    model = Motion(4, 0.8)
-    plain = [Motion(ratio=0.8 * max(1.0, factor)) for factor in factors]
+    model = Follower(4, 0.8)
+    plain = [Follower(ratio=0.8 * max(1.0, factor)) for factor in factors]
     for _ in range(300):
         motion = model.update(force, reference, factors)
         for lane, one in enumerate(plain):
@@ -213,11 +215,11 @@ def test_a_forecast_comes_true_where_nothing_new_happens(period: float) -> None:
             reference.rows[2 * order : 2 * order + 2] = np.sum(terms, axis=0)
         return reference
 
-    model, kept = Motion(lanes, period=period), Motion(lanes, period=period)
+    model, kept = Follower(lanes, period=period), Follower(lanes, period=period)
     for tick in range(-60, 1):
         force = rng.uniform(-30, 30, (2, lanes))
         if tick == 0:
-            model.offset[:, 1] = kept.offset[:, 1] = 0.0
+            model.offset.rows[:, 1] = kept.offset.rows[:, 1] = 0.0
         motion = model.update(force, at(tick))
         kept.update(force, at(tick))
     ahead = model.forecast(at(0), force, ticks)

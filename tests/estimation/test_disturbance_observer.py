@@ -37,7 +37,7 @@ def test_an_unknown_force_is_found_with_a_double_pole(bandwidth: float, period: 
     for time in times:
         piston, speed = np.array([[0.01], [-0.1 + 0.5 * a * time**2]]), np.array([[0.0], [a * time]])
         estimator.update(measured(piston, speed, pressures, rig, np.zeros((2, 1))), np.zeros((2, 1)), np.zeros((2, 1)))
-        errors.append(estimator.disturbance[:, 0] - [0.0, a])
+        errors.append(estimator.pistons.disturbance[:, 0] - [0.0, a])
     error = np.array(errors)
     assert np.abs(error[:, 0]).max() < 1e-9, "cylinder 1 feels nothing"
     kept = 1 - bandwidth * period
@@ -87,7 +87,7 @@ def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
             pose = by_points.pose_from_lengths(y[0] + RIG.geometry.k1, r2, RIG.geometry)
             kappa = np.hypot(*by_points.cartesian_velocity(pose, r2, 1.0, 0.0)[0])
             expected = unknown / (RIG.mechanics.mass * np.array([kappa**2, 1.0]))
-            np.testing.assert_allclose(estimator.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
+            np.testing.assert_allclose(estimator.pistons.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
 
 
 def test_lanes_and_a_new_start() -> None:
@@ -99,13 +99,13 @@ def test_lanes_and_a_new_start() -> None:
     alone = measured(now.piston[:, 1:2], now.speed[:, 1:2], now.pressures[:, 1:2], RIG, nothing[:, :1])
     for tick in range(40):
         if tick == 20:
-            reset.fresh[fresh] = 1.0
+            reset.pistons.fresh[fresh] = 1.0
         for estimator in (kept, reset):
             estimator.update(seen, nothing, nothing)
         single.update(alone, nothing[:, :1], nothing[:, :1])
-        assert np.array_equal(single.disturbance[:, 0], kept.disturbance[:, 1])
-        assert np.array_equal(reset.disturbance[:, ~fresh], kept.disturbance[:, ~fresh])
+        assert np.array_equal(single.pistons.disturbance[:, 0], kept.pistons.disturbance[:, 1])
+        assert np.array_equal(reset.pistons.disturbance[:, ~fresh], kept.pistons.disturbance[:, ~fresh])
         if tick >= 20:
             late.update(alone, nothing[:, :1], nothing[:, :1])
-            assert np.array_equal(reset.disturbance[:, 1], late.disturbance[:, 0])
-    assert np.abs(kept.disturbance[:, 1] - reset.disturbance[:, 1]).max() > 0.01
+            assert np.array_equal(reset.pistons.disturbance[:, 1], late.pistons.disturbance[:, 0])
+    assert np.abs(kept.pistons.disturbance[:, 1] - reset.pistons.disturbance[:, 1]).max() > 0.01

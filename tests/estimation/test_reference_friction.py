@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from baselines.estimation import reference_friction
+from baselines.estimation.rows import Motion
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points
@@ -26,7 +27,7 @@ class Friction:
 
     def update(self, motion: Array) -> Array:
         drag = np.empty_like(self.bristles)
-        reference_friction.rub(motion, self._p, self._period, self.bristles, drag)
+        reference_friction.rub(Motion(motion), self._p, self._period, self.bristles, drag)
         return drag
 
     def forecast(self, ahead: Array, ticks: Array) -> Array:

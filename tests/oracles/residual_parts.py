@@ -48,7 +48,7 @@ class UnexplainedForceObserver:
             self.met, self._seen = np.zeros((unexplained.ROWS, len(lanes))), np.zeros((4, len(lanes)))
             self._measured = Measured(self._rig, unexplained.BANDWIDTH, len(lanes))
             self._sampled = Sampled(self._rig)
-        self._measured.fresh[lanes] = 1.0
+        self._measured.pistons.fresh[lanes] = 1.0
         self._sampled.reset(lanes)
         self.met[:, lanes], self._seen[:, lanes] = 0.0, 0.0
 
@@ -56,5 +56,5 @@ class UnexplainedForceObserver:
         force = np.ascontiguousarray(measurement.user_force)
         observer = self._sampled if measurement.sampled else self._measured
         self.joints = np.ascontiguousarray(observer.update(measurement, force, np.zeros_like(force)))
-        disturbance = np.ascontiguousarray(observer.disturbance)
+        disturbance = np.ascontiguousarray(observer.pistons.disturbance)
         unexplained.remember(self.joints, disturbance, self._p, self._period, self._seen, self.met)

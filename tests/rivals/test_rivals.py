@@ -170,12 +170,12 @@ def test_the_observer_is_told_what_is_known(rival: type[TrackingController]) -> 
         reference.rows[2] = [2e-3, 5e-4]
         law.command(measured, reference)
         told.update(measured, measured.user_force, moving=np.array([1.0, 0.0]))
-    assert np.array_equal(law._memories[1], told.memory)
-    assert told.rest[0, 0] == 0 < told.rest[0, 1]
+    assert np.array_equal(law._memories[1], told.pistons.rows)
+    assert told.pistons.rest[0, 0] == 0 < told.pistons.rest[0, 1]
     pushed = dataclasses.replace(measured, user_force=np.full((2, 2), 3.0))
     law.command(pushed, reference)
     told.update(pushed, pushed.user_force, moving=np.ones(2))
-    assert np.array_equal(law._memories[1][:, 0], told.memory[:, 0])
+    assert np.array_equal(law._memories[1][:, 0], told.pistons.rows[:, 0])
 
 
 def test_the_dead_zone_is_continuous() -> None:
