@@ -12,7 +12,7 @@ from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import ASKED, OPENING, SEEN, WORLD, Seen, Signals, World
 from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Stage, scratch
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
@@ -61,7 +61,9 @@ def mark(world: World, seen: Seen, memory: Memory, gains: Gains, tables: int, la
     own = Observer(scratch(Observer.size))
     for i in range(n):
         own.newest[i] = gains.bandwidth + gains.corner[1] + gains.observer.newest
+        own.estimate[0, i] = gains.corner.shape[0] + gains.rows.shape[0] + memory.bristle.shape[0] + memory.since.shape[0]
         memory.observer.newest[i] += own.newest[i]
+        memory.bristle[0, i] = own.estimate[0, i]
         seen.opening[3, i] = world.tick[i] + seen.asked.stiffness_coupling[i]
     return int(summed(memory, n))
 
@@ -137,7 +139,7 @@ def test_a_stage_is_handed_what_it_is_annotated_with():
     places = [(tick, World.tick.first)], [(asked, Seen.asked.first), (opening, OPENING)]
     assert Loop(lanes, *places, [stage]).run(3) == 3 * 10 * lanes
     assert (Memory(memory).observer.newest == 3 * 11.0).all()
-    assert memory.sum() == lanes * (33.0 + 1.0)
+    assert (Memory(memory).bristle[0] == 2 + 6 + 2 + BLOCK).all(), "views have the shape of their group"
     np.testing.assert_array_equal(opening, [np.zeros(lanes)] * 3 + [tick[0] + 0.5])
 
 

@@ -110,7 +110,7 @@ def arrays(simulation: Simulation):
     parts = (simulation.plant, simulation.trajectory, simulation.user_force, simulation.stiffness, simulation.sensors)
     for part in parts:
         for name, value in vars(part).items():
-            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_velocity"):
+            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_arrived"):
                 yield f"{type(part).__name__}.{name}", value
 
 

@@ -176,7 +176,9 @@ def _of_block(context: Any, builder: Any, record: Block, value: Any, name: str) 
     if group and group.layout:
         return data
     kind = record.of(group) if group else record.array
-    return _view(context, builder, kind, data, [WORD(count), WORD(columns)], [WORD(8 * columns), WORD(8)])
+    axes = slice(record.array.ndim)
+    shape, strides = [WORD(count), WORD(columns)][axes], [WORD(8 * columns), WORD(8)][axes]
+    return _view(context, builder, kind, data, shape, strides)
 
 
 @lower_getattr_generic(Record)
