@@ -1,27 +1,33 @@
-"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop."""
+"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop.
+
+``driving`` puts any controller, compiled or not, into a loop.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import TOLD, feedforward_rows, lanes_of
+from baselines.controller import TOLD, Controller, checked_command, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import (
-    ACTION,
-    ASKED,
-    OPENING,
-    REFERENCE,
-    fill_measurement,
-)
+from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, SEEN, fill_measurement
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Stage, block
+from birthsim_env.parts.actuation import Forgetful
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.simulation import Simulation
+
+TIMED = 10
+"""Control periods, and repetitions of them, over which a compiled law is timed."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,11 @@ class StagedController:
         """Without the loop, which knows addresses."""
         return {**self.__dict__, "_loop": None}
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether ``stages`` are all that ``command`` does: not where a derived class has changed it."""
+        return getattr(self.command, "__func__", None) is StagedController.command
+
     def law_stages(self, sampled: bool) -> Sequence[LawStage]:
         """The law for one kind of sensors: ``sampled`` where positions are samples, see ``Measurement``."""
         raise NotImplementedError(f"{type(self).__name__}.law_stages(sampled) is missing; it returns LawStage objects")
@@ -74,6 +85,14 @@ class StagedController:
         """The law as stages of a closed loop, with what it remembers."""
         pairs = zip(self._made, self._memories, strict=True)
         return [Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs]
+
+    def require_acceleration(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` without an acceleration where the law, once prepared, needs one."""
+        if measurement.acceleration is None and any(one.feels for one in self._made):
+            raise ValueError(
+                f"measurement.acceleration = None; allowed: (2, {self._lanes}) m/s2, since this controller believes in a "
+                f"sensor: electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
+            )
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
@@ -104,11 +123,7 @@ class StagedController:
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
-        if measurement.acceleration is None and any(one.feels for one in self._made):
-            raise ValueError(
-                f"measurement.acceleration = None; allowed: (2, {lanes}) m/s2, since this controller believes in a sensor: "
-                f"electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
-            )
+        self.require_acceleration(measurement)
         if self._loop is None:
             self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))
@@ -126,3 +141,80 @@ class StagedController:
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""
         return []
+
+
+@kernel
+def _ask(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """A law is asked for the reference; memory: what it is told besides."""
+    s, told = block(seen, SEEN), block(memory, ACTION - FEEDFORWARD)
+    for i in range(n):
+        for row in range(REFERENCES):
+            s[ASKED + row, i] = s[REFERENCE + row, i]
+        for row in range(ACTION - FEEDFORWARD):
+            s[FEEDFORWARD + row, i] = told[row, i]
+    return 0
+
+
+class Driving(Forgetful):
+    """A controller as an actuation, called back once per control period. A policy step has no action.
+
+    Raises ``ValueError`` with the controller's ``name`` where it returns anything but openings.
+    """
+
+    size, names, every_period = 0, (), True
+
+    def __init__(self, controller: Controller, name: str) -> None:
+        self.controller, self._name, self._spent = controller, name, list[float]()
+
+    def begin(self, lanes: Mask) -> None:
+        self.controller.reset(None if lanes.all() else lanes)
+
+    def accept(self, actions: Array) -> None:
+        pass
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        started = time.perf_counter()
+        command = self.controller.command(measurement, reference)
+        self._spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
+        return checked_command(self._name, command, plant.num_envs)
+
+    def check(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` where what is measured is not enough for the controller."""
+
+    def cost(self, simulation: Simulation) -> list[float]:
+        """us per lane and call."""
+        return self._spent
+
+
+class CompiledDriving(Driving):
+    """A ``StagedController`` as an actuation: its stages are part of the loop."""
+
+    controller: StagedController
+
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
+        """The law, compiled into the closed loop."""
+        self.controller.prepare(lanes, sampled)
+        told = feedforward_rows(lanes, None, None)
+        return [Stage(_ask, memory=told, sees_world=False), *self.controller.stages()]
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the law."""
+        self.controller.explain(measurement, reference)
+
+    def check(self, measurement: Measurement) -> None:
+        self.controller.require_acceleration(measurement)
+
+    def cost(self, simulation: Simulation) -> list[float]:
+        """us per lane and call, on a copy of a ``simulation`` that this drives."""
+        acting, spent = deepcopy(simulation).loops_of_parts()[1], []
+        for _ in range(TIMED):
+            started = time.perf_counter()
+            acting.run(TIMED)
+            spent.append((time.perf_counter() - started) * 1e6 / TIMED / simulation.plant.num_envs)
+        return spent
+
+
+def driving(controller: Controller, name: str) -> Driving:
+    """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
+    compiled = isinstance(controller, StagedController) and controller.is_compiled
+    return (CompiledDriving if compiled else Driving)(controller, name)
