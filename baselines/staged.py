@@ -62,7 +62,6 @@ class StagedController:
         """Without the loop, which knows addresses."""
         return {**self.__dict__, "_loop": None}
 
-    @property
     def is_compiled(self) -> bool:
         """Whether ``stages`` are all that ``command`` does: not where a derived class has changed it."""
         return getattr(self.command, "__func__", None) is StagedController.command
@@ -129,7 +128,7 @@ class StagedController:
             self._openings: Array = np.zeros((4, lanes))
             unchanged = self._seen.view()
             unchanged.flags.writeable = False
-            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
+            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows()]
             self._loop = Loop(lanes, [], placed, self.stages())
         self._asked[REFERENCES:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor, self.TOLD)
         fill_measurement(self._seen, measurement)
@@ -138,8 +137,8 @@ class StagedController:
             self.explain(measurement, reference)
         return self._openings.copy()
 
-    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""
+    def more_rows(self) -> list[tuple[Array, int]]:
+        """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of what is seen."""
         return []
 
 
@@ -197,6 +196,10 @@ class CompiledDriving(Driving):
         told = feedforward_rows(lanes, None, None)
         return [Stage(_ask, memory=told, sees_world=False), *self.controller.stages()]
 
+    def more_rows(self) -> list[tuple[Array, int]]:
+        """What the law keeps in rows of what is seen."""
+        return self.controller.more_rows()
+
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the law."""
         self.controller.explain(measurement, reference)
@@ -216,5 +219,5 @@ class CompiledDriving(Driving):
 
 def driving(controller: Controller, name: str) -> Driving:
     """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
-    compiled = isinstance(controller, StagedController) and controller.is_compiled
+    compiled = isinstance(controller, StagedController) and controller.is_compiled()
     return (CompiledDriving if compiled else Driving)(controller, name)

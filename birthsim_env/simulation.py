@@ -261,7 +261,7 @@ class Simulation:
             if own is None:
                 self._shown[:] = actuation.memory()
             seen.append((self._shown, SHOWN))
-        return world, seen
+        return world, [*seen, *getattr(actuation, "more_rows", list)()]
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)
@@ -298,7 +298,7 @@ class Simulation:
 
     def _assemble(self) -> None:
         """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
-        lanes, places, parts = self.plant.num_envs, self._places(), self.parts()
+        lanes, parts, places = self.plant.num_envs, self.parts(), self._places()
         commanded, moved = self._watching
         order = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
         every = [part for group in order.values() for part in group]

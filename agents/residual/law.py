@@ -236,11 +236,19 @@ class ResidualLaw(StagedController):
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         super().reset(lanes)
-        if lanes is not None:
-            if self.action.shape[1] != len(lanes):
-                self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
-            self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
-            self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
+        self._begin(np.zeros(0, dtype=np.bool_) if lanes is None else lanes)
+
+    def _begin(self, lanes: Mask) -> None:
+        if self.action.shape[1] != len(lanes):
+            self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
+        self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
+        self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
+
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
+        if self.action.shape[1] != lanes:
+            self._begin(np.ones(lanes, dtype=np.bool_))
+        super().prepare(lanes, sampled)
 
     def accept(self, actions: Array) -> None:
         """Take the actions (size, N) of a policy step."""
@@ -261,7 +269,7 @@ class ResidualLaw(StagedController):
         """What it was told besides: forces along the cylinders, N, their rates, N/s, and a damping factor; (5, N)."""
         return self._asked[REFERENCES:].copy()
 
-    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+    def more_rows(self) -> list[tuple[Array, int]]:
         return [(self.action, ACTION), (self.shown, SHOWN)]
 
     def memory(self) -> Array:

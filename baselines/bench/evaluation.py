@@ -19,7 +19,7 @@ from baselines.staged import Driving, driving
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
-LANES = 128
+LANES = 256
 """Episodes that run side by side."""
 
 AT_ONCE = 250

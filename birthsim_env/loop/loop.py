@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import SEEN, WORLD
-from birthsim_env.loop.stage import TABLE, Stage, address_of, carray, pointer
+from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -101,9 +101,7 @@ class Loop:
             if stage.memory is not None and memory == self._rows:
                 moves.append(self._move(stage.memory, memory))
                 self._rows += stage.memory.shape[0]
-            about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
-            for entry, table in zip(about, stage.tables, strict=False):
-                entry[: 1 + table.ndim] = table.ctypes.data, *table.shape
+            about = described(stage.tables)
             self._tables.append(about)
             places = (0 if stage.sees_world else -1, WORLD, memory)
             entries.append((address_of(stage.function), *places, stage.constants.ctypes.data, about.ctypes.data, closes))
