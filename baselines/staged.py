@@ -26,6 +26,9 @@ from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.simulation import Simulation
 
+NO_ACTION = np.zeros(0, dtype=np.float32)
+"""What a single environment's ``step`` takes where a controller drives it."""
+
 TIMED = 10
 """Control periods, and repetitions of them, over which a compiled law is timed."""
 
@@ -177,9 +180,6 @@ class Driving(Forgetful):
         self._spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
         return checked_command(self._name, command, plant.num_envs)
 
-    def check(self, measurement: Measurement) -> None:
-        """Raise ``ValueError`` where what is measured is not enough for the controller."""
-
     def cost(self, simulation: Simulation) -> list[float]:
         """us per lane and call."""
         return self._spent
@@ -205,6 +205,7 @@ class CompiledDriving(Driving):
         self.controller.explain(measurement, reference)
 
     def check(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` where episodes begin with less than the law has to measure."""
         self.controller.require_acceleration(measurement)
 
     def cost(self, simulation: Simulation) -> list[float]:

@@ -61,7 +61,7 @@ def assess(
     not asked for yet. ``action`` and ``last_action`` (size, N).
     """
     steps, kept = period / 0.01, exact.exp(-period / GIVING_WAY)
-    unit = steps / LARGEST_COST
+    unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
     for i in range(state.shape[1]):
         given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
         error, speed = 0.0, 0.0
@@ -89,5 +89,5 @@ def assess(
         terms[0, i] = steps
         terms[1, i] = -unit * cost
         terms[2, i] = -unit * HUNTING_COST * hunting
-        terms[3, i] = -unit * EFFORT_COST * effort / action.shape[0]
-        terms[4, i] = -unit * ACTION_CHANGE_COST * turned / action.shape[0]
+        terms[3, i] = -unit * EFFORT_COST * effort / entries
+        terms[4, i] = -unit * ACTION_CHANGE_COST * turned / entries

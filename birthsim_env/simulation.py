@@ -218,6 +218,8 @@ class Simulation:
                 f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
         felt[untold] = 0.0
+        if hasattr(self.actuation, "check"):
+            self.actuation.check(self.measurement)
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""

@@ -15,7 +15,7 @@ from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller
-from baselines.staged import Driving, driving
+from baselines.staged import driving
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
@@ -117,7 +117,10 @@ def _run_batch(
     environment: str, controller: Controller, seeds: list[int], arguments: dict[str, Any], result: Evaluation,
     spent: list[float], progress: bool,
 ) -> None:  # fmt: skip
-    env, driver = driven(environment, controller, result.controller, seeds, **arguments)
+    period = load_parameters(arguments.get("parameters")).electronics.control_period
+    driver = driving(controller, result.controller)
+    env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
+    env.reset(seed=list(seeds))
     asked, simulation = required_strength_ratio(env), env.simulation
     measures = Measures(simulation, env.steps)
     at_once = 1 if measures.stops else AT_ONCE
@@ -143,18 +146,6 @@ def _run_batch(
     for discount, sums in zip(DISCOUNTS, measures.returns, strict=True):
         result.returns[discount] += sums.tolist()
     result.traces.append(measures.error.transpose(0, 2, 1))
-
-
-def driven(environment: str, controller: Controller, name: str, seeds: list[int], **arguments: Any) -> tuple[Any, Driving]:
-    """A vector environment of a registered id whose loop a controller closes, one lane a seed, and what drives it.
-
-    Its episodes have begun. A policy step is a control period.
-    """
-    period, driver = load_parameters(arguments.get("parameters")).electronics.control_period, driving(controller, name)
-    env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
-    env.reset(seed=list(seeds))
-    driver.check(env.measurement)
-    return env, driver
 
 
 def overview(evaluations: list[Evaluation]) -> str:
