@@ -160,13 +160,15 @@ def _ask(world: int, seen: int, memory: int, constants: int, tables: int, lane: 
 class Driving(Forgetful):
     """A controller as an actuation, called back once per control period. A policy step has no action.
 
-    Raises ``ValueError`` with the controller's ``name`` where it returns anything but openings.
+    With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``told`` are options of
+    ``command``.
     """
 
-    size, names, every_period = 0, (), True
+    size, every_period = 0, True
+    names: tuple[str, ...] = ()
 
-    def __init__(self, controller: Controller, name: str) -> None:
-        self.controller, self._name, self._spent = controller, name, list[float]()
+    def __init__(self, controller: Controller, name: str | None, told: dict[str, Array]) -> None:
+        self.controller, self._name, self._told, self._spent = controller, name, told, list[float]()
 
     def begin(self, lanes: Mask) -> None:
         self.controller.reset(None if lanes.all() else lanes)
@@ -176,9 +178,9 @@ class Driving(Forgetful):
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         started = time.perf_counter()
-        command = self.controller.command(measurement, reference)
+        command = self.controller.command(measurement, reference, **self._told)
         self._spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
-        return checked_command(self._name, command, plant.num_envs)
+        return command if self._name is None else checked_command(self._name, command, plant.num_envs)
 
     def cost(self, simulation: Simulation) -> list[float]:
         """us per lane and call."""
@@ -193,7 +195,8 @@ class CompiledDriving(Driving):
     def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """The law, compiled into the closed loop."""
         self.controller.prepare(lanes, sampled)
-        told = feedforward_rows(lanes, None, None)
+        force, rate, factor = map(self._told.get, TOLD)
+        told = feedforward_rows(lanes, force, rate, factor, self.controller.TOLD)
         return [Stage(_ask, memory=told, sees_world=False), *self.controller.stages()]
 
     def more_rows(self) -> list[tuple[Array, int]]:
@@ -218,7 +221,7 @@ class CompiledDriving(Driving):
         return spent
 
 
-def driving(controller: Controller, name: str) -> Driving:
+def driving(controller: Controller, name: str | None, told: dict[str, Array] | None = None) -> Driving:
     """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
     compiled = isinstance(controller, StagedController) and controller.is_compiled()
-    return (CompiledDriving if compiled else Driving)(controller, name)
+    return (CompiledDriving if compiled else Driving)(controller, name, told or {})
