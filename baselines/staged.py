@@ -53,6 +53,9 @@ class StagedController:
     TOLD: ClassVar[tuple[str, ...]] = TOLD
     """What ``command`` takes besides the signals."""
 
+    asks: ClassVar[bool] = False
+    """Whether the stages themselves say what the law is asked for and told."""
+
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
@@ -197,10 +200,11 @@ class CompiledDriving(Driving):
         self.controller.prepare(lanes, sampled)
         force, rate, factor = map(self._told.get, TOLD)
         told = feedforward_rows(lanes, force, rate, factor, self.controller.TOLD)
-        return [Stage(_ask, memory=told, sees_world=False), *self.controller.stages()]
+        before = [] if self.controller.asks else [Stage(_ask, memory=told, sees_world=False)]
+        return [*before, *self.controller.stages()]
 
     def more_rows(self) -> list[tuple[Array, int]]:
-        """What the law keeps in rows of what is seen."""
+        """Arrays that the loop places in rows of what is seen."""
         return self.controller.more_rows()
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

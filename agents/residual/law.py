@@ -19,7 +19,7 @@ from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSetting
 from baselines.estimation import disturbance_observer, observers
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
-from baselines.staged import LawStage, StagedController
+from baselines.staged import CompiledDriving, LawStage, StagedController
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
@@ -36,12 +36,11 @@ from birthsim_env.loop.rows import (
     VELOCITY,
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage, block, numbers, scratch
+from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFEST = 4000.0
@@ -202,6 +201,8 @@ def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane
 class ResidualLaw(StagedController):
     """A law with a residual over N lanes: ``accept`` takes the actions (size, N) of a policy step."""
 
+    asks = True
+
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         super().__init__(parameters)
         self.settings = settings
@@ -277,39 +278,28 @@ class ResidualLaw(StagedController):
         return self.shown.copy()
 
 
-class ResidualActuation:
+class ResidualActuation(CompiledDriving):
     """``ResidualLaw`` as an actuation of the environments: the law runs inside, at the control rate."""
 
-    every_period = True
+    controller: ResidualLaw
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
-        self._law = ResidualLaw(parameters, settings)
-        self.size = settings.size
-        self.names = action_names(settings)
-        self.memory_names = memory_names(settings)
+        super().__init__(ResidualLaw(parameters, settings), None, {})
+        self.size, self.names, self.memory_names = settings.size, action_names(settings), memory_names(settings)
 
     @property
     def shown(self) -> Array:
         """What a policy sees of the law's memory, (size + 8, N)."""
-        return self._law.shown
+        return self.controller.shown
 
     def begin(self, lanes: Mask) -> None:
-        self._law.reset(lanes)
+        self.controller.reset(lanes)
 
     def accept(self, actions: Array) -> None:
-        self._law.accept(actions)
+        self.controller.accept(actions)
 
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
-        return self._law.command(measurement, reference)
-
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
-        """``openings``, compiled into the closed loop."""
-        self._law.prepare(lanes, sampled)
-        return self._law.stages()
-
-    def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the law."""
-        self._law.explain(measurement, reference)
+    def more_rows(self) -> list[tuple[Array, int]]:
+        return []
 
     def memory(self) -> Array:
-        return self._law.memory()
+        return self.controller.memory()

@@ -91,11 +91,12 @@ def run_stiffness_test(
     hand = RampedForces(probes.force)
     loop.close([hand.stage()], watching)
     loop.run(len(times))
-    rest, held = map(Window.of, paths)
-    displacement = held.mean() - rest.mean()
+    rest, held = (path.mean(axis=0) for path in paths)
+    displacement = held - rest
     lost = ~np.isfinite(displacement).all(axis=0) | (loop.impacts.max(axis=0) > board_limit(rigs))
-    expected, hunting = reference.compliant_target(probes.force) - probes.position, np.maximum(held.span(), rest.span())
-    return StiffnessResult(displacement, expected, hunting, lost, rest.mean() - probes.position)
+    expected = reference.compliant_target(probes.force) - probes.position
+    hunting = np.max([np.ptp(path, axis=0) for path in paths], axis=0)
+    return StiffnessResult(displacement, expected, hunting, lost, rest - probes.position)
 
 
 def board_limit(rigs: Parameters | Sequence[Parameters]) -> float:
@@ -110,33 +111,3 @@ class RampedForces(ForceProfile):
         super().__init__()
         self._knots, self._counts = np.zeros((3, 3, force.shape[1])), np.full(force.shape[1], 3.0)
         self._knots[1:, 0], self._knots[2, 1:] = np.transpose([[REST, REST + RISE]]), force
-
-
-class Window:
-    """Mean and span of positions (2, N) over a stretch of time."""
-
-    @classmethod
-    def of(cls, path: Array) -> Window:
-        """Over positions (T, 2, N)."""
-        window = cls(path.shape[2])
-        for place in path:
-            window.add(place)
-        return window
-
-    def __init__(self, lanes: int) -> None:
-        self._sum, self._count = np.zeros((2, lanes)), 0
-        self._low, self._high = np.full((2, lanes), np.inf), np.full((2, lanes), -np.inf)
-
-    def add(self, position: Array) -> None:
-        """Take one instant."""
-        self._sum += position
-        self._count += 1
-        self._low, self._high = np.minimum(self._low, position), np.maximum(self._high, position)
-
-    def mean(self) -> Array:
-        """m, (2, N)."""
-        return np.asarray(self._sum / self._count)
-
-    def span(self) -> Array:
-        """Peak to peak, m, (2, N)."""
-        return np.asarray(self._high - self._low)
