@@ -16,12 +16,13 @@ import numpy as np
 
 from baselines.controller import TOLD, Controller, checked_command, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, SEEN, fill_measurement
+from birthsim_env.loop.rows import ACTION, ASKED, OPENING, REFERENCE, Feedforward, Seen, fill_measurement
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
-from birthsim_env.loop.stage import Stage, block
+from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import Forgetful
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.records import Rows, part, row
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.simulation import Simulation
@@ -126,6 +127,14 @@ class StagedController:
             given = (feedforward_force, feedforward_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
+        if self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor)):
+            self.explain(measurement, reference)
+        return self._openings.copy()
+
+    def run_stages(
+        self, measurement: Measurement, reference: Reference, told: tuple[Array | None, Array | None, Array | None]
+    ) -> int:
+        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve."""
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         self.require_acceleration(measurement)
@@ -134,29 +143,34 @@ class StagedController:
             self._openings: Array = np.zeros((4, lanes))
             unchanged = self._seen.view()
             unchanged.flags.writeable = False
-            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows()]
+            placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor, self.TOLD)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.TOLD)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
-        if self._loop.run():
-            self.explain(measurement, reference)
-        return self._openings.copy()
+        return self._loop.run()
 
-    def more_rows(self) -> list[tuple[Array, int]]:
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of what is seen."""
         return []
 
 
+class Told(Rows):
+    """What a law is told besides."""
+
+    feedforward = part(Feedforward, "what it is to believe acts on the pistons")
+    damping_factor = row("1", "damping in units of the least, where the law has one to vary; 0: the law's own")
+
+
 @kernel
-def _ask(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """A law is asked for the reference; memory: what it is told besides."""
-    s, told = block(seen, SEEN), block(memory, ACTION - FEEDFORWARD)
+def _ask(world: int, seen: Seen, told: Told, constants: int, tables: int, lane: int, n: int) -> int:
+    """A law is asked for the reference, and told what its memory holds."""
     for i in range(n):
-        for row in range(REFERENCES):
-            s[ASKED + row, i] = s[REFERENCE + row, i]
-        for row in range(ACTION - FEEDFORWARD):
-            s[FEEDFORWARD + row, i] = told[row, i]
+        for k in range(Reference.size):
+            seen.asked.rows[k, i] = seen.reference.rows[k, i]
+        for k in range(Feedforward.size):
+            seen.feedforward.rows[k, i] = told.feedforward.rows[k, i]
+        seen.damping_factor[i] = told.damping_factor[i]
     return 0
 
 
@@ -203,9 +217,9 @@ class CompiledDriving(Driving):
         before = [] if self.controller.asks else [Stage(_ask, memory=told, sees_world=False)]
         return [*before, *self.controller.stages()]
 
-    def more_rows(self) -> list[tuple[Array, int]]:
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays that the loop places in rows of what is seen."""
-        return self.controller.more_rows()
+        return self.controller.more_rows(lanes)
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the law."""

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import math
 
-from birthsim_env.loop.signals import compliance
+from birthsim_env.loop.rows import World
+from birthsim_env.loop.signals import Reference, compliance
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 
 ERROR_UNIT = 1e-3
 """m. A tracking error e costs ln(1 + e/``ERROR_UNIT``) per 10 ms: what is small counts, and what is large still matters."""
@@ -46,37 +48,63 @@ PRESSURE_RANGE = (0.2e5, 20e5)
 TEMPERATURE_RANGE = (100.0, 1000.0)
 """K, likewise."""
 
-REWARD_TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
+
+class Terms(Rows):
+    """What a policy step pays."""
+
+    survive = row("1", "for going on", "reward_survive")
+    tracking = row("1", "for the tracking error", "reward_tracking")
+    hunting = row("1", "for speed that is not asked for", "reward_hunting")
+    effort = row("1", "for the action", "reward_effort")
+    action_change = row("1", "for its change", "reward_action_change")
+    total = row("1", "their sum, the reward", "reward")
+
+
+REWARD_TERMS = tuple(name for name, *_ in Terms.entries())[:-1]
+
+
+class Owed(Rows):
+    """What a policy step has to know of the ones before."""
+
+    given = rows("x y", "m", "what the hand has moved the compliant target by")
+    owed = rows("x y", "m", "how much of that is not asked for yet")
+
+
+class Limits(Numbers):
+    """Of an environment."""
+
+    period = number("s", "policy period")
+    jumped_below = number("s", "a jump was in this policy step where less time has gone since")
+    impact_speed = number("m/s", "of the fastest collision with an end stop that does not end an episode")
 
 
 @helper
 def assess(
-    state: Array, motion: Array, reference: Array, force: Array, jumped: Array, moved: Array, action: Array,
-    last_action: Array, impacts: Array, impact_speed: float, period: float, terms: Array, failed: Array,
+    world: World, reference: Reference, owed: Owed, action: Array, last_action: Array, limits: Limits, terms: Terms,
+    failed: Array, n: int,
 ) -> None:  # fmt: skip
-    """Writes reward ``terms`` (5, N) in the order of ``REWARD_TERMS``, and 1 in lanes (N,) that have left the physical range.
+    """Writes ``terms`` of n lanes, and 1 in lanes (N,) that have ``failed``: those that have left the physical range.
 
-    ``force`` (2, N), N, is the hand's; ``jumped`` (N,) is 1 where it or a stiffness setpoint jumped within this policy
-    ``period``, s. ``moved`` (4, N), m, is carried on: what the hand has moved the compliant target by, and how much of that is
-    not asked for yet. ``action`` and ``last_action`` (size, N).
+    ``owed`` is carried on. ``action`` and ``last_action`` (size, N).
     """
-    steps, kept = period / 0.01, exact.exp(-period / GIVING_WAY)
-    unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
-    for i in range(state.shape[1]):
-        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
+    steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
+    unit, size, state, force = steps / LARGEST_COST, max(1, action.shape[0]), world.state, world.force
+    for i in range(n):
+        kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
+        given, jumped = compliance(force[0, i], force[1, i], kx, ky, kxy), world.since_jump[i] < limits.jumped_below
         error, speed = 0.0, 0.0
         for axis in range(2):
-            change = given[axis] - moved[axis, i]
-            owed = kept * (moved[2 + axis, i] + (change if jumped[i] > 0.0 else 0.0))
-            asked = given[axis] - owed
-            rate = (asked - moved[axis, i] + moved[2 + axis, i]) / period
-            error += abs(motion[axis, i] - reference[axis, i] - asked)
-            speed += abs(motion[2 + axis, i] - reference[2 + axis, i] - rate)
-            moved[axis, i], moved[2 + axis, i] = given[axis], owed
+            change = given[axis] - owed.given[axis, i]
+            due = kept * (owed.owed[axis, i] + (change if jumped else 0.0))
+            asked = given[axis] - due
+            rate = (asked - owed.given[axis, i] + owed.owed[axis, i]) / limits.period
+            error += abs(world.motion[axis, i] - reference.position[axis, i] - asked)
+            speed += abs(world.motion[2 + axis, i] - reference.velocity[axis, i] - rate)
+            owed.given[axis, i], owed.owed[axis, i] = given[axis], due
         cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
         hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)
         turned, effort = 0.0, 0.0
-        for k in range(action.shape[0]):
+        for k in range(size):
             turned += abs(action[k, i] - last_action[k, i])
             effort += action[k, i] * action[k, i]
         inside = True
@@ -85,9 +113,10 @@ def assess(
         for k in (at.TP1, at.TN1, at.TP2, at.TN2):
             inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
         inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
-        failed[i] = 1.0 if not inside or max(impacts[0, i], impacts[1, i]) > impact_speed else 0.0
-        terms[0, i] = steps
-        terms[1, i] = -unit * cost
-        terms[2, i] = -unit * HUNTING_COST * hunting
-        terms[3, i] = -unit * EFFORT_COST * effort / entries
-        terms[4, i] = -unit * ACTION_CHANGE_COST * turned / entries
+        failed[i] = 1.0 if not inside or max(world.impact[0, i], world.impact[1, i]) > limits.impact_speed else 0.0
+        terms.survive[i] = steps
+        terms.tracking[i] = -unit * cost
+        terms.hunting[i] = -unit * HUNTING_COST * hunting
+        terms.effort[i] = -unit * EFFORT_COST * effort / size
+        terms.action_change[i] = -unit * ACTION_CHANGE_COST * turned / size
+        terms.total[i] = terms.survive[i] + terms.tracking[i] + terms.hunting[i] + terms.effort[i] + terms.action_change[i]

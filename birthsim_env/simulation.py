@@ -263,7 +263,8 @@ class Simulation:
             if own is None:
                 self._shown[:] = actuation.memory()
             seen.append((self._shown, SHOWN))
-        return world, [*seen, *getattr(actuation, "more_rows", list)()]
+        more = actuation.more_rows(lanes) if hasattr(actuation, "more_rows") else []
+        return world, [*seen, *more]
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)

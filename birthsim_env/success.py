@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
-from birthsim_env.loop.signals import compliance
+from birthsim_env.loop.rows import World
+from birthsim_env.loop.signals import Reference, compliance
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row
 
 SETTLED = 0.5
 """s after a jump of force or setpoint (or the start) from which an error counts as settled."""
@@ -15,23 +17,33 @@ SUCCESS_ERROR = 1e-3
 """m, root mean square distance from the compliant target; assumed: a quarter of the paper's law's."""
 
 
-@helper
-def add(
-    motion: Array, reference: Array, force: Array, since: Array, failed: Array, tally: Array, success: Array
-) -> None:  # fmt: skip
-    """Takes one policy step: carries ``tally`` (4, N) on and writes ``success`` (N,), 1 where an episode is successful so far.
+class Tally(Rows):
+    """Of an episode so far."""
 
-    The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump (``since`` (N,), s), or over all
-    of them before there is such a step. An episode that has ``failed`` (N,) is none.
+    squares = row("m2", "sum of the squared distances from the compliant target")
+    steps = row("1", "policy steps")
+    settled_squares = row("m2", "the same, of settled steps")
+    settled_steps = row("1", "settled policy steps")
+
+
+@helper
+def add(world: World, reference: Reference, failed: Array, tally: Tally, success: Array, n: int) -> None:
+    """Takes one policy step: carries ``tally`` on and writes ``success`` (N,), 1 where an episode is successful so far.
+
+    The error is the root mean square over the policy steps ``SETTLED`` s and more after a jump, or over all of them before
+    there is such a step. An episode that has ``failed`` (N,) is none.
     """
-    for i in range(since.shape[0]):
-        given = compliance(force[0, i], force[1, i], reference[8, i], reference[9, i], reference[14, i])
-        x, y = motion[0, i] - reference[0, i] - given[0], motion[1, i] - reference[1, i] - given[1]
-        settled = since[i] >= SETTLED
-        for row, counts in ((0, True), (2, settled)):
-            if counts:
-                tally[row, i] += x * x + y * y
-                tally[row + 1, i] += 1.0
-        row = 2 if tally[3, i] > 0.0 else 0
-        good = failed[i] == 0.0 and math.sqrt(tally[row, i] / tally[row + 1, i]) < SUCCESS_ERROR
-        success[i] = 1.0 if good else 0.0
+    for i in range(n):
+        kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
+        given_x, given_y = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
+        x = world.motion[0, i] - reference.position[0, i] - given_x
+        y = world.motion[1, i] - reference.position[1, i] - given_y
+        tally.squares[i] += x * x + y * y
+        tally.steps[i] += 1.0
+        if world.since_jump[i] >= SETTLED:
+            tally.settled_squares[i] += x * x + y * y
+            tally.settled_steps[i] += 1.0
+        any_settled = tally.settled_steps[i] > 0.0
+        squares = tally.settled_squares[i] if any_settled else tally.squares[i]
+        steps = tally.settled_steps[i] if any_settled else tally.steps[i]
+        success[i] = 1.0 if failed[i] == 0.0 and math.sqrt(squares / steps) < SUCCESS_ERROR else 0.0

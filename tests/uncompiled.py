@@ -41,7 +41,18 @@ def address_of(stage: Callable[..., int]) -> int:
 
 def call(address: int, *arguments: int) -> int:
     """Stands in for the loop's own."""
-    return _stages[address](*map(int, arguments))
+    stage = importlib.import_module("birthsim_env.loop.stage")
+    function = _stages[int(address)]
+    return function(*map(_named, stage.layouts_of(function), map(int, arguments)))
+
+
+def _named(layout: Any, address: int) -> Any:
+    """What a stage is handed: a whole number, or the rows at an address by name."""
+    if layout is None or not address:
+        return address
+    stage = importlib.import_module("birthsim_env.loop.stage")
+    shape = (layout.size, stage.BLOCK) if layout.per_lane else (layout.size,)
+    return layout(stage.carray(pointer(address, stage.np.float64), shape))
 
 
 def switch_off() -> None:

@@ -1,4 +1,4 @@
-"""The paper's backstepping law as kernels over lanes (design section 5, the paper's sections IV and Fig. 3).
+"""The paper's backstepping law as kernels over lanes (the paper's section IV and Fig. 3).
 
 Per cylinder, with z1 = y - yd, z2 = v - (vd - c1 z1), z3 = F - F*, dv/dt = f + g F and 1/g = m_e:
     F*    = (ad - c1 (v - vd) - f - z1 - c2 z2) / g

@@ -10,15 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.bench.metrics import ALIVE, COUNT, ERROR, TALLY, figures_of, fresh_tally, sample, window
+from baselines.bench.metrics import Tally, figures_of, fresh_tally, sample, window
 from birthsim_env import reward, success
-from birthsim_env.info import ROWS as INFO
-from birthsim_env.info import describe
-from birthsim_env.loop.rows import FORCE, IMPACT, MOTION, OPENING, REFERENCE, SEEN, SINCE_JUMP, STATE, TIME, WORLD
-from birthsim_env.loop.signals import REFERENCES, compliance
-from birthsim_env.loop.stage import Stage, block, numbers, scratch, table3
+from birthsim_env.info import Info, describe
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.signals import compliance
+from birthsim_env.loop.stage import Stage, scratch, table3
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
 from birthsim_env.simulation import Simulation
 
 DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
@@ -27,82 +27,77 @@ DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
 TRACE = 0.01
 """s between the samples of the error kept for the figure."""
 
-COMMAND = TALLY
-LAST = COMMAND + 4
-START = LAST + 4
-MOVED = START + STATES + 4
-CALM = MOVED + 4
-SUCCESS = CALM + 4
-FAILED = SUCCESS + 1
-WEIGHT = FAILED + 1
-RETURN = WEIGHT + len(DISCOUNTS)
-ROWS = RETURN + len(DISCOUNTS)
-"""Rows of memory behind the tally: the command and the last one; state and motion where the episode began; what
-``reward.assess`` and ``success.add`` carry on; 1 in episodes that are successful so far; 1 in lanes that left the physical
-range; weight of the next reward and sum of the past ones, for each of ``DISCOUNTS``."""
 
-PERIOD, EVERY, JUMPED, SPEED, FACTOR = range(5)
-"""Constants: control period, s; periods between samples of the error; time, s, below which a jump was in this period; largest
-speed, m/s, of a collision; discounts of a period."""
+class Memory(Tally):
+    """What is carried from period to period."""
+
+    command = rows(4, "1", "openings")
+    last = rows(4, "1", "those of the period before")
+    state = rows(STATES, "SI", "where the episode began")
+    motion = rows(4, "SI", "of the end effector there")
+    owed = part(reward.Owed, "for the reward")
+    calm = part(success.Tally, "for success")
+    success = row("1", "1 where the episode is successful so far")
+    fallen = row("1", "1 where the lane has left the physical range")
+    weight = rows(len(DISCOUNTS), "1", "of the next reward, for each of ``DISCOUNTS``")
+    returns = rows(len(DISCOUNTS), "1", "sums of the rewards so far")
+
+
+class About(Numbers):
+    """Constants of the stages."""
+
+    limits = part(reward.Limits, "of the environment")
+    every = number("1", "control periods between samples of the error")
+    discounts = rows(len(DISCOUNTS), "1", "of a control period")
 
 
 @kernel
-def _see(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
     """Tables: positions kept for the metrics (W, 2, N); error (T, 2, N), m."""
-    w, s, m, about = block(world, WORLD), block(seen, SEEN), block(memory, ROWS)[:, :n], numbers(constants, FACTOR)
-    state, motion, hits = w[STATE : STATE + STATES, :n], w[MOTION : MOTION + 4, :n], w[IMPACT : IMPACT + 2, :n]
-    force, asked, now = w[FORCE : FORCE + 2, :n], s[REFERENCE : REFERENCE + REFERENCES, :n], scratch(INFO)[:, :n]
+    now, every, reference = Info(scratch(Info.size)), int(about.every), seen.reference
     kept, errors = table3(tables, 0)[:, :, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
-    describe(s[TIME, :n], w[SINCE_JUMP, :n], state, motion, asked, force, hits, w[:PARAMETERS, :n], now)
+    describe(world, seen, now, n)
     for i in range(n):
-        if m[COUNT, i] == 0.0:
-            given = compliance(force[0, i], force[1, i], asked[8, i], asked[9, i], asked[14, i])
+        number = int(own.count[i])
+        if number == 0:
+            kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
+            given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
             for axis in range(2):
-                m[MOVED + axis, i], m[MOVED + 2 + axis, i] = given[axis], given[axis]
+                own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
             for k in range(STATES):
-                m[START + k, i] = state[k, i]
+                own.state[k, i] = world.state[k, i]
             for k in range(4):
-                m[START + STATES + k, i] = motion[k, i]
-        number = int(m[COUNT, i])
-        if m[ALIVE, i] > 0.0 and number % int(about[EVERY]) == 0:
+                own.motion[k, i] = world.motion[k, i]
+        if own.alive[i] > 0.0 and number % every == 0:
             for axis in range(2):
-                errors[number // int(about[EVERY]), axis, i] = now[ERROR + axis, i]
-        for k in range(2):
-            hits[k, i] = 0.0
-    for k in range(4):
-        for i in range(n):
-            m[COMMAND + k, i] = s[OPENING + k, i]
-    sample(now, m[COMMAND:LAST], about[PERIOD], m, kept)
+                errors[number // every, axis, i] = now.tracking_error[axis, i]
+        world.impact[0, i], world.impact[1, i] = 0.0, 0.0
+        for k in range(4):
+            own.command[k, i] = seen.opening[k, i]
+    sample(now, own.command, about.limits.period, own, kept, n)
     return 0
 
 
 @kernel
-def _pay(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s, m = block(world, WORLD), block(seen, SEEN), block(memory, ROWS)[:, :n]
-    about, own = numbers(constants, FACTOR + len(DISCOUNTS)), scratch(8)[:, :n]
-    state, motion, hits = w[STATE : STATE + STATES, :n], w[MOTION : MOTION + 4, :n], w[IMPACT : IMPACT + 2, :n]
-    force, asked, since = w[FORCE : FORCE + 2, :n], s[REFERENCE : REFERENCE + REFERENCES, :n], w[SINCE_JUMP, :n]
-    jumped, failed, good, terms, command, last = own[0], own[1], own[2], own[3:], m[COMMAND:LAST], m[LAST:START]
+def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
+    terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), scratch(2), seen.reference
+    failed, good = ends[0], ends[1]
+    reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
+    success.add(world, reference, failed, own.calm, good, n)
     for i in range(n):
-        jumped[i] = 1.0 if since[i] < about[JUMPED] else 0.0
-    reward.assess(
-        state, motion, asked, force, jumped, m[MOVED:CALM], command, last, hits, about[SPEED], about[PERIOD], terms, failed
-    )  # fmt: skip
-    success.add(motion, asked, force, since, failed, m[CALM:SUCCESS], good)
-    for i in range(n):
-        paid = terms[0, i] + terms[1, i] + terms[2, i] + terms[3, i] + terms[4, i]
+        paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
         for k in range(len(DISCOUNTS)):
-            m[RETURN + k, i] += m[WEIGHT + k, i] * (paid if m[ALIVE, i] > 0.0 else 0.0)
-            m[WEIGHT + k, i] *= about[FACTOR + k]
+            own.returns[k, i] += own.weight[k, i] * paid
+            own.weight[k, i] *= about.discounts[k]
         for k in range(4):
-            last[k, i] = command[k, i]
+            own.last[k, i] = own.command[k, i]
         if failed[i] > 0.0:
-            m[ALIVE, i], m[FAILED, i] = 0.0, 1.0
+            own.alive[i], own.fallen[i] = 0.0, 1.0
             for k in range(STATES):
-                state[k, i] = m[START + k, i]
+                world.state[k, i] = own.state[k, i]
             for k in range(4):
-                motion[k, i] = m[START + STATES + k, i]
-        m[SUCCESS, i] = good[i] * m[ALIVE, i]
+                world.motion[k, i] = own.motion[k, i]
+        own.success[i] = good[i] * own.alive[i]
     return 0
 
 
@@ -117,34 +112,36 @@ class Measures:
         period, lanes = simulation.period, simulation.plant.num_envs
         every = max(1, round(TRACE / period))
         self.error: Array = np.full((-(-steps // every), 2, lanes), np.nan)
-        self._period, self._memory = period, fresh_tally(lanes, ROWS)
-        self._memory[WEIGHT:RETURN] = 1.0
-        about = (period, every, period - 0.5 * period, simulation.parameters.mechanics.impact_speed)
-        constants = np.array([*about, *np.power(DISCOUNTS, period / 0.01)])
-        see = Stage(_see, constants, self._memory, (window(lanes, period), self.error))
-        self.stops = simulation.watch([see], [Stage(_pay, constants, self._memory)])
+        self._period, self._own = period, Memory(fresh_tally(lanes, Memory.size - Tally.size))
+        self._own.weight[:] = 1.0
+        limits = reward.Limits.numbers(
+            period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
+        )
+        about = About.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
+        see = Stage(_see, about, self._own.rows, (window(lanes, period), self.error))
+        self.stops = simulation.watch([see], [Stage(_pay, about, self._own.rows)])
 
     @property
     def alive(self) -> NDArray[np.bool_]:
         """Lanes (N,) that are not lost."""
-        return np.asarray(self._memory[ALIVE] > 0.0)
+        return np.asarray(self._own.alive > 0.0)
 
     @property
     def success(self) -> NDArray[np.bool_]:
         """Lanes (N,) that are successful so far, see ``birthsim_env.success``."""
-        return np.asarray(self._memory[SUCCESS] > 0.0)
+        return np.asarray(self._own.success > 0.0)
 
     @property
     def returns(self) -> Array:
         """Sums of discounted rewards, (D, N), for each of ``DISCOUNTS``."""
-        return self._memory[RETURN:].copy()
+        return self._own.returns.copy()
 
     def fallen(self) -> NDArray[np.bool_]:
         """Lanes (N,) that have left the physical range since the last call."""
-        fallen: NDArray[np.bool_] = self._memory[FAILED] > 0.0
-        self._memory[FAILED] = 0.0
+        fallen: NDArray[np.bool_] = self._own.fallen > 0.0
+        self._own.fallen[:] = 0.0
         return fallen
 
     def metrics(self) -> dict[str, Array]:
         """Every metric of ``metrics.UNITS`` per lane, (N,)."""
-        return figures_of(self._memory[:TALLY], self._period)
+        return figures_of(self._own, self._period)

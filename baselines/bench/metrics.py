@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.info import ROWS, SLICES
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.info import Info
+from birthsim_env.loop.stage import scratch
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, part, row, rows
 from birthsim_env.success import SETTLED
 
 QUIET = 1.0
@@ -54,134 +56,157 @@ along the push, less one; ``cross_motion`` the displacement across the push beyo
 target. ``unrest`` is the motion, peak to peak, in the ``WINDOW`` before the push. All three say something only where the
 reference stands still all along and the episode ends in a held push."""
 
-(
-    COUNT, SETTLED_COUNT, EX, EY, SX, SY, K1, K2, PEAK_EX, PEAK_EY, PEAK_SX, PEAK_SY, SUPPLIED, SATURATED,
-    QUIET_NOW, QUIET_TIME, LOW_X, LOW_Y, HIGH_X, HIGH_Y, HUNTING_X, HUNTING_Y, RESTARTS, IS_STUCK,
-    IS_STILL, KEPT, SUM_X, SUM_Y, REST_X, REST_Y, SPAN_X, SPAN_Y, IS_HELD, MOVED_X, MOVED_Y, ASKED_X, ASKED_Y, PUSH_X, PUSH_Y,
-    ALIVE, BEFORE,
-) = range(41)  # fmt: skip
-"""Rows of the tally: samples, and settled ones; sums of squares of errors (m2), settled errors and relative errors of the
-pneumatic stiffness; their peaks; kg of air; samples with a valve at its limit; s of constant setpoints now, and those that
-counted; extremes of this window and the worst span; restarts; flags; the window's samples and their sum; means at rest,
-spans of the same window, means held; displacement asked for; force held; 1 in lanes that are measured; what was asked for at
-the last sample."""
 
-SINCE, FLOW, ERROR, POSITION, VELOCITY, STIFFNESS, TARGET, COMPLIANT, FORCE, PNEUMATIC = (
-    SLICES[name].start
-    for name in (
-        *("since_jump", "supply_flow", "tracking_error", "position", "velocity", "pneumatic_stiffness"),
-        *("target", "compliant_target", "user_force", "pneumatic_stiffness_setpoint"),
-    )
-)
-"""First rows, in ``info``, of what is measured."""
+class Asked(Rows):
+    """What an instant asks for."""
 
-STILL = (TARGET, TARGET + 1, SLICES["stiffness_setpoint"].start, SLICES["stiffness_setpoint"].start + 1)
-ASKED = (*STILL, COMPLIANT, COMPLIANT + 1, FORCE, FORCE + 1, PNEUMATIC, PNEUMATIC + 1)
-"""Rows of what is asked for, those first that a stiffness test leaves alone."""
+    target = rows(2, "m", "x, y")
+    stiffness = rows(2, "N/m", "setpoint of the closed-loop stiffness")
+    compliant_target = rows(2, "m", "(19)")
+    force = rows(2, "N", "of the hand")
+    pneumatic_stiffness = rows(2, "N/m", "setpoint of the cylinders")
 
-TALLY, PUSHED_BEFORE = BEFORE + len(ASKED), BEFORE + ASKED.index(FORCE)
-"""Rows of the tally, and where the force of the last sample stands in it."""
+
+STILL = Asked.compliant_target.first
+"""So many of the first rows stay as they are in a stiffness test."""
+
+
+class Tally(Rows):
+    """What is carried from sample to sample."""
+
+    count = row("1", "samples")
+    settled_count = row("1", "those that are settled")
+    squares = rows(2, "m2", "sum of squared errors")
+    settled_squares = rows(2, "m2", "the same, settled")
+    stiffness_squares = rows(2, "1", "sum of squared relative errors of the pneumatic stiffness")
+    peak = rows(2, "m", "largest error")
+    settled_peak = rows(2, "m", "the same, settled")
+    supplied = row("kg", "air")
+    saturated = row("1", "samples with a valve at its limit")
+    quiet_now = row("s", "for which all that is asked for has been constant")
+    quiet_time = row("s", "of quiet that counted")
+    low = rows(2, "m", "least position of this quiet window")
+    high = rows(2, "m", "greatest position of it")
+    hunting = rows(2, "m", "greatest span of a window so far")
+    restarts = row("1", "from rest, in quiet windows")
+    is_stuck = row("1", "1 where the end effector is stuck")
+    is_still = row("1", "1 where target and setpoints have never changed")
+    kept = row("1", "samples since anything asked for changed")
+    sum = rows(2, "m", "of the positions of the last ``WINDOW`` s of them")
+    rest = rows(2, "m", "mean position before the push")
+    span = rows(2, "m", "peak to peak in that time")
+    is_held = row("1", "1 where a push has been held for ``HELD`` s")
+    moved = rows(2, "m", "mean position of the last ``WINDOW`` s")
+    wanted = rows(2, "m", "displacement asked for")
+    push = rows(2, "N", "the hand's force")
+    before = part(Asked, "at the last sample")
+    alive = row("1", "1 in lanes that are measured")
 
 
 @helper
-def _add_errors(now: Array, command: Array, period: float, tally: Array, i: int) -> None:
-    settled = 1.0 if now[SINCE, i] >= SETTLED else 0.0
-    tally[COUNT, i] += 1.0
-    tally[SETTLED_COUNT, i] += settled
+def _add_errors(now: Info, command: Array, period: float, tally: Tally, i: int) -> None:
+    settled = 1.0 if now.since_jump[i] >= SETTLED else 0.0
+    tally.count[i] += 1.0
+    tally.settled_count[i] += settled
     for k in range(2):
-        size = abs(now[ERROR + k, i])
-        tally[EX + k, i] += size * size
-        tally[SX + k, i] += settled * size * size
-        tally[PEAK_EX + k, i] = max(tally[PEAK_EX + k, i], size)
-        tally[PEAK_SX + k, i] = max(tally[PEAK_SX + k, i], settled * size)
-        tally[K1 + k, i] += (now[STIFFNESS + k, i] / now[PNEUMATIC + k, i] - 1.0) ** 2
-    tally[SUPPLIED, i] += now[FLOW, i] * period
+        size = abs(now.tracking_error[k, i])
+        tally.squares[k, i] += size * size
+        tally.settled_squares[k, i] += settled * size * size
+        tally.peak[k, i] = max(tally.peak[k, i], size)
+        tally.settled_peak[k, i] = max(tally.settled_peak[k, i], settled * size)
+        tally.stiffness_squares[k, i] += (now.pneumatic_stiffness[k, i] / now.pneumatic_stiffness_setpoint[k, i] - 1.0) ** 2
+    tally.supplied[i] += now.supply_flow[i] * period
     largest = 0.0
     for k in range(4):
         largest = max(largest, abs(command[k, i]))
-    tally[SATURATED, i] += 1.0 if largest >= 1.0 else 0.0
+    tally.saturated[i] += 1.0 if largest >= 1.0 else 0.0
 
 
 @helper
-def _hunt(now: Array, period: float, tally: Array, i: int) -> None:
+def _hunt(now: Info, period: float, tally: Tally, i: int) -> None:
     """Spans and restarts of one lane where its setpoints have been constant for long enough."""
-    counts = tally[QUIET_NOW, i] >= QUIET
-    speed = math.sqrt(now[VELOCITY, i] ** 2 + now[VELOCITY + 1, i] ** 2)
+    counts = tally.quiet_now[i] >= QUIET
+    speed = math.sqrt(now.velocity[0, i] ** 2 + now.velocity[1, i] ** 2)
     for k in range(2):
         # A window that ends gives its span to the worst one seen; a new one starts from nothing.
-        tally[LOW_X + k, i] = min(tally[LOW_X + k, i], now[POSITION + k, i]) if counts else math.inf
-        tally[HIGH_X + k, i] = max(tally[HIGH_X + k, i], now[POSITION + k, i]) if counts else -math.inf
-        tally[HUNTING_X + k, i] = max(tally[HUNTING_X + k, i], tally[HIGH_X + k, i] - tally[LOW_X + k, i])
+        tally.low[k, i] = min(tally.low[k, i], now.position[k, i]) if counts else math.inf
+        tally.high[k, i] = max(tally.high[k, i], now.position[k, i]) if counts else -math.inf
+        tally.hunting[k, i] = max(tally.hunting[k, i], tally.high[k, i] - tally.low[k, i])
     if counts:
-        tally[QUIET_TIME, i] += period
-        tally[RESTARTS, i] += 1.0 if tally[IS_STUCK, i] > 0.0 and speed > RUNNING else 0.0
-    tally[IS_STUCK, i] = 1.0 if speed < STUCK else (0.0 if speed > RUNNING else tally[IS_STUCK, i])
+        tally.quiet_time[i] += period
+        tally.restarts[i] += 1.0 if tally.is_stuck[i] > 0.0 and speed > RUNNING else 0.0
+    tally.is_stuck[i] = 1.0 if speed < STUCK else (0.0 if speed > RUNNING else tally.is_stuck[i])
 
 
 @helper
-def _add_rest(now: Array, period: float, tally: Array, kept: Array, i: int) -> None:
-    width, same, still = kept.shape[0], True, True
-    for k in range(len(ASKED)):
-        changed = now[ASKED[k], i] != tally[BEFORE + k, i]
-        same, still = same and not changed, still and not (changed and k < len(STILL))
-    if not (same or tally[COUNT, i] <= 1.0):
-        if tally[PUSHED_BEFORE, i] == 0.0 and tally[PUSHED_BEFORE + 1, i] == 0.0:
-            size = min(tally[KEPT, i], float(width))
-            tally[REST_X, i], tally[REST_Y, i] = tally[SUM_X, i] / size, tally[SUM_Y, i] / size
+def _add_rest(now: Info, asked: Asked, period: float, tally: Tally, kept: Array, i: int) -> None:
+    width, same, still, before = kept.shape[0], True, True, tally.before
+    for k in range(Asked.size):
+        changed = asked.rows[k, i] != before.rows[k, i]
+        same, still = same and not changed, still and not (changed and k < STILL)
+    if not (same or tally.count[i] <= 1.0):
+        if before.force[0, i] == 0.0 and before.force[1, i] == 0.0:
+            size = min(tally.kept[i], float(width))
             for k in range(2):
                 low, high = math.inf, -math.inf
                 for j in range(int(size)):
                     low, high = min(low, kept[j, k, i]), max(high, kept[j, k, i])
-                tally[SPAN_X + k, i] = high - low
-        tally[QUIET_NOW, i] = 0.0
-        tally[KEPT, i] = tally[SUM_X, i] = tally[SUM_Y, i] = 0.0
+                tally.rest[k, i], tally.span[k, i] = tally.sum[k, i] / size, high - low
+        tally.quiet_now[i], tally.kept[i], tally.sum[0, i], tally.sum[1, i] = 0.0, 0.0, 0.0, 0.0
         if not still:
-            tally[IS_STILL, i] = 0.0
+            tally.is_still[i] = 0.0
     else:
-        tally[QUIET_NOW, i] += period
-    slot = int(tally[KEPT, i]) % width
+        tally.quiet_now[i] += period
+    slot = int(tally.kept[i]) % width
     for k in range(2):
-        old = kept[slot, k, i] if tally[KEPT, i] >= width else 0.0
-        tally[SUM_X + k, i] += now[POSITION + k, i] - old
-        kept[slot, k, i] = now[POSITION + k, i]
-    tally[KEPT, i] += 1.0
+        old = kept[slot, k, i] if tally.kept[i] >= width else 0.0
+        tally.sum[k, i] += now.position[k, i] - old
+        kept[slot, k, i] = now.position[k, i]
+    tally.kept[i] += 1.0
     _hunt(now, period, tally, i)
-    pushed = now[FORCE, i] != 0.0 or now[FORCE + 1, i] != 0.0
-    tally[IS_HELD, i] = 1.0 if pushed and tally[QUIET_NOW, i] >= HELD else 0.0
+    pushed = now.user_force[0, i] != 0.0 or now.user_force[1, i] != 0.0
+    tally.is_held[i] = 1.0 if pushed and tally.quiet_now[i] >= HELD else 0.0
     for k in range(2):
-        tally[MOVED_X + k, i] = tally[SUM_X + k, i] / min(tally[KEPT, i], float(width))
-        tally[ASKED_X + k, i] = now[COMPLIANT + k, i] - now[TARGET + k, i]
-        tally[PUSH_X + k, i] = now[FORCE + k, i]
-    for k in range(len(ASKED)):
-        tally[BEFORE + k, i] = now[ASKED[k], i]
+        tally.moved[k, i] = tally.sum[k, i] / min(tally.kept[i], float(width))
+        tally.wanted[k, i] = asked.compliant_target[k, i] - asked.target[k, i]
+        tally.push[k, i] = now.user_force[k, i]
+    for k in range(Asked.size):
+        before.rows[k, i] = asked.rows[k, i]
 
 
 @helper
-def sample(now: Array, command: Array, period: float, tally: Array, kept: Array) -> None:
-    """Take one instant: ``now`` (info.ROWS, N) as ``info`` has it, ``command`` (4, N) the openings.
+def sample(now: Info, command: Array, period: float, tally: Tally, kept: Array, n: int) -> None:
+    """Take one instant of n lanes: ``now``, and ``command`` (4, N), the openings.
 
-    ``kept`` (W, 2, N): the positions of the last W samples since anything asked for changed. A lane whose row ``ALIVE`` is 0 is
-    left as it is.
+    ``kept`` (W, 2, N): the positions of the last W samples since anything asked for changed. A lane that is not alive is left
+    as it is.
     """
-    for i in range(now.shape[1]):
-        if tally[ALIVE, i] > 0.0:
+    asked = Asked(scratch(Asked.size))
+    for i in range(n):
+        for k in range(2):
+            asked.target[k, i], asked.compliant_target[k, i] = now.target[k, i], now.compliant_target[k, i]
+            asked.stiffness[k, i], asked.force[k, i] = now.stiffness_setpoint[k, i], now.user_force[k, i]
+            asked.pneumatic_stiffness[k, i] = now.pneumatic_stiffness_setpoint[k, i]
+        if tally.alive[i] > 0.0:
             _add_errors(now, command, period, tally, i)
-            _add_rest(now, period, tally, kept, i)
+            _add_rest(now, asked, period, tally, kept, i)
 
 
 @kernel
-def _sample(now: Array, command: Array, period: float, tally: Array, kept: Array) -> None:
-    sample(now, command, period, tally, kept)
+def _sample(now: Info, command: Array, period: float, tally: Tally, kept: Array) -> None:
+    for first in range(0, command.shape[1], BLOCK):
+        part = slice(first, min(first + BLOCK, command.shape[1]))
+        n = part.stop - first
+        sample(Info(now.rows[:, part]), command[:, part], period, Tally(tally.rows[:, part]), kept[:, :, part], n)
 
 
-def fresh_tally(lanes: int, rows: int = TALLY) -> Array:
-    """The tally, (``rows``, N), of episodes that begin."""
-    tally: Array = np.zeros((rows, lanes))
+def fresh_tally(lanes: int, more: int = 0) -> Array:
+    """The rows of a ``Tally``, and ``more`` behind them, of episodes that begin."""
+    rows: Array = np.zeros((Tally.size + more, lanes))
+    tally = Tally(rows[: Tally.size])
     # No window has been quiet yet, none has been at rest before a push.
-    tally[[HUNTING_X, HUNTING_Y]] = -np.inf
-    tally[[REST_X, REST_Y]] = np.nan
-    tally[[IS_STILL, ALIVE]] = 1.0
-    return tally
+    tally.hunting[:], tally.rest[:], tally.is_still[:], tally.alive[:] = -np.inf, np.nan, 1.0, 1.0
+    return rows
 
 
 def window(lanes: int, period: float) -> Array:
@@ -193,18 +218,18 @@ class EpisodeMetrics:
     """Metrics of one episode in each of N lanes, sampled every ``period`` s by ``add``."""
 
     def __init__(self, num_lanes: int, period: float) -> None:
-        self._period, self._tally, self._kept = period, fresh_tally(num_lanes), window(num_lanes, period)
-        self._now: Array = np.zeros((ROWS, num_lanes))
+        self._period, self._tally, self._kept = period, Tally(fresh_tally(num_lanes)), window(num_lanes, period)
+        self._now = Info(np.zeros((Info.size, num_lanes)))
 
     def add(self, info: dict[str, Any], command: Array, alive: NDArray[np.bool_]) -> None:
         """Take the ``info`` of a vector environment and the openings (4, N) commanded at the same instant.
 
         Lanes where ``alive`` (N,) is False are left as they are; a lane that was left once is not taken up again.
         """
-        for name, rows in SLICES.items():
+        for name, group in Info.groups.items():
             if name in info:
-                self._now[rows] = info[name].T
-        self._tally[ALIVE] = alive
+                self._now.rows[group.first if group.single else group.place] = info[name].T
+        self._tally.alive[:] = alive
         _sample(self._now, np.ascontiguousarray(command, dtype=np.float64), self._period, self._tally, self._kept)
 
     def result(self) -> dict[str, Array]:
@@ -212,19 +237,20 @@ class EpisodeMetrics:
         return figures_of(self._tally, self._period)
 
 
-def figures_of(t: Array, period: float) -> dict[str, Array]:
+def figures_of(tally: Tally, period: float) -> dict[str, Array]:
     """Every metric of ``UNITS`` per lane, (N,), of a tally sampled every ``period`` s."""
+    count, settled_count, quiet = tally.count, tally.settled_count, tally.quiet_time
     with np.errstate(invalid="ignore", divide="ignore"):
-        rms = 1e3 * np.sqrt(t[EX : EY + 1] / t[COUNT])
-        settled = 1e3 * np.sqrt(t[SX : SY + 1] / t[SETTLED_COUNT])
-        pneumatic = 100 * np.sqrt(t[K1 : K2 + 1] / t[COUNT])
-        peaks = np.where(t[SETTLED_COUNT] > 0, 1e3 * t[PEAK_SX : PEAK_SY + 1], np.nan)
-        hunting = np.where(t[QUIET_TIME] > 0, 1e3 * t[HUNTING_X : HUNTING_Y + 1], np.nan)
+        rms = 1e3 * np.sqrt(tally.squares / count)
+        settled = 1e3 * np.sqrt(tally.settled_squares / settled_count)
+        pneumatic = 100 * np.sqrt(tally.stiffness_squares / count)
+        peaks = np.where(settled_count > 0, 1e3 * tally.settled_peak, np.nan)
+        hunting = np.where(quiet > 0, 1e3 * tally.hunting, np.nan)
         values = {
             "error_rms_x": rms[0],
             "error_rms_y": rms[1],
-            "error_max_x": 1e3 * t[PEAK_EX],
-            "error_max_y": 1e3 * t[PEAK_EY],
+            "error_max_x": 1e3 * tally.peak[0],
+            "error_max_y": 1e3 * tally.peak[1],
             "settled_rms_x": settled[0],
             "settled_rms_y": settled[1],
             "settled_rms": np.hypot(*settled),
@@ -232,23 +258,22 @@ def figures_of(t: Array, period: float) -> dict[str, Array]:
             "settled_max_y": peaks[1],
             "hunting_x": hunting[0],
             "hunting_y": hunting[1],
-            "restarts": np.where(t[QUIET_TIME] > 0, t[RESTARTS] / t[QUIET_TIME], np.nan),
+            "restarts": np.where(quiet > 0, tally.restarts / quiet, np.nan),
             "pneumatic_rms_1": pneumatic[0],
             "pneumatic_rms_2": pneumatic[1],
-            "air": 60e3 * t[SUPPLIED] / NORMAL_DENSITY / (t[COUNT] * period),
-            "saturation": 100 * t[SATURATED] / t[COUNT],
+            "air": 60e3 * tally.supplied / NORMAL_DENSITY / (count * period),
+            "saturation": 100 * tally.saturated / count,
         }
-        values["stiffness_error"], values["cross_motion"], values["unrest"] = _rendered(t)
+        values["stiffness_error"], values["cross_motion"], values["unrest"] = _rendered(tally)
     return {name: values[name] for name in UNITS}
 
 
-def _rendered(t: Array) -> tuple[Array, Array, Array]:
-    push, asked = t[PUSH_X : PUSH_Y + 1], t[ASKED_X : ASKED_Y + 1]
-    moved = t[MOVED_X : MOVED_Y + 1] - t[REST_X : REST_Y + 1]
+def _rendered(tally: Tally) -> tuple[Array, Array, Array]:
+    push, asked, moved = tally.push, tally.wanted, tally.moved - tally.rest
     direction = push / np.hypot(*push)
     along, wanted = (np.einsum("in,in->n", way, direction) for way in (moved, asked))
     across = direction[0] * (moved - asked)[1] - direction[1] * (moved - asked)[0]
-    says = (t[IS_STILL] > 0) & (t[IS_HELD] > 0)
-    found = 100 * (wanted / along - 1), 1e3 * np.abs(across), 1e3 * np.hypot(*t[SPAN_X : SPAN_Y + 1])
+    says = (tally.is_still > 0) & (tally.is_held > 0)
+    found = 100 * (wanted / along - 1), 1e3 * np.abs(across), 1e3 * np.hypot(*tally.span)
     stiffness, cross, unrest = (np.where(says, values, np.nan) for values in found)
     return stiffness, cross, unrest

@@ -9,15 +9,16 @@ import numpy as np
 from baselines.controller import Controller
 from baselines.staged import driving
 from birthsim_env.loop.loop import MixedLoop, available_threads
-from birthsim_env.loop.rows import ASKED, MOTION, REFERENCE, TICK, TIME, WORLD
+from birthsim_env.loop.rows import ASKED, REFERENCE, TIME, World
 from birthsim_env.loop.signals import Reference
-from birthsim_env.loop.stage import Stage, block, numbers, table3
+from birthsim_env.loop.stage import Stage, table3
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
@@ -25,21 +26,26 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Part, Simulation
 
 
+class Begins(Numbers):
+    """Constant of the stage that records."""
+
+    tick = number("1", "the first one that is recorded")
+
+
 @kernel
-def _record(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constant: the first tick. Table: positions (T, 2, N), m."""
-    w, path = block(world, WORLD), table3(tables, 0)[:, :, lane : lane + n]
-    k = int(w[TICK, 0] - numbers(constants, 1)[0])
+def _record(world: World, seen: int, memory: int, begins: Begins, tables: int, lane: int, n: int) -> int:
+    """Table: positions (T, 2, N), m."""
+    path, k = table3(tables, 0)[:, :, lane : lane + n], int(world.tick[0] - begins.tick)
     if 0 <= k < path.shape[0]:
         for axis in range(2):
             for i in range(n):
-                path[k, axis, i] = w[MOTION + axis, i]
+                path[k, axis, i] = world.motion[axis, i]
     return 0
 
 
 def recording(first: int, path: Array) -> Stage:
     """Writes where the end effector is from the tick ``first`` on into ``path`` (T, 2, N), m."""
-    return Stage(_record, np.array([float(first)]), tables=(path,))
+    return Stage(_record, Begins.numbers(tick=first), tables=(path,))
 
 
 class RestingRigs(Simulation):

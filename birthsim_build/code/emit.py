@@ -21,7 +21,7 @@ import numpy as np
 from birthsim_build.code.advance import advance_code
 from birthsim_build.code.counting import counted
 from birthsim_build.code.targets import TARGETS, Target
-from birthsim_env.loop.stage import SIGNATURE
+from birthsim_env.loop.stage import compiled
 from birthsim_env.physics.compiled.compilation import BLOCK
 
 EXPORTED = "birthsim_"
@@ -48,8 +48,9 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
     )
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
     kernels = [_kernel_code(function) for function in functions]
-    module = llvm.parse_assembly(head + advance_code([symbol for symbol, _ in kernels]) + _constants(data))
-    for _, code in kernels:
+    symbol, runs = _kernel_code(f"{advance_code.__module__}:advance")
+    module = llvm.parse_assembly(head + advance_code([own for own, _ in kernels], symbol) + _constants(data))
+    for code in [runs, *(own for _, own in kernels)]:
         module.link_in(llvm.parse_assembly(head + code))
     for one in [*module.functions, *module.global_variables]:
         if not one.is_declaration and not one.name.startswith(EXPORTED):
@@ -66,13 +67,10 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
 
 
 def _kernel_code(function: str) -> tuple[str, str]:
-    """Symbol and LLVM code of a kernel with the signature of a stage, without what belongs to this processor or to Python."""
+    """Symbol and LLVM code of the kernel ``module:name``, without what belongs to this processor or to Python."""
     module, _, name = function.partition(":")
-    kernel: Any = getattr(import_module(module), name)
-    if SIGNATURE.args not in kernel.overloads:
-        kernel.compile(SIGNATURE)
-    compiled = kernel.overloads[SIGNATURE.args]
-    code = str(compiled.library._get_module_for_linking())
+    made = compiled(getattr(import_module(module), name))
+    code = str(made.library._get_module_for_linking())
     code = re.sub(r"^target .*$|^source_filename.*$", "", code, flags=re.MULTILINE)
     code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code).replace("= common ", "= internal ")
     # Nothing is raised, so that no target needs tables to unwind.
@@ -83,7 +81,7 @@ def _kernel_code(function: str) -> tuple[str, str]:
         code = code.replace(f"@{operation}(", intrinsic)
         code = re.sub(rf"^declare .*{re.escape(intrinsic)}.*$", "", code, flags=re.MULTILINE)
         code += f"\ndeclare double {intrinsic}{', '.join(['double'] * numbers)})"
-    return compiled.fndesc.mangled_name, code
+    return made.fndesc.mangled_name, code
 
 
 def _constants(data: Path) -> str:

@@ -1,78 +1,88 @@
 """Named rows of what the stages of a closed loop share, in blocks (rows, BLOCK).
 
-``World`` is the truth, for the plant and what acts on it; ``Seen`` is what a controller is handed. The rig's parameters and
-state stand at the beginning of the world, in the order of ``physics.lanes``.
+``World`` is the truth, for the plant and what acts on it; ``Seen`` is what a controller is handed.
 """
 
 from __future__ import annotations
 
-from birthsim_env.loop.signals import REFERENCES, Measurement
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
+from birthsim_env.physics.compiled.records import Rows, part, row, rows
 
-STATE = PARAMETERS
-IMPACT = STATE + STATES
-"""Fastest collision of each piston with an end stop in this policy step, m/s."""
-MOTION = IMPACT + 2
-"""True x, y (m), vx, vy (m/s) of the end effector, where hand and tracker are: of its handle where the structure bends."""
-FORCE = MOTION + 4
-"""The hand's force Fx, Fy, N."""
-SINCE_JUMP = FORCE + 2
-"""s since force or stiffness setpoint jumped."""
-TICK = SINCE_JUMP + 1
-"""Control periods since the episode began."""
-WORLD = TICK + 1
-"""Rows of the world."""
+
+class World(Rows):
+    """The rig and what acts on it. Parameters and state are in the order of ``physics.lanes``."""
+
+    rig = rows(" ".join(f"rig_{name}" for name in PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
+    state = rows(" ".join(STATE_NAMES), STATE_UNITS, "state of the plant")
+    impact = rows("impact1 impact2", "m/s", "fastest collision with an end stop in this policy step; zero begins anew")
+    motion = rows("x y vx vy", ("m", "m", "m/s", "m/s"), "of the end effector (its handle, if it bends), true")
+    force = rows("force_x force_y", "N", "force of the hand, true")
+    since_jump = row("s", "since force or stiffness setpoint jumped")
+    tick = row("1", "control periods since the episode began")
+
+
+class Feedforward(Rows):
+    """What a law may be given besides: what it is to believe acts along cylinders 1 and 2."""
+
+    force = rows("force1 force2", "N", "force along a cylinder")
+    rate = rows("rate1 rate2", "N/s", "rate of that force")
+
 
 MOST_ACTIONS, MOST_SHOWN, MOST_HANDED = 64, 64, 32
 """Longest action, most that an actuation shows of its memory, and most rows that a law's stages hand on."""
 
-TIME = 0
-"""s since the episode began."""
-POSITION = TIME + 1
-"""Measured x, y of the end effector, m."""
-VELOCITY = POSITION + 2
-"""vx, vy as measured, m/s."""
-POSITION_TIME = VELOCITY + 2
-"""When the position was measured, s."""
-ACCELERATION = POSITION_TIME + 1
-"""Acceleration of the end effector as a sensor there feels it, m/s2; 0 without one."""
-PRESSURE = ACCELERATION + 2
-"""Measured pressures of chambers P1, N1, P2, N2, Pa."""
-USER_FORCE = PRESSURE + 4
-"""Measured force of the hand, N."""
-REFERENCE = USER_FORCE + 2
-"""What is asked for, in the order of ``signals.REFERENCE_NAMES``."""
-ASKED = REFERENCE + REFERENCES
-"""What a law is asked for: the reference, or what a residual has made of it."""
-FEEDFORWARD = ASKED + REFERENCES
-"""What a law is told besides: forces along cylinders 1 and 2 (N), their rates (N/s), a damping factor."""
-DAMPING = FEEDFORWARD + 4
-"""That damping factor."""
-ACTION = FEEDFORWARD + 5
-"""The policy's action."""
-OPENING = ACTION + MOST_ACTIONS
-"""Commanded openings of the valves of chambers P1, N1, P2, N2."""
-SHOWN = OPENING + 4
-"""What an actuation shows of its memory to a policy."""
-HANDED = SHOWN + MOST_SHOWN
-"""What the stages of a law hand on to the next ones within a control period; the law names its rows."""
-SEEN = HANDED + MOST_HANDED
-"""Rows of what is seen."""
+
+class Signals(Rows):
+    """What is measured and asked for."""
+
+    time = row("s", "since the episode began")
+    position = rows("measured_x measured_y", "m", "of the end effector, measured")
+    velocity = rows("measured_vx measured_vy", "m/s", "of the end effector, measured")
+    position_time = row("s", "when the position was measured")
+    acceleration = rows("measured_ax measured_ay", "m/s2", "of the end effector as a sensor there measures it; 0 without one")
+    pressure = rows("measured_Pp1 measured_Pn1 measured_Pp2 measured_Pn2", "Pa", "of the chambers, measured, absolute")
+    user_force = rows("measured_force_x measured_force_y", "N", "of the hand, measured")
+    reference = part(Reference, "what is asked for")
+
+
+class Seen(Signals):
+    """What a controller is handed."""
+
+    asked = part(Reference, "what a law is asked for: the reference, or what a residual has made of it")
+    feedforward = part(Feedforward, "what a law is to believe acts on the pistons")
+    damping_factor = row("1", "damping in units of the least, where the law has one to vary; 0: the law's own")
+    action = rows(MOST_ACTIONS, "1", "the policy's action")
+    opening = rows("opening_P1 opening_N1 opening_P2 opening_N2", "1", "commanded opening of a valve, -1 to 1")
+    shown = rows(MOST_SHOWN, "1", "what an actuation shows a policy of its memory")
+    handed = rows(MOST_HANDED, "SI", "what stages of a law hand on to the next ones in a period; the law names its rows")
+
+
+STATE, IMPACT, MOTION, FORCE = (one.first for one in (World.state, World.impact, World.motion, World.force))
+SINCE_JUMP, TICK, WORLD = World.since_jump.first, World.tick.first, World.size
+TIME, POSITION, VELOCITY, POSITION_TIME = (one.first for one in (Seen.time, Seen.position, Seen.velocity, Seen.position_time))
+ACCELERATION, PRESSURE, USER_FORCE, REFERENCE = (
+    one.first for one in (Seen.acceleration, Seen.pressure, Seen.user_force, Seen.reference)
+)
+ASKED, FEEDFORWARD, DAMPING, ACTION = (one.first for one in (Seen.asked, Seen.feedforward, Seen.damping_factor, Seen.action))
+OPENING, SHOWN, HANDED, SEEN = Seen.opening.first, Seen.shown.first, Seen.handed.first, Seen.size
+"""Numbers of rows, for arrays that a loop places."""
 
 
 def fill_measurement(rows: Array, measurement: Measurement) -> None:
-    """Write a measurement over N lanes into the first rows of what is seen, (REFERENCE or more, N)."""
-    rows[TIME], rows[POSITION_TIME] = measurement.time, measurement.position_time
-    rows[POSITION:VELOCITY], rows[VELOCITY:POSITION_TIME] = measurement.position, measurement.velocity
-    rows[PRESSURE:USER_FORCE], rows[USER_FORCE:REFERENCE] = measurement.pressures, measurement.user_force
+    """Write a measurement over N lanes into the rows of ``Signals``."""
+    seen = Signals(rows)
+    seen.time[:], seen.position_time[:] = measurement.time, measurement.position_time
+    seen.position[:], seen.velocity[:] = measurement.position, measurement.velocity
+    seen.pressure[:], seen.user_force[:] = measurement.pressures, measurement.user_force
     if measurement.acceleration is not None:
-        rows[ACCELERATION:PRESSURE] = measurement.acceleration
+        seen.acceleration[:] = measurement.acceleration
 
 
 def measurement_of(rows: Array, sampled: bool, feels: bool) -> Measurement:
-    """The measurement in a copy of the first rows of what is seen, with an acceleration where a sensor ``feels`` it."""
-    seen = rows[:REFERENCE].copy()
+    """The measurement in a copy of the rows of ``Signals``, with an acceleration where a sensor ``feels`` it."""
+    seen = Signals(rows.copy())
     return Measurement(
-        seen[TIME], seen[POSITION:VELOCITY], seen[POSITION_TIME], seen[VELOCITY:POSITION_TIME], seen[PRESSURE:USER_FORCE],
-        seen[USER_FORCE:], sampled, seen[ACCELERATION:PRESSURE] if feels else None,
+        seen.time, seen.position, seen.position_time, seen.velocity, seen.pressure, seen.user_force, sampled,
+        seen.acceleration if feels else None,
     )  # fmt: skip

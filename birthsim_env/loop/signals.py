@@ -13,14 +13,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-
-REFERENCE_NAMES = (
-    *("x", "y", "vx", "vy", "ax", "ay", "jx", "jy"),
-    *("Kclx", "Kcly", "Kpneu1", "Kpneu2", "dKpneu1", "dKpneu2", "Kclxy"),
-)
-"""Rows of a reference: the target's position, velocity, acceleration and jerk; the setpoints of closed-loop stiffness;
-those of pneumatic stiffness and their rates; the coupling of the closed-loop stiffness [[Kclx, Kclxy], [Kclxy, Kcly]]."""
-REFERENCES = len(REFERENCE_NAMES)
+from birthsim_env.physics.compiled.records import Rows, row, rows
 
 
 def displacement(force_x: Any, force_y: Any, kx: Any, ky: Any, kxy: Any) -> tuple[Any, Any]:
@@ -33,57 +26,39 @@ compliance = helper(displacement)
 """``displacement`` for kernels."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,) in the order of ``REFERENCE_NAMES``."""
+class Motion(Rows):
+    """Where the end effector should be."""
 
-    rows: Array
+    position = rows("x y", "m", "target of the end effector")
+    velocity = rows("vx vy", "m/s", "of the target")
+    acceleration = rows("ax ay", "m/s2", "of the target")
+    jerk = rows("jx jy", "m/s3", "of the target")
 
-    @property
-    def position(self) -> Array:
-        """Target of the end effector, m, (2, N)."""
-        return self.rows[0:2]
 
-    @property
-    def velocity(self) -> Array:
-        """m/s, (2, N)."""
-        return self.rows[2:4]
+class Setpoints(Rows):
+    """How stiff the rig should be."""
 
-    @property
-    def acceleration(self) -> Array:
-        """m/s2, (2, N)."""
-        return self.rows[4:6]
+    stiffness = rows("Kclx Kcly", "N/m", "setpoint of closed-loop stiffness")
+    pneumatic_stiffness = rows("Kpneu1 Kpneu2", "N/m", "setpoint of the pneumatic stiffness (9) of a cylinder")
+    pneumatic_stiffness_rate = rows("dKpneu1 dKpneu2", "N/(m s)", "rate of that setpoint")
+    stiffness_coupling = row("N/m", "what couples x and y: closed-loop stiffness is [[Kclx, Kclxy], [Kclxy, Kcly]]", "Kclxy")
 
-    @property
-    def jerk(self) -> Array:
-        """m/s3, (2, N)."""
-        return self.rows[6:8]
 
-    @property
-    def stiffness(self) -> Array:
-        """Setpoints of closed-loop stiffness Kclx, Kcly, N/m, (2, N)."""
-        return self.rows[8:10]
+class Reference(Motion, Setpoints):
+    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,); ``command`` refuses other shapes."""
 
-    @property
-    def pneumatic_stiffness(self) -> Array:
-        """Setpoints of the pneumatic stiffness (9) of cylinders 1 and 2, N/m, (2, N)."""
-        return self.rows[10:12]
-
-    @property
-    def pneumatic_stiffness_rate(self) -> Array:
-        """Rates of those setpoints, N/(m s), (2, N)."""
-        return self.rows[12:14]
-
-    @property
-    def stiffness_coupling(self) -> Array:
-        """Setpoint Kclxy of what couples x and y, N/m, (N,); zero in the paper."""
-        return np.asarray(self.rows[14])
+    def __init__(self, rows: Array) -> None:
+        self.rows = rows
 
     def compliant_target(self, user_force: Array) -> Array:
         """Where a hand that pushes with ``user_force`` (2, N), N, should find the end effector (19), m, (2, N)."""
         (kx, ky), kxy = self.stiffness, self.stiffness_coupling
         x, y = displacement(user_force[0], user_force[1], kx, ky, kxy)
         return np.asarray(self.position + np.stack([x, y]))
+
+
+REFERENCE_NAMES = tuple(name for name, *_ in Reference.entries())
+REFERENCES = Reference.size
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 A stage is a kernel over one block of lanes. Its seven arguments are whole numbers: the addresses of the world and of what is
 seen (``loop.rows``), of its own memory, constants and tables, the first lane of the block and the number of lanes. It returns
-how many lanes it could not serve. ``block``, ``numbers`` and ``table`` turn addresses into arrays; a block's shape is constant,
-so that LLVM vectorises loops over it. A law is called with zero for the world.
+how many lanes it could not serve. An argument that is annotated with a layout (``records.Rows``, ``Numbers``) names the rows at
+its address; ``block``, ``numbers`` and ``table`` make arrays of other addresses. A block's shape is constant, so that LLVM
+vectorises loops over it. A law is called with zero for the world.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -23,9 +24,10 @@ from numpy.typing import NDArray
 
 from birthsim_env.physics.compiled.compilation import BLOCK, helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.record_types import block_type
+from birthsim_env.physics.compiled.records import Rows
 
 ARGUMENTS = 7
-SIGNATURE = types.int64(*[types.int64] * ARGUMENTS)
 TABLE = 5
 """Whole numbers that describe a table: its address and up to four dimensions."""
 
@@ -143,13 +145,27 @@ def described(tables: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
     return about
 
 
+def layouts_of(stage: Any) -> list[type[Rows] | None]:
+    """The layout with which each argument of a stage is annotated; None for a whole number."""
+    function = getattr(stage, "py_func", stage)
+    hints = get_type_hints(function)
+    named = [hints.get(name) for name in function.__code__.co_varnames[: function.__code__.co_argcount]]
+    return [one if isinstance(one, type) and issubclass(one, Rows) else None for one in named]
+
+
+def compiled(stage: Any) -> Any:
+    """What Numba made of a stage; compiled when it is first asked for."""
+    arguments = tuple(block_type(layout) if layout else types.int64 for layout in layouts_of(stage))
+    if arguments not in stage.overloads:
+        stage.compile(types.int64(*arguments))
+    return stage.overloads[arguments]
+
+
 @cache
 def address_of(stage: Any) -> int:
-    """Where the machine code of a kernel with the signature of a stage begins; compiled when it is first asked for."""
-    if SIGNATURE.args not in stage.overloads:
-        stage.compile(SIGNATURE)
-    compiled = stage.overloads[SIGNATURE.args]
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
+    """Where the machine code of a stage begins."""
+    made = compiled(stage)
+    return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
 
 
 @dataclass

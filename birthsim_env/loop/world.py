@@ -2,121 +2,137 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from birthsim_env.loop.rows import (
-    FORCE,
-    IMPACT,
-    MOTION,
-    OPENING,
-    REFERENCE,
-    SEEN,
-    SINCE_JUMP,
-    STATE,
-    TICK,
-    TIME,
-    USER_FORCE,
-    WORLD,
-)
-from birthsim_env.loop.stage import Stage, block, numbers, scratch
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.stage import Stage, scratch
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
+from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.options import SCRATCH
 from birthsim_env.physics.plant import Plant
 
 
+class Clock(Numbers):
+    """A control period, and how it is integrated."""
+
+    period = number("s", "control period")
+    steps = number("1", "integration steps in it")
+
+
+class InnerCommands(Rows):
+    """What valves that do not open as they are commanded remember."""
+
+    inner = rows(4, "1", "inner commands")
+
+
+class FurtherStates(InnerCommands):
+    """What the options of ``physics.options`` remember besides."""
+
+    further = rows(options.FURTHER, "SI", "further states")
+
+
 @helper
-def _tick(w: Array, s: Array, period: float, n: int) -> None:
+def _tick(world: World, seen: Seen, period: float, n: int) -> None:
     for i in range(n):
-        w[TICK, i] += 1.0
-        s[TIME, i] = w[TICK, i] * period
+        world.tick[i] += 1.0
+        seen.time[i] = world.tick[i] * period
 
 
 @helper
-def _move(w: Array, s: Array, u: Array, about: Array, dx: Array, total: Array, trial: Array, n: int) -> None:
-    """One control period under openings ``u`` (4, n); ``about``: its length, s, and integration steps in it."""
-    x, p, hit = w[STATE : STATE + STATES], w[:PARAMETERS], w[IMPACT : IMPACT + 2]
-    steps = int(about[1])
-    dynamics.integrate(x, u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, hit, dx, total, trial, n)
+def _move(world: World, seen: Seen, u: Array, clock: Clock, dx: Array, total: Array, trial: Array, n: int) -> None:
+    """One control period under openings ``u`` (4, n)."""
+    x, p, steps = world.state, world.rig, int(clock.steps)
+    dynamics.integrate(x, u, world.force, p, steps, clock.period / steps, world.impact, dx, total, trial, n)
     dynamics.settle(x, n)
-    _tick(w, s, about[0], n)
-    end_effector_motion(x[:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
+    _tick(world, seen, clock.period, n)
+    end_effector_motion(x[:, :n], p[:, :n], world.motion[:, :n])
 
 
 @kernel
-def _plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: control period, s; integration steps in it."""
-    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
+def _plant(world: World, seen: Seen, memory: int, clock: Clock, tables: int, lane: int, n: int) -> int:
     dx, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
-    _move(w, s, s[OPENING : OPENING + 4], about, dx, total, trial, n)
+    _move(world, seen, seen.opening, clock, dx, total, trial, n)
     return 0
 
 
 @kernel
-def _worn_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """As ``_plant``, with valves that do not open as they are told; memory: their inner commands."""
-    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 2)
+def _worn_plant(world: World, seen: Seen, memory: InnerCommands, clock: Clock, tables: int, lane: int, n: int) -> int:
+    """As ``_plant``, with valves that do not open as they are commanded."""
     dx, total, trial, u = scratch(STATES), scratch(STATES), scratch(STATES), scratch(4)
-    spools.admit(s[OPENING : OPENING + 4], w[:PARAMETERS], block(memory, 4), u, n)
-    _move(w, s, u, about, dx, total, trial, n)
+    spools.admit(seen.opening, world.rig, memory.inner, u, n)
+    _move(world, seen, u, clock, dx, total, trial, n)
     return 0
 
 
 @kernel
-def _optional_plant(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """As ``_worn_plant``, with the options of ``physics.options``; memory: inner commands and further states."""
-    w, s, m, about = block(world, WORLD), block(seen, SEEN), block(memory, 4 + options.FURTHER), numbers(constants, 2)
-    u, own, p, x = scratch(4), scratch(SCRATCH), w[:PARAMETERS], w[STATE : STATE + STATES]
-    spools.admit(s[OPENING : OPENING + 4], p, m[:4], u, n)
-    steps = int(about[1])
-    options.integrate(
-        x, m[4:], u, w[FORCE : FORCE + 2], p, steps, about[0] / steps, w[IMPACT : IMPACT + 2], own, n
-    )  # fmt: skip
-    _tick(w, s, about[0], n)
-    options.port_motion(x[:, :n], m[4:, :n], p[:, :n], w[MOTION : MOTION + 4, :n])
+def _optional_plant(world: World, seen: Seen, memory: FurtherStates, clock: Clock, tables: int, lane: int, n: int) -> int:
+    """As ``_worn_plant``, with the options of ``physics.options``."""
+    u, own, p, x, further = scratch(4), scratch(SCRATCH), world.rig, world.state, memory.further
+    spools.admit(seen.opening, p, memory.inner, u, n)
+    steps = int(clock.steps)
+    options.integrate(x, further, u, world.force, p, steps, clock.period / steps, world.impact, own, n)
+    _tick(world, seen, clock.period, n)
+    options.port_motion(x[:, :n], further[:, :n], p[:, :n], world.motion[:, :n])
     return 0
 
 
 def plant_stage(plant: Plant, period: float) -> Stage:
     """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand."""
-    about = np.array([period, dynamics.steps_in(period)])
+    clock = Clock.numbers(period=period, steps=dynamics.steps_in(period))
     if not options.are_off(plant.lane_parameters):
-        return Stage(_optional_plant, about, plant.memory)
+        return Stage(_optional_plant, clock, plant.memory)
     perfect = spools.are_perfect(plant.lane_parameters)
-    return Stage(_plant, about) if perfect else Stage(_worn_plant, about, plant.inner_commands)
+    return Stage(_plant, clock) if perfect else Stage(_worn_plant, clock, plant.inner_commands)
+
+
+class Before(Rows):
+    """Force and setpoints a period ago."""
+
+    force = rows("force_x force_y", "N", "of the hand")
+    stiffness = rows("Kclx Kcly", "N/m", "setpoint of closed-loop stiffness")
+    stiffness_coupling = row("N/m", "what couples x and y")
+
+
+class Jumps(Numbers):
+    """What counts as a jump."""
+
+    period = number("s", "control period")
+    change = number("N", "change of a force in one period that is a jump")
+    begins = number("1", "1 to start counting the present instant")
 
 
 @kernel
-def _jumps(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: period, s; what of a force's change in one is a jump, N; 1 to start counting the present instant."""
-    w, s, last, about = block(world, WORLD), block(seen, SEEN), block(memory, 5), numbers(constants, 3)
+def _jumps(world: World, seen: Seen, before: Before, about: Jumps, tables: int, lane: int, n: int) -> int:
+    force, asked = world.force, seen.reference
     for i in range(n):
-        since = w[SINCE_JUMP, i] + about[0]
-        jumped = abs(w[FORCE, i] - last[0, i]) > about[1] or abs(w[FORCE + 1, i] - last[1, i]) > about[1]
-        for k, row in ((2, 8), (3, 9), (4, 14)):
-            jumped = jumped or s[REFERENCE + row, i] != last[k, i]
-        w[SINCE_JUMP, i] = w[SINCE_JUMP, i] if about[2] > 0.0 else 0.0 if jumped else since
-        last[0, i], last[1, i] = w[FORCE, i], w[FORCE + 1, i]
-        last[2, i], last[3, i], last[4, i] = s[REFERENCE + 8, i], s[REFERENCE + 9, i], s[REFERENCE + 14, i]
+        jumped = False
+        for axis in range(2):
+            jumped = jumped or abs(force[axis, i] - before.force[axis, i]) > about.change
+            jumped = jumped or asked.stiffness[axis, i] != before.stiffness[axis, i]
+        jumped = jumped or asked.stiffness_coupling[i] != before.stiffness_coupling[i]
+        since = 0.0 if jumped else world.since_jump[i] + about.period
+        world.since_jump[i] = world.since_jump[i] if about.begins > 0.0 else since
+        for axis in range(2):
+            before.force[axis, i], before.stiffness[axis, i] = force[axis, i], asked.stiffness[axis, i]
+        before.stiffness_coupling[i] = asked.stiffness_coupling[i]
     return 0
 
 
 def jump_stage(period: float, jump_rate: float, memory: Array, begins: bool) -> Stage:
     """Counts the time since the force changed faster than ``jump_rate``, N/s, or a closed-loop setpoint changed at all.
 
-    ``memory`` (5, N): force and setpoints a period ago; where an episode ``begins`` they are only remembered.
+    ``memory`` (5, N) is ``Before``; where an episode ``begins`` it is only written.
     """
-    return Stage(_jumps, np.array([period, jump_rate * period, float(begins)]), memory)
+    about = Jumps.numbers(period=period, change=jump_rate * period, begins=begins)
+    return Stage(_jumps, about, memory)
 
 
 @kernel
-def _hide_force(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s = block(seen, SEEN)
+def _hide_force(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     for axis in range(2):
         for i in range(n):
-            s[USER_FORCE + axis, i] = 0.0
+            seen.user_force[axis, i] = 0.0
     return 0
 
 

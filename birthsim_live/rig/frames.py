@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.info import ROWS, describe, single_info
+from birthsim_env.info import Info, describe, single_info
+from birthsim_env.loop.rows import Signals, World
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -48,11 +49,14 @@ LEAST_FORCE, LEAST_GIVEN = 5.0, 1e-4
 
 def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
     """The present instant as a row (COLUMNS,)."""
-    now, plant, rows = simulation, simulation.plant, np.empty((ROWS, 1))
-    rig = plant.lane_parameters
-    describe(now.time, now.since_jump, plant.state, now.motion, now.reference.rows, now.force, now.impacts, rig, rows)
-    info, within = single_info(rows), np.empty((inside.ROWS, 1))
-    inside.look_inside(plant.state, rig, within)
+    now, plant, rows, within = simulation, simulation.plant, np.empty((Info.size, 1)), np.empty((inside.ROWS, 1))
+    world, seen = World(np.zeros((World.size, 1))), Signals(np.zeros((Signals.size, 1)))
+    world.rig[:], world.state[:], world.motion[:] = plant.lane_parameters, plant.state, now.motion
+    world.force[:], world.impact[:], world.since_jump[:] = now.force, now.impacts, now.since_jump
+    seen.time[:], seen.reference.rows[:] = now.time, now.reference.rows
+    describe(world, seen, Info(rows), 1)
+    info = single_info(rows)
+    inside.look_inside(plant.state, plant.lane_parameters, within)
     hold = hands.hold
     pointer = (math.nan, math.nan) if hold is None else hold.pointer(plant.end_effector()[:2, 0], hands.stiffness)
     parts: Sequence[Any] = (

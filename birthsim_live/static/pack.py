@@ -21,9 +21,9 @@ from agents.policy.stage import policy_stage
 from agents.residual.law import ResidualLaw
 from baselines.staged import LawStage, StagedController
 from birthsim_build.image import function_name
-from birthsim_env import info
 from birthsim_env.assembly import policy_periods
-from birthsim_env.loop import rows
+from birthsim_env.info import Info
+from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage
 from birthsim_env.parts.actuation import VALVE_LAYOUTS, ValveActuation
@@ -106,10 +106,13 @@ def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[
         "opens": {"controller": opening_settings(rig, policies).controller},
         "stiffnesses": STIFFNESSES,
         "period": period,
-        "rows": {name: getattr(rows, name) for name in dir(rows) if name.isupper() and isinstance(getattr(rows, name), int)},
+        "rows": {
+            **{name.upper(): group.first for layout in (World, Seen) for name, group in layout.groups.items()},
+            "WORLD": World.size, "SEEN": Seen.size,
+        },
         "info": {
-            **{name: [part.start, part.stop - part.start] for name, part in info.SLICES.items()},
-            "friction": [info.ROWS, 2], "flows": [info.ROWS + 2, 4],
+            **{name: [group.first, group.count] for name, group in Info.groups.items()},
+            "friction": [Info.size, 2], "flows": [Info.size + 2, 4],
         },
         "rig": rig_numbers(rig),
         "range": {"low": packed(LOWEST), "high": packed(HIGHEST), "names": at.STATE_NAMES},

@@ -38,7 +38,7 @@ def pair():
     return PairRenderer(RIG, "test", ("one", "other"), (0.0, 2.0), 0.01)
 
 
-@pytest.mark.parametrize("suffix", ["webp", "gif"])
+@pytest.mark.parametrize("suffix", ["webp", pytest.param("gif", marks=pytest.mark.slow)])
 def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, capsys):
     path = tmp_path / "deeper" / f"pull.{suffix}"
     options = ("--seed", 1, "--begin", 0.5, "--end", 1.5, "--rate", 10, "--out", path)

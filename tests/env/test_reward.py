@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from birthsim_env import StiffnessSchedule, reward
-from birthsim_env.loop.signals import REFERENCES
+from birthsim_env.loop.rows import World
+from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import environment_id
-from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, Y1, Y2
+from birthsim_env.physics.compiled.lanes import PRESSURES, TEMPERATURES, Y1, Y2
 
 CIRCLE, PROBE, FORCEPS, DESCENT = (environment_id(name) for name in ("circle", "probe", "forceps", "descent"))
 TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
@@ -75,29 +76,27 @@ def test_every_term_is_its_formula_of_info(name, period, arguments):
 
 
 def assess(lanes=1, policy_period=0.01, **changes):
-    """Terms by name, (N,), and failures of healthy lanes at rest on their target, apart from ``changes``."""
-    state = np.zeros((STATES, lanes))
-    state[list(PRESSURES)], state[list(TEMPERATURES)] = 3e5, 293.0
-    rows = np.zeros((REFERENCES, lanes))
-    rows[0], rows[8:10] = 0.5, 2000.0
+    """Terms by name, (N,), and failures of healthy lanes at rest on their target, without a jump, apart from ``changes``."""
+    world, reference = World(np.zeros((World.size, lanes))), Reference(np.zeros((Reference.size, lanes)))
+    world.state[list(PRESSURES)], world.state[list(TEMPERATURES)] = 3e5, 293.0
+    world.since_jump[:] = policy_period
+    reference.position[0], reference.stiffness[:], world.motion[0] = 0.5, 2000.0, 0.5
     given = {
-        "state": state,
-        "motion": rows[:4].copy(),
-        "reference": rows,
-        "force": np.zeros((2, lanes)),
-        "jumped": np.zeros(lanes),
-        "moved": np.zeros((4, lanes)),
+        **{name: getattr(world, name) for name in ("state", "motion", "force", "since_jump", "impact")},
+        "reference": reference.rows,
+        "owed": np.zeros((4, lanes)),
         "action": np.zeros((2, lanes)),
         "last_action": np.zeros((2, lanes)),
-        "impacts": np.zeros((2, lanes)),
-        "impact_speed": 0.1,
-        "period": policy_period,
     }
     for name, change in changes.items():
-        given[name] = change(given[name]) if callable(change) else np.asarray(change, dtype=given[name].dtype)
-    terms, failed = np.empty((len(TERMS), lanes)), np.empty(lanes)
-    reward.assess(*given.values(), terms, failed)
-    return dict(zip(reward.REWARD_TERMS, terms, strict=True)), failed
+        given[name] = change(given[name]) if callable(change) else np.asarray(change, dtype=np.float64)
+        if name in World.groups:
+            getattr(world, name)[:] = given[name]
+    limits = reward.Limits(reward.Limits.numbers(period=policy_period, jumped_below=0.5 * policy_period, impact_speed=0.1))
+    terms, failed = reward.Terms(np.empty((reward.Terms.size, lanes))), np.empty(lanes)
+    owed = reward.Owed(given["owed"])
+    reward.assess(world, reference, owed, given["action"], given["last_action"], limits, terms, failed, lanes)
+    return dict(zip(reward.REWARD_TERMS, terms.rows, strict=False)), failed
 
 
 def test_the_terms_are_named_in_order():
@@ -112,10 +111,10 @@ def test_the_terms_are_named_in_order():
 def test_giving_way_with_a_growing_push_is_calm_and_standing_still_is_not(period):
     """At 2000 N/m a push that grows by 100 N/s moves the compliant target at 50 mm/s."""
     now = np.array([[20.0, 20.0], [0.0, 0.0]])
-    moved = np.zeros((4, 2))
-    moved[0] = 0.01 - 0.05 * period
+    owed = np.zeros((4, 2))
+    owed[0] = 0.01 - 0.05 * period
     motion = np.array([[0.51, 0.51], [0.0, 0.0], [0.05, 0.0], [0.0, 0.0]])
-    terms, _ = assess(2, period, force=now, moved=moved, motion=motion)
+    terms, _ = assess(2, period, force=now, owed=owed, motion=motion)
     np.testing.assert_allclose(terms["reward_tracking"], 0, atol=1e-9)
     np.testing.assert_allclose(terms["reward_hunting"], [0, -0.2 * np.log(6) / LARGEST * period / 0.01], rtol=1e-9, atol=1e-9)
 
@@ -126,10 +125,10 @@ PUSH = 40.0
 
 def cost_of(path, period=0.001):
     """What tracking and hunting cost along positions (T,), m past the target, from a sudden ``PUSH`` on."""
-    moved, cost = np.zeros((4, 1)), 0.0
+    owed, cost = np.zeros((4, 1)), 0.0
     for k, speed in enumerate(np.diff(path, prepend=0.0) / period):
         motion = [[0.5 + path[k]], [0.0], [speed], [0.0]]
-        terms, _ = assess(1, period, force=[[PUSH], [0.0]], jumped=[k == 0], moved=lambda _: moved, motion=motion)
+        terms, _ = assess(1, period, force=[[PUSH], [0.0]], since_jump=[float(k > 0)], owed=lambda _: owed, motion=motion)
         cost -= LARGEST * float(terms["reward_tracking"][0] + terms["reward_hunting"][0])
     return cost
 
@@ -213,4 +212,4 @@ def test_a_piston_that_is_nowhere_fails(row, value):
 
 def test_a_fast_collision_of_either_piston_fails():
     impacts = np.array([[0.0, 0.101, 0.0, 0.1], [0.0, 0.0, 0.2, 0.1]])
-    np.testing.assert_array_equal(assess(4, impacts=impacts)[1], [False, True, True, False])
+    np.testing.assert_array_equal(assess(4, impact=impacts)[1], [False, True, True, False])

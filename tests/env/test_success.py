@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from baselines.registry import make_controller
+from birthsim_env.loop.rows import World
+from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.success import add
+from birthsim_env.success import Tally, add
 
 CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
 
@@ -34,16 +36,15 @@ def test_it_is_the_settled_error_so_far(name, kept):
 
 
 def test_a_lost_episode_is_no_success_and_the_next_one_begins_anew():
-    tally, now, zero = np.zeros((4, 2)), np.zeros(2), np.zeros((2, 2))
-    reference = np.zeros((15, 2))
-    reference[8:10] = 2000.0
-    motion, since = np.zeros((4, 2)), np.ones(2)
-    add(motion, reference, zero, since, np.array([1.0, 0.0]), tally, now)
+    world, reference = World(np.zeros((World.size, 2))), Reference(np.zeros((Reference.size, 2)))
+    tally, now = Tally(np.zeros((Tally.size, 2))), np.zeros(2)
+    reference.stiffness[:], world.since_jump[:] = 2000.0, 1.0
+    add(world, reference, np.array([1.0, 0.0]), tally, now, 2)
     np.testing.assert_array_equal(now, [0, 1])
-    motion[0] = 0.1
-    add(motion, reference, zero, since, np.zeros(2), tally, now)
+    world.motion[0] = 0.1
+    add(world, reference, np.zeros(2), tally, now, 2)
     assert not now.any()
-    tally[:, 0] = 0.0
-    motion[0] = 0.9e-3
-    add(motion, reference, zero, since, np.zeros(2), tally, now)
+    tally.rows[:, 0] = 0.0
+    world.motion[0] = 0.9e-3
+    add(world, reference, np.zeros(2), tally, now, 2)
     np.testing.assert_array_equal(now, [1, 0])

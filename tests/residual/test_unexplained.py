@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents.residual.unexplained import MOVING, ROWS
-from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.admittance.controller import AdmittanceController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
@@ -57,7 +57,7 @@ def seen(sensors: str, seconds: float = 5.0) -> tuple[list[Measurement], Array]:
     tracker = LabSensors(BELIEVED.electronics, LANES)
     for lane in range(LANES):
         tracker.begin(lane, np.random.default_rng(lane))
-    law, record, truth = AdmittanceBackstepping(BELIEVED), [], []
+    law, record, truth = AdmittanceController(BELIEVED, learn=False), [], []
 
     def sense(plant: Plant, time: float, force: Array) -> Measurement:
         exact = closed_loop.ideal(plant, time, force)
@@ -103,7 +103,9 @@ def unexplained(truth: Array) -> tuple[Array, Array]:
     return weight, np.array([[rig.cylinder1.coulomb_friction, rig.cylinder2.coulomb_friction] for rig in RIGS]).T
 
 
-@pytest.mark.parametrize(("sensors", "fraction", "close"), [("ideal", 0.9, 1.0), ("lab", 0.5, 5.0)])
+@pytest.mark.parametrize(
+    ("sensors", "fraction", "close"), [pytest.param("ideal", 0.9, 1.0, marks=pytest.mark.slow), ("lab", 0.5, 5.0)]
+)
 def test_friction_opposes_both_ways_and_weight_neither(sensors: str, fraction: float, close: float) -> None:
     """Out: what is too heavy, less friction; in: the same and friction. Within 1 N of 57 N with exact sensors.
 

@@ -26,6 +26,7 @@ STATE_NAMES = (
 """Rows of the state: piston positions (m) and speeds (m/s), bristle deflections (m), chamber pressures (Pa) and
 temperatures (K), spool openings (-)."""
 
+STATE_UNITS = (*("m", "m/s") * 2, "m", "m", *("Pa", "K") * 4, *("1",) * 4)
 STATES = len(STATE_NAMES)
 Y1, V1, Y2, V2, Z1, Z2, PP1, TP1, PN1, TN1, PP2, TP2, PN2, TN2, S1P, S1N, S2P, S2N = range(STATES)
 PRESSURES = (PP1, PN1, PP2, PN2)
@@ -46,6 +47,18 @@ PARAMETER_NAMES = (
     *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
     *("deadband", "play", "opening_limit"),
     *("source", "line", "line_gain", "mode_rate", "mode_damping", "handle", "tube_rate"),
+)
+PARAMETER_UNITS = (
+    *("m2", "m2", "1", "1", "m", "m", "m", "m"),
+    *("kg", "m/s2", "N/m", "N s/m"),
+    *("1", "N", "N", "N", "N", "N s/m", "N s/m", "m/s", "N/m", "N s/m", "m/s"),
+    *("1", "1", "1"),
+    *("m2", "m2", "m2", "m2", "m", "m", "m3", "W/(m2 K)", "W/K"),
+    *("m3/(s Pa)", "1", "m3/(s Pa)", "s", "Pa", "Pa", "K"),
+    *("J/(kg K)", "1", "1", "kg/m3", "K"),
+    *("1", "1", "1", "1/Pa", "1/Pa", "1/s", "s/m", "1/kg"),
+    *("1", "1", "1"),
+    *("Pa", "m3/(s Pa)", "Pa/kg", "1/s", "1", "1", "1/s"),
 )
 PARAMETERS = len(PARAMETER_NAMES)
 (
