@@ -1,4 +1,4 @@
-"""Compiles all stages, once, on all processors: ``python -m tests.warming``.
+"""Compiles all stages and the plant, once, on all processors: ``python -m tests.warming``.
 
 Without it every worker of pytest compiles for itself what it meets first. Stages are compiled by their address, without a
 simulation; other kernels are left to whoever calls them.
@@ -12,9 +12,12 @@ from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
 from multiprocessing import get_context
 
+import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from birthsim_env.loop.stage import ARGUMENTS, address_of
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
 from tests.processors import ROOT
 
 PACKAGES = ("birthsim_env", "baselines", "agents")
@@ -40,10 +43,18 @@ def warm(name: str) -> None:
     address_of(getattr(import_module(module), function))
 
 
+def plant() -> None:
+    """Compile what most tests of physics call first."""
+    Plant(Parameters(), 1).advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.001)
+
+
 def main() -> None:
-    """Compile them side by side."""
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("spawn")) as pool:
-        list(pool.map(warm, stages()))
+    """Compile them side by side, in children that have all imports of this process."""
+    found = stages()
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+        alone = pool.submit(plant)
+        list(pool.map(warm, found))
+        alone.result()
 
 
 if __name__ == "__main__":

@@ -48,8 +48,9 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
     )
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
     kernels = [_kernel_code(function) for function in functions]
-    module = llvm.parse_assembly(head + advance_code([symbol for symbol, _ in kernels]) + _constants(data))
-    for _, code in kernels:
+    symbol, runs = _kernel_code(f"{advance_code.__module__}:advance")
+    module = llvm.parse_assembly(head + advance_code([own for own, _ in kernels], symbol) + _constants(data))
+    for code in [runs, *(own for _, own in kernels)]:
         module.link_in(llvm.parse_assembly(head + code))
     for one in [*module.functions, *module.global_variables]:
         if not one.is_declaration and not one.name.startswith(EXPORTED):
@@ -66,7 +67,7 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
 
 
 def _kernel_code(function: str) -> tuple[str, str]:
-    """Symbol and LLVM code of a kernel with the signature of a stage, without what belongs to this processor or to Python."""
+    """Symbol and LLVM code of the kernel ``module:name``, without what belongs to this processor or to Python."""
     module, _, name = function.partition(":")
     made = compiled(getattr(import_module(module), name))
     code = str(made.library._get_module_for_linking())

@@ -1,4 +1,4 @@
-"""A chamber of the plant: pressure, temperature and heat exchange (design section 3; the paper's section V).
+"""A chamber of the plant: pressure, temperature and heat exchange (the paper's section V).
 
 V = V0 + S L,   Q = h (2 S + pi D L)(Twall - T) + G12 (Tother - T)
 dP/dt = [gamma r (Tin qin - T qout) - gamma P dV/dt + (gamma - 1) Q] / V

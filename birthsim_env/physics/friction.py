@@ -1,6 +1,6 @@
 """Friction of one piston: LuGre for the plant, an elasto-plastic variant of it, and the paper's Coulomb and viscous law (4).
 
-LuGre (Canudas de Wit et al., IEEE TAC 1995), design section 2:
+LuGre (Canudas de Wit et al., IEEE TAC 1995):
     dz/dt = v - s0 |v| z / G(v),  Ff = s0 z + s1 dz/dt + Fv v,  G(v) = Fc + (Fs - Fc) / (1 + (v/vs)^2)
 
 Elasto-plastic (Dupont, Hayward, Armstrong and Altpeter, "Single state elastoplastic friction models", IEEE TAC 2002):

@@ -75,7 +75,7 @@ DRAWINGS = {
 }
 
 
-LONG = ("learning", "studies")
+LONG = ("learning", "studies", "comparison", "stability")
 """Figures that take seconds to draw twice."""
 
 

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 
 from baselines.bench import stability
 from baselines.bench.pieces import controller_settings
-from baselines.bench.probes import Window
 from baselines.bench.stability import (
     MAPS,
     MOST_FORCE,
@@ -24,6 +23,7 @@ from baselines.bench.stability import (
     Axis,
     Cases,
     Map,
+    Window,
     describe_map,
     judge,
     stability_tasks,
@@ -45,7 +45,7 @@ class Constant:
     """Every valve at one opening, (4,); keeps what it saw."""
 
     def __init__(self, *openings: float) -> None:
-        self.openings, self.seen = np.array(openings), list[Measurement]()
+        self.openings, self.seen = np.array(openings, dtype=float), list[Measurement]()
 
     def reset(self, lanes: Mask | None = None) -> None:
         self.seen = []
@@ -224,6 +224,7 @@ def test_how_far_all_is_stable() -> None:
     assert stable_up_to(chart, "a") == [3.0, 1.0, None]
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Files, strict JSON, and a table with the numbers of the maps."""
     monkeypatch.setattr(stability, "JUDGED", 0.9)

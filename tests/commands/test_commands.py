@@ -193,7 +193,7 @@ COMPILING = "BirthSIM: compiling numerical kernels, usually 10 to 40 s; the resu
     ("command", "arguments", "message"),
     [
         ("evaluate", ("--controller", "nobody"), "controller = 'nobody'; allowed: "),
-        ("figure4", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
+        pytest.param("figure4", ("--parameters", "nowhere.toml"), "'nowhere.toml'", marks=pytest.mark.slow),
     ],
 )
 def test_bad_input_in_a_shell_leaves_one_line_and_no_traceback(tmp_path, command, arguments, message):

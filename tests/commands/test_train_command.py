@@ -107,6 +107,7 @@ def test_train_runs_several_seeds_side_by_side_and_evaluate_takes_them_together(
     assert_picture(tmp_path / "evaluated", "learning_curves")
 
 
+@pytest.mark.slow
 def test_ctrl_c_during_training_keeps_the_best_policy_and_the_checkpoint(tmp_path, small):
     """The first checkpoint follows the first validation, before anything is learned."""
     arguments = ("--config", small, "--steps", 10**8, "--out", tmp_path)

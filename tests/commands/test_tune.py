@@ -158,6 +158,7 @@ def test_probes_are_pushed_rigs_of_the_documented_ranges():
     assert again.rigs == probes.rigs[:20]
 
 
+@pytest.mark.slow
 def test_costs_on_the_plant_tell_good_gains_from_bad_ones(own):
     """The same gains cost the same; a slack PID costs more, valves that stay shut much more."""
     rig = Parameters()

@@ -17,7 +17,7 @@ RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
 NAMES = [*listed_names(), *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
-    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW and sensors != "lab"))
+    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW))
     for name in NAMES for sensors in SENSORS
 ]  # fmt: skip
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))

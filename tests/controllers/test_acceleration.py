@@ -55,6 +55,7 @@ def test_an_acceleration_of_another_shape_is_refused():
         openings(shown=np.zeros((3, 2, 3)))
 
 
+@pytest.mark.slow
 def test_a_pull_that_is_let_go_overshoots_less():
     settings = {
         "controller": "admittance-adaptive",

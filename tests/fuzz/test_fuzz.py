@@ -63,6 +63,7 @@ def _misbehave(_, rng, folder, case):
             (folder.parent.parent / "elsewhere").write_text("x")
 
 
+@pytest.mark.slow
 def test_the_harness_sees_every_misbehaviour(monkeypatch):
     monkeypatch.setattr(harness, "SECONDS", 0.5)
     *_, figures = fuzz("misbehaviour", Kind(lambda folder: None, _misbehave), 120, 0)

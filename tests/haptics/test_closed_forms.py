@@ -94,6 +94,7 @@ def test_an_ideal_impedance_has_no_error_of_its_own_and_gives_no_energy(ideal: t
     assert recording.energy.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_late_spring_is_felt_late(late: tuple[Recording, Array]) -> None:
     """Magnitude and phase as K exp(-sT), and the bandwidth that follows from them."""
     felt, truth = impedance_felt(*late)[:, 0], impedance(FREQUENCIES, LIGHT, DRAG, STIFFNESS, LATE)

@@ -66,6 +66,7 @@ def test_one_that_gives_energy_loses_its_authority():
     assert run(-20.0, PortLimiter(Full(), RIG, capacity=math.inf), 3.0) == (1.0, 1.0)
 
 
+@pytest.mark.slow
 def test_a_stiffer_spring_that_is_asked_for_is_paid_by_who_asks():
     """Held 20 mm out while the setpoint doubles, then let back: the hand gets 0.8 J of which it gave 0.4 J."""
     limiter, ends = PortLimiter(Full(), RIG, speed=math.inf), []
@@ -142,7 +143,7 @@ def test_a_name_puts_any_law_behind_the_limits():
 
 @pytest.mark.slow
 def test_a_clamp_that_swings_with_the_papers_law_gets_no_energy_behind_the_limits():
-    """20 kN/m, lab sensors: joules without the limits, see docs/haptics.md; with them what the row of issue 19 allows."""
+    """20 kN/m, lab sensors: joules without the limits, see docs/haptics.md; with them what docs/limits.md allows."""
     case = Cases([RIG], np.array([20000.0]), np.array([KX]), np.zeros(1), np.zeros(1))
     bare = judge(case, make_controller("backstepping", RIG), "lab", 0, None)
     limited = judge(case, make_controller("limited:backstepping", RIG), "lab", 0, None)

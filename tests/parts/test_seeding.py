@@ -26,7 +26,7 @@ DESIGN = {
     "cylinder1.viscous_friction": (10.0, 60.0),
     "cylinder2.viscous_friction": (10.0, 60.0),
 }
-"""Design section 4: the ranges in brackets."""
+"""Assumed: docs/reference/rig.md has them."""
 
 COLUMNS = {
     "mechanics.mass": "mass",

@@ -86,7 +86,7 @@ def test_three_PHASES_each_go_on_from_the_one_before():
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_varied_schedules_draw_inside_the_feasible_range(name):
-    # Design section 7: feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
+    # Feasible at mid stroke are 2400-5500 N/m on cylinder 1 and 1200-2800 N/m on cylinder 2.
     schedule, lanes = SCENARIOS[name].varied()[2], 300
     schedule.prepare(lanes)
     for lane in range(lanes):

@@ -272,7 +272,7 @@ def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
     env.reset(seed=0)
     sizes = []
     kernel = courses._is_plain
-    monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].shape[1]) or kernel(*given))
+    monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].rows.shape[1]) or kernel(*given))
     env.reset(options={"reset_mask": np.arange(50) < 2})
     assert sum(sizes) == 2 * courses.CHECKS
 

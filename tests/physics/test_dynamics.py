@@ -55,7 +55,8 @@ def test_rates_are_the_second_models(changes: dict[str, object], law: str) -> No
     step = 1e-6
     slope = (shown(rig, plant, state + step * rates) - shown(rig, plant, state - step * rates)) / (2 * step)
     other, constants = shown(rig, plant, state), second_model.constants(rig)
-    expected = np.stack([second_model.rates(other[:, i], command[:, i], push[:, i], *constants) for i in range(8)], axis=1)
+    columns = [np.ascontiguousarray(rows.T) for rows in (other, command, push)]
+    expected = np.stack([second_model.rates(*(rows[i] for rows in columns), *constants) for i in range(8)], axis=1)
     # The relaxation limit of fast bristles is the plant's own; ``friction`` has its tests.
     fast = np.abs(state[[at.V1, at.V2]]) > 0.5
     assert not np.all(fast)
@@ -73,7 +74,8 @@ def test_flows_are_those_that_change_the_air() -> None:
     rig = Parameters().replace(MOVED)
     plant, command, push = anywhere(rig, 6, 3)
     other, constants = shown(rig, plant, plant.state.copy()), second_model.constants(rig)
-    expected = np.stack([second_model.rates(other[:, i], command[:, i], push[:, i], *constants) for i in range(6)], axis=1)
+    columns = [np.ascontiguousarray(rows.T) for rows in (other, command, push)]
+    expected = np.stack([second_model.rates(*(rows[i] for rows in columns), *constants) for i in range(6)], axis=1)
     flows = np.full((8, 6), np.nan)  # a fresh array may hold the flows of a call before
     dynamics.mass_flows(plant.state, plant.lane_parameters, flows)
     np.testing.assert_allclose(flows[:4] - flows[4:], expected[4:8], rtol=1e-9, atol=1e-15)

@@ -25,7 +25,7 @@ from tests.oracles import linkage_by_points as by_points
 
 FC, FS, VS, FV = (12.0, 15.0), (12.0 * 1.33, 15.0 * 1.33), 0.015, 35.0
 S0, S1 = 5e4, 150.0
-"""Design section 4: levels of cylinders 1 and 2, Stribeck speed, viscous friction, bristle stiffness and damping."""
+"""Assumed: levels of cylinders 1 and 2, Stribeck speed, viscous friction, bristle stiffness and damping."""
 
 NO_FRICTION = {
     **{f"cylinder{k}.{name}_friction": 0.0 for k in (1, 2) for name in ("coulomb", "viscous")},

@@ -16,7 +16,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 C, B, CL = 3.9e-9, 0.30, 0.005 * 3.9e-9
 RHO0, T0, SUPPLY, ATMOSPHERE = 1.185, 293.15, 7.0e5, 1.013e5
-"""Design section 4: sonic conductance, critical ratio, leakage; ISO 6358 reference state; absolute pressures."""
+"""Assumed: sonic conductance, critical ratio, leakage; ISO 6358 reference state; absolute pressures."""
 
 
 def iso_6358(conductance: float, p_up: float, t_up: float, p_down: float) -> float:

@@ -103,7 +103,9 @@ def unexplained(truth: Array) -> tuple[Array, Array]:
     return weight, np.array([[rig.cylinder1.coulomb_friction, rig.cylinder2.coulomb_friction] for rig in RIGS]).T
 
 
-@pytest.mark.parametrize(("sensors", "fraction", "close"), [("ideal", 0.9, 1.0), ("lab", 0.5, 5.0)])
+@pytest.mark.parametrize(
+    ("sensors", "fraction", "close"), [pytest.param("ideal", 0.9, 1.0, marks=pytest.mark.slow), ("lab", 0.5, 5.0)]
+)
 def test_friction_opposes_both_ways_and_weight_neither(sensors: str, fraction: float, close: float) -> None:
     """Out: what is too heavy, less friction; in: the same and friction. Within 1 N of 57 N with exact sensors.
 

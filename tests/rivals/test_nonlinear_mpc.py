@@ -239,6 +239,7 @@ def test_exact_sensors_through_friction(monkeypatch: pytest.MonkeyPatch) -> None
     assert np.abs(answers.offset).max() < 5e-5
 
 
+@pytest.mark.slow
 def test_a_trackers_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     """Noise of 0.1 mm at 240 Hz: 5 % and 1 mm are asked for; measured are 1.5 % and 0.1 mm."""
     cases = [(0.5, 0.0, 20, 0, 2000, 2000, 0), (0.4, 0.05, 0, -15, 1500, 1500, 0)]

@@ -77,7 +77,7 @@ SLOW = pytest.mark.slow
         pytest.param({"sensors": "lab", "environment": "BirthSIM/CircleResidual-v1"}, [(CHECK, 5)], marks=SLOW, id="ppo lab"),
         # The first 160 steps are drawn from the space of actions.
         pytest.param({"algorithm": "sac", "steps": 384}, [(STEP, 10), (STEP, 40), (CHECK, 4)], marks=SLOW, id="sac"),
-        pytest.param({"algorithm": "tqc", "steps": 256}, [(STEP, 30)], id="tqc"),
+        pytest.param({"algorithm": "tqc", "steps": 256}, [(STEP, 30)], marks=SLOW, id="tqc"),
     ],
 )
 @pytest.mark.usefixtures("brief")
@@ -107,6 +107,7 @@ def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch)
     assert (tmp_path / "cut" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize("name", ["save_checkpoint", "save_policy"])
 def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, name):

@@ -145,6 +145,7 @@ def test_the_claim_of_a_process_that_died_is_void(log, tmp_path):
     assert not list(tmp_path.rglob("*.claim"))
 
 
+@pytest.mark.slow
 def test_the_claim_of_another_host_is_void_once_nobody_touches_it(log, tmp_path, monkeypatch):
     monkeypatch.setattr(claims, "PATIENCE", 1.5)
     others_claim(log, tmp_path / "out", "elsewhere 1")

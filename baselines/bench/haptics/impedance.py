@@ -12,7 +12,7 @@ from birthsim_env.loop.signals import Mask
 from birthsim_env.physics.compiled.lanes import Array
 
 MAGNITUDE, PHASE = 0.10, 10.0
-"""Fraction and degrees within which the impedance felt is the one declared: the issue's definition (design section 11)."""
+"""Fraction and degrees within which the impedance felt is the one declared; assumed, see docs/haptics.md."""
 
 WEBER, WEBER_WITHOUT_WORK = 0.15, 0.22
 """Fractions of compliance that people just notice: 15 % (Bergmann Tiest and Kappers 2009); 22 % where the work done tells

@@ -42,7 +42,7 @@ KNOWN = 0.2
 def documented_ranges(nominal: Parameters, sensors: str = "ideal") -> dict[str, tuple[float, float]]:
     """Dotted field name -> (low, high), SI units: what domain randomisation of a rig with a sensor model draws from.
 
-    A figure of the default rig is assumed, and has the range that its field documents (design section 4); one that the owner
+    A figure of the default rig is assumed, and has the range that its field documents; one that the owner
     has given another value is known to ``KNOWN``. Where the rig has ``ranges`` of its own, those count.
     """
     ranges = {}

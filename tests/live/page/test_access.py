@@ -85,6 +85,7 @@ def test_r_resets_and_space_pauses_wherever_the_focus_is(window, place):
     assert window.value("birthsim.settings") == before
 
 
+@pytest.mark.slow
 def test_a_screen_reader_is_told_what_matters_and_no_digits(window):
     window.page.evaluate(SPOKEN)
     window.hold(across=30)
@@ -110,6 +111,7 @@ def test_texts_have_contrast_and_the_rig_is_painted_in_the_colours_of_the_theme(
         window.page.screenshot(path=pictures / f"theme_{theme}.png")
 
 
+@pytest.mark.slow
 def test_high_contrast_keeps_the_pictures_readable_and_the_sliders_visible(chromium, server, pictures):
     with Window(chromium, server.url) as window:
         window.page.emulate_media(forced_colors="active", color_scheme="dark")
@@ -153,6 +155,7 @@ def test_a_pointer_that_rests_keeps_its_hold(chromium, server):
         window.page.mouse.up()
 
 
+@pytest.mark.slow
 def test_frames_without_numbers_are_shown_as_such(chromium, tmp_path):
     rig = Parameters()
     session, rows = Session(rig), []

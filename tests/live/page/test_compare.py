@@ -102,6 +102,7 @@ def test_whichever_head_is_dragged_one_place_of_the_hand_pulls_both(pair, pictur
     spring.fill(pair.value("String(document.querySelector('#set-drag_stiffness').max / 2)"))
 
 
+@pytest.mark.slow
 def test_the_magnifier_shows_the_errors_of_both(pair):
     pair.hold(across=60)
     pair.wait("birthsim.frame.second.error_mm > 2 && birthsim.frame.error_mm < 1")
@@ -115,6 +116,7 @@ def test_the_magnifier_shows_the_errors_of_both(pair):
     pair.wait(BESIDE)
 
 
+@pytest.mark.slow
 def test_figures_physics_and_plots_show_the_rig_that_is_chosen(pair):
     pair.page.locator("#open-physics").click()
     pair.hold(across=60)
@@ -142,6 +144,7 @@ def test_figures_physics_and_plots_show_the_rig_that_is_chosen(pair):
     pair.wait(BESIDE)
 
 
+@pytest.mark.slow
 def test_keys_push_both_with_one_force_pause_and_reset_both(pair):
     body = pair.page.locator("body")
     pair.page.keyboard.down("ArrowUp")
@@ -206,7 +209,7 @@ def test_both_are_recorded_replayed_by_a_server_and_opened_on_the_page(chromium,
 
 @pytest.mark.parametrize(
     ("width", "height"),
-    [(320, 640), (1280, 800), *(pytest.param(*size, marks=pytest.mark.slow) for size in ((768, 1024), (1366, 768)))],
+    [(320, 640), *(pytest.param(*size, marks=pytest.mark.slow) for size in ((1280, 800), (768, 1024), (1366, 768)))],
 )
 def test_two_rigs_fit_a_window_of_any_size(chromium, server, pair, pictures, width, height):
     with Window(chromium, server.url, {"width": width, "height": height}) as window:

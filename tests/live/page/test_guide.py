@@ -67,6 +67,7 @@ def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window
     window.wait("birthsim.frame.second === null")
 
 
+@pytest.mark.slow
 def test_the_settings_are_a_link(chromium, server):
     asked = "?controller=pid&Kclx=3000&friction=0.5&scenario_force=true"
     with Window(chromium, server.url + asked) as window:
@@ -87,6 +88,7 @@ def test_a_link_that_asks_for_the_impossible_is_refused_by_name(chromium, server
         assert window.value("birthsim.settings.mass") == 3
 
 
+@pytest.mark.slow
 def test_on_the_heavy_rig_of_the_lesson_the_policy_takes_three_quarters_of_the_error():
     def error(controller):
         session = Session(Parameters())

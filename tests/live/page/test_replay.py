@@ -113,6 +113,7 @@ def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
     assert window.value("birthsim.hello.mode") == "live"
 
 
+@pytest.mark.slow
 def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
     drop(window, file.read_bytes() + struct.pack("<II", 1000, 0) + bytes(10))
     window.wait("birthsim.hello.mode === 'replay' && birthsim.frame.time > 0")

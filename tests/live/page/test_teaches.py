@@ -22,6 +22,7 @@ pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", r
 TIMES = "Number(document.querySelector('#magnification').textContent.match(/\\d+/)[0])"
 
 
+@pytest.mark.slow
 def test_the_magnifier_stays_on_the_error_while_one_pulls(window):
     at_rest = window.wait(f"Math.hypot(...birthsim.frame.velocity) < 1e-3 && {TIMES}")
     window.hold(across=60)
@@ -110,6 +111,7 @@ def test_the_physics_open_and_close_and_tell_of_a_pull(window, pictures):
     assert not panel.is_visible()
 
 
+@pytest.mark.slow
 def test_every_name_explains_itself(window):
     window.page.locator("#open-physics").click()
     names = window.value("[...document.querySelectorAll('.term')].map((e) => e.textContent)")
@@ -139,6 +141,7 @@ def test_a_choice_says_what_it_is_where_it_is_made(window):
     window.wait("birthsim.settings.scenario === 'probe'")
 
 
+@pytest.mark.slow
 def test_about_names_paper_licence_and_version(window):
     window.page.locator("#open-about").click()
     words = window.page.locator("#about").text_content()
@@ -161,6 +164,7 @@ def saved(window, button):
     return download.value.path().read_bytes()
 
 
+@pytest.mark.slow
 def test_what_is_shown_is_saved_as_numbers_and_as_a_picture(window):
     window.live(0.5)
     window.page.locator("#pause").click()
@@ -180,6 +184,7 @@ def test_what_is_shown_is_saved_as_numbers_and_as_a_picture(window):
     window.wait("!birthsim.state.paused")
 
 
+@pytest.mark.slow
 def test_a_second_window_sees_the_time_before_it_came(chromium, server, window):
     window.live(2.0)
     with Window(chromium, server.url) as other:

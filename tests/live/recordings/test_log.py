@@ -55,6 +55,7 @@ def rows_of(log: Log, name: str) -> np.ndarray:
     return np.concatenate([one.values[name] for one in log.series])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
 def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
     status, printed, complained = call("log", monkeypatch, capsys, files[kind], "--out", tmp_path / "a.parquet")

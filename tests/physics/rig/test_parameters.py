@@ -32,7 +32,7 @@ DESIGN_RANGES = {
     "chambers.wall_heat_transfer": (20, 100),
     "valves.time_constant": (0.0015, 0.008),
 }
-"""Design section 4, the figures in brackets."""
+"""Assumed: docs/reference/rig.md has them."""
 
 LAWS = ["lugre", "coulomb", "elasto_plastic"]
 
