@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Point, Reference
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
 
@@ -16,7 +16,7 @@ class World(Rows):
     rig = rows(" ".join(f"rig_{name}" for name in PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
     state = rows(" ".join(STATE_NAMES), STATE_UNITS, "state of the plant")
     impact = rows("impact1 impact2", "m/s", "fastest collision with an end stop in this policy step; zero begins anew")
-    motion = rows("x y vx vy", ("m", "m", "m/s", "m/s"), "of the end effector (its handle, if it bends), true")
+    motion = part(Point, "end effector (its handle, if it bends), true", "")
     force = rows("force_x force_y", "N", "force of the hand, true")
     since_jump = row("s", "since force or stiffness setpoint jumped")
     tick = row("1", "control periods since the episode began")

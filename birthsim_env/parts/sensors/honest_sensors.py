@@ -88,13 +88,14 @@ def _track(world: World, seen: Signals, shared: Shared, kept: Kept, i: int, tick
     e, key, time, latency = kept.errors, kept.keys[i], seen.time[i], kept.errors.figures.position_latency[i]
     due = tracker.sample_due(tick, time, shared.period, shared.rate)
     if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
-        x, y = world.motion[0, i], world.motion[1, i]
+        x, y = world.motion.position[0, i], world.motion.position[1, i]
         noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
         at_x = _sample(e, shared, i, 0, x, y, noise * normal(key, tick, TRACKED))
         at_y = _sample(e, shared, i, 1, x, y, noise * normal(key, tick, TRACKED + 1))
         tracker.take(kept.queue, i, time, shared.rate, at_x, at_y)
         if tick == 0:
-            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, world.motion[2, i], world.motion[3, i])
+            speed = world.motion.velocity
+            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, speed[0, i], speed[1, i])
     tracker.arrive(kept.queue, kept.arrived, i, time, latency)
 
 
@@ -125,7 +126,7 @@ def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> 
             if shared.share > 0.0:
                 gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
                 told = acceleration.feel(
-                    kept.felt, i, axis, tick, world.motion[2 + axis, i], gain, bias, shared.period, shared.share, again
+                    kept.felt, i, axis, tick, world.motion.velocity[axis, i], gain, bias, shared.period, shared.share, again
                 )
                 if read:
                     noise = shared.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)

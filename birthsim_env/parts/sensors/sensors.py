@@ -31,10 +31,11 @@ from birthsim_env.physics.electronics import Electronics
 @kernel
 def ideal_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Shows position, velocity, pressures and the hand's force as they are."""
+    place, speed = world.motion.position, world.motion.velocity
     for i in range(n):
         seen.position_time[i] = seen.time[i]
         for axis in range(2):
-            seen.position[axis, i], seen.velocity[axis, i] = world.motion[axis, i], world.motion[2 + axis, i]
+            seen.position[axis, i], seen.velocity[axis, i] = place[axis, i], speed[axis, i]
             seen.user_force[axis, i] = world.force[axis, i]
         for chamber in range(4):
             seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i]
@@ -86,15 +87,15 @@ class Kept(NamedTuple):
 @helper
 def _lab(world: World, seen: Signals, board: Board, kept: Kept, n: int) -> None:
     """One control instant."""
-    arrived = kept.arrived
+    arrived, place, speed = kept.arrived, world.motion.position, world.motion.velocity
     for i in range(n):
         tick, key, time = int(world.tick[i]), kept.keys[i], seen.time[i]
         if tracker.sample_due(tick, time, board.period, board.rate):
-            x = world.motion[0, i] + board.position_noise * normal(key, tick, 4)
-            y = world.motion[1, i] + board.position_noise * normal(key, tick, 5)
+            x = place[0, i] + board.position_noise * normal(key, tick, 4)
+            y = place[1, i] + board.position_noise * normal(key, tick, 5)
             tracker.take(kept.queue, i, time, board.rate, x, y)
             if tick == 0:
-                tracker.start(kept.queue, arrived, i, x, y, world.motion[2, i], world.motion[3, i])
+                tracker.start(kept.queue, arrived, i, x, y, speed[0, i], speed[1, i])
         tracker.arrive(kept.queue, arrived, i, time, board.latency)
         seen.position_time[i] = arrived.time[i]
         for chamber in range(4):
@@ -104,8 +105,7 @@ def _lab(world: World, seen: Signals, board: Board, kept: Kept, n: int) -> None:
             seen.position[axis, i], seen.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             seen.user_force[axis, i], seen.acceleration[axis, i] = world.force[axis, i], 0.0
             if board.share > 0.0:
-                speed = world.motion[2 + axis, i]
-                felt = acceleration.feel(kept.felt, i, axis, tick, speed, 0.0, 0.0, board.period, board.share, again)
+                felt = acceleration.feel(kept.felt, i, axis, tick, speed[axis, i], 0.0, 0.0, board.period, board.share, again)
                 noise = board.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
                 seen.acceleration[axis, i] = felt + noise
 
