@@ -60,10 +60,8 @@ class Seen(Signals):
 
 STATE, IMPACT, MOTION, FORCE = (one.first for one in (World.state, World.impact, World.motion, World.force))
 SINCE_JUMP, TICK, WORLD = World.since_jump.first, World.tick.first, World.size
-TIME, POSITION, VELOCITY, POSITION_TIME = (one.first for one in (Seen.time, Seen.position, Seen.velocity, Seen.position_time))
-ACCELERATION, PRESSURE, USER_FORCE, REFERENCE = (
-    one.first for one in (Seen.acceleration, Seen.pressure, Seen.user_force, Seen.reference)
-)
+TIME, POSITION, ACCELERATION, PRESSURE = (one.first for one in (Seen.time, Seen.position, Seen.acceleration, Seen.pressure))
+REFERENCE = Seen.reference.first
 ASKED, FEEDFORWARD, DAMPING, ACTION = (one.first for one in (Seen.asked, Seen.feedforward, Seen.damping_factor, Seen.action))
 OPENING, SHOWN, HANDED, SEEN = Seen.opening.first, Seen.shown.first, Seen.handed.first, Seen.size
 """Numbers of rows, for arrays that a loop places."""

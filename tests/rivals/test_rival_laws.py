@@ -13,7 +13,7 @@ from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
 from baselines.rivals.feedforward import SIGN_WIDTH, Tracked, feedforward
 from baselines.rivals.tracking import TrackingController
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import HANDED, USER_FORCE
+from birthsim_env.loop.rows import HANDED, Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import geometry
@@ -40,7 +40,7 @@ def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, forc
     wanted, needed = np.empty((8, lanes)), np.empty((5, lanes))
     placed = [
         (motion, MOTION),
-        (force.copy(), USER_FORCE),
+        (force.copy(), Seen.user_force.first),
         (wanted, HANDED + Tracked.wanted.first),
         (needed, HANDED + Tracked.needed.first),
     ]
