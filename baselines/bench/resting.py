@@ -39,7 +39,7 @@ def _record(world: World, seen: int, memory: int, begins: Begins, tables: int, l
     if 0 <= k < path.shape[0]:
         for axis in range(2):
             for i in range(n):
-                path[k, axis, i] = world.motion[axis, i]
+                path[k, axis, i] = world.motion.position[axis, i]
     return 0
 
 
