@@ -14,7 +14,7 @@ from typing import Any
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import Controller
+from baselines.controller import Controller, check_flags
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
@@ -31,21 +31,34 @@ ENTRY_POINTS = "birthsim.controllers"
 """Entry point group by which a package that builds on this one adds controllers."""
 
 
+def _backstepping(parameters: Parameters, cartesian: bool = False, **options: Any) -> Controller:
+    check_flags({"cartesian": cartesian})
+    return CartesianBackstepping(parameters, **options) if cartesian else BacksteppingController(parameters, **options)
+
+
 CONTROLLERS: dict[str, Factory] = {
-    "backstepping": BacksteppingController,
-    "backstepping-weight": partial(BacksteppingController, weight_compensation=True),
-    "backstepping-frozen": partial(BacksteppingController, weight_compensation=True, frozen_friction=True),
-    "backstepping-one-valve": partial(BacksteppingController, weight_compensation=True, valves="one_valve"),
-    "backstepping-force-first": partial(BacksteppingController, force_first=True),
-    "backstepping-cartesian": CartesianBackstepping,
-    "admittance-backstepping": partial(AdmittanceController, learn=False),
-    "admittance-adaptive": AdmittanceController,
-    "admittance-sensorless": partial(AdmittanceController, force_sensor=False),
+    "backstepping": _backstepping,
+    "admittance": AdmittanceController,
     "pid": PositionPID,
     "lqr": LinearQuadratic,
     "sliding-mode": SlidingMode,
     "nonlinear-mpc": NonlinearMPC,
 }
+
+SHORT_NAMES = {
+    "backstepping-weight": "backstepping[weight_compensation=true]",
+    "backstepping-frozen": "backstepping[weight_compensation=true,frozen_friction=true]",
+    "backstepping-one-valve": "backstepping[weight_compensation=true,valves=one_valve]",
+    "backstepping-force-first": "backstepping[force_first=true]",
+    "backstepping-cartesian": "backstepping[cartesian=true]",
+    "admittance-backstepping": "admittance[learn=false]",
+    "admittance-adaptive": "admittance",
+    "admittance-sensorless": "admittance[force_sensor=false]",
+}
+"""Short name -> controller with options. Tables, trained policies and recordings have the short names."""
+
+LISTED = ("backstepping", *SHORT_NAMES, "pid", "lqr", "sliding-mode", "nonlinear-mpc")
+"""Controllers that ``birthsim-evaluate --all``, scores, the page and the stored bits compare."""
 
 UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
 """What any controller should beat; ``birthsim-evaluate --all`` leaves them out."""
@@ -54,9 +67,18 @@ SLOW = frozenset({"nonlinear-mpc"})
 """Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
 
 
+def _others() -> list[str]:
+    return [*UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+
+
 def controller_names() -> list[str]:
-    """Every name that ``make_controller`` knows."""
-    return [*CONTROLLERS, *UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
+    """Every registered name; options, and what ``SHORT_NAMES`` abbreviates, come on top."""
+    return [*CONTROLLERS, *_others()]
+
+
+def listed_names() -> list[str]:
+    """What there is to choose from in a list: ``LISTED`` and all others."""
+    return [*LISTED, *_others()]
 
 
 def split_options(name: str) -> tuple[str, dict[str, Any]]:
@@ -79,9 +101,16 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
     return plain, options
 
 
+def resolved(name: str) -> tuple[str, dict[str, Any]]:
+    """The registered name of a controller, or its file, without limits, and its options, also those of a short name."""
+    plain, options = split_options(name.removeprefix(LIMITED))
+    registered, own = split_options(SHORT_NAMES.get(plain, plain))
+    return registered, {**own, **options}
+
+
 def bare_name(name: str) -> str:
-    """A controller's name without options and limits: what the table, or a file, calls it."""
-    return split_options(name)[0].removeprefix(LIMITED)
+    """A controller's registered name, or its file, without options and limits."""
+    return resolved(name)[0]
 
 
 def _factory(name: str) -> Factory:
@@ -102,17 +131,18 @@ def known_options(name: str) -> list[str] | None:
     factory: Any = _factory(bare_name(name))
     kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
     parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
-    named, fixed = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD], getattr(factory, "keywords", {})
-    tunable = getattr(kind, "TUNABLE", {})
-    if len(named) < len(parameters) and not tunable:
-        return None
-    return [*(name for name in named[1:] if name not in fixed), *tunable]
+    named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
+    if kind is _backstepping:
+        law = CartesianBackstepping if resolved(name)[1].get("cartesian") else BacksteppingController
+        return [*list(inspect.signature(law).parameters)[1:], *named]
+    return [*named, *tunable] if tunable or len(named) + 1 == len(parameters) else None
 
 
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
     """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
 
-    A name may carry options, ``pid[bandwidth=60]``. ``limited:`` before it puts the law behind the limits of ``PortLimiter``.
+    A name may be short (``SHORT_NAMES``) and carry options, ``pid[bandwidth=60]``. ``limited:`` before it puts the law behind
+    the limits of ``PortLimiter``.
     Raises ``ValueError`` naming what is unknown and what there is.
     """
     if name.startswith(LIMITED):
@@ -120,9 +150,9 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             return PortLimiter(make_controller(name.removeprefix(LIMITED), parameters, **options), parameters)
         except ValueError as error:
             raise ValueError(str(error).replace("controller = '", f"controller = '{LIMITED}")) from error
-    plain, named = split_options(name)
+    plain, named = resolved(name)
     factory = _factory(plain)
-    known = known_options(plain)
+    known = known_options(name)
     for option, value in named.items():
         if known is not None and option not in known:
             allowed = ", ".join(known) or "no options"

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.residual.privileged import acting
-from agents.residual.settings import LAWS, ResidualSettings
+from agents.residual.settings import LAWS, ResidualSettings, is_one_of
 from baselines.bench.haptics.rendering import rendering
 from baselines.bench.haptics.worlds import Condition
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, number, quantile
@@ -91,7 +91,7 @@ def _compare(arguments: argparse.Namespace) -> None:
         print(_row(folder.name, score, within, (law.error - score.error)[None, within]))
     print(_less("all seeds", (law.error - errors)[:, within]))
     for name in arguments.beside:
-        if name in LAWS:
+        if is_one_of(name, LAWS):
             others = {name: _law(replace(settings, law=name), policies[0].environment, arguments)}
         else:
             places, its = _seeds_of(name)

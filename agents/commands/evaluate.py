@@ -53,7 +53,8 @@ def main() -> None:
         "--controllers",
         nargs="+",
         metavar="NAME",
-        help=f"one or more of {', '.join(controller_names())}, or path/to/file.py:Class (default: backstepping, with --policy "
+        help=f"one or more of {', '.join(controller_names())}, with options as in 'admittance[learn=false]', or "
+        "path/to/file.py:Class (default: backstepping, with --policy "
         "residual, with --all every one of the registry that is not slow)",
     )
     parser.add_argument(

@@ -34,7 +34,8 @@ def main() -> None:
     parser.add_argument("--config", default="circle", help=f"{listed}, or a TOML file (default: %(default)s)")
     parser.add_argument("--env", help="residual environment")
     parser.add_argument("--algorithm", choices=ALGORITHMS, help="how it learns")
-    parser.add_argument("--law", choices=LAWS, help="law underneath; none: the policy drives the valves by itself")
+    laws = f"law underneath, one of {', '.join(LAWS)}; {LAWS[-1]}: the policy drives the valves by itself"
+    parser.add_argument("--law", metavar="NAME", help=laws)
     parser.add_argument("--impedance", choices=tuple(IMPEDANCES), help="what an action sets beside forces")
     parser.add_argument("--steps", type=whole, help="policy steps per seed")
     parser.add_argument(

@@ -11,16 +11,17 @@ residual. It then works with less stiffness, until the swing has died.
 
 from __future__ import annotations
 
-import numpy as np
-
 from baselines.admittance.law import sustained
 from baselines.admittance.rows import HalfWave
 from baselines.backstepping.cartesian_law import across, along
+from baselines.estimation.rows import Joints
+from birthsim_env.loop.signals import Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, part, row, rows
 
 LEVEL = 0.1
 """m/s of the speed error; smaller half waves do not count. As in ``admittance-backstepping``."""
@@ -45,36 +46,37 @@ MOST_SOFTENING = 2.0
 RECOVERY = 1.0
 """s: time constant with which the stiffness comes back; assumed."""
 
-CYLINDER = 4
-"""Rows of memory per cylinder: the fraction of the authority that is left, 1 to ``LEAST``, and what ``sustained`` remembers."""
 
-SOFTNESS = 2 * CYLINDER
-"""Row of the power of ``law.STIFFENING`` that half waves along either cylinder have taken of the stiffness."""
+class Limiter(Rows):
+    """What limits the authority."""
 
-ROWS = SOFTNESS + 1
-
-FRESH = np.zeros(ROWS)
-"""What a lane remembers when it starts."""
-FRESH[:SOFTNESS:CYLINDER] = 1.0
+    left = rows("1 2", "1", "fraction of the authority on a cylinder that is left, 1 to ``LEAST``")
+    wave1 = part(HalfWave, "speed error of cylinder 1")
+    wave2 = part(HalfWave, "speed error of cylinder 2")
+    softness = row("1", "power of ``law.STIFFENING`` that half waves along either cylinder have taken of the stiffness")
 
 
 @helper
-def limit_authority(joints: Array, target: Array, p: Array, period: float, level: float, memory: Array) -> None:
-    """Carries ``memory`` (ROWS, N) on by one period: y1, y2, v1, v2 are ``joints`` (4, N), ``target`` rows are a reference's.
+def _yield(limiter: Limiter, cylinder: int, i: int, peak: float, level: float) -> None:
+    """What a sustained half wave of a cylinder takes."""
+    if peak > SWING:
+        limiter.softness[i] = min(limiter.softness[i] + SOFTENING, MOST_SOFTENING)
+    if peak > 0.0:
+        left = limiter.left[cylinder, i]
+        limiter.left[cylinder, i] = max(LEAST, exact.exp2(_LOG2_YIELDING * peak / level) * left)
 
-    Half waves below ``level``, m/s, do not count.
-    """
-    kept = exact.exp(-period / RECOVERY)
-    for i in range(joints.shape[1]):
+
+@helper
+def limit_authority(joints: Joints, target: Reference, p: Array, period: float, level: float, limiter: Limiter) -> None:
+    """Carries the ``limiter`` of N lanes on by one period. Half waves below ``level``, m/s, do not count."""
+    kept, asked = exact.exp(-period / RECOVERY), target.velocity
+    for i in range(joints.rows.shape[1]):
+        y1, y2, vx, vy = joints.position[0, i], joints.position[1, i], asked[0, i], asked[1, i]
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
         )
-        error1 = -kappa * joints[2, i] - across(target[2, i], target[3, i], sine, cosine)
-        error2 = joints[3, i] - along(target[2, i], target[3, i], sine, cosine)
-        memory[SOFTNESS, i] *= kept
-        for row, error in ((0, error1), (CYLINDER, error2)):
-            peak = sustained(HalfWave(memory[row + 1 : row + CYLINDER]), i, error, period, level, level)
-            if peak > SWING:
-                memory[SOFTNESS, i] = min(memory[SOFTNESS, i] + SOFTENING, MOST_SOFTENING)
-            if peak > 0.0:
-                memory[row, i] = max(LEAST, exact.exp2(_LOG2_YIELDING * peak / level) * memory[row, i])
+        error1 = -kappa * joints.speed[0, i] - across(vx, vy, sine, cosine)
+        error2 = joints.speed[1, i] - along(vx, vy, sine, cosine)
+        limiter.softness[i] *= kept
+        _yield(limiter, 0, i, sustained(limiter.wave1, i, error1, period, level, level), level)
+        _yield(limiter, 1, i, sustained(limiter.wave2, i, error2, period, level, level), level)

@@ -21,24 +21,14 @@ from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import CompiledDriving, LawStage, StagedController
-from birthsim_env.loop.rows import (
-    ACTION,
-    ASKED,
-    FEEDFORWARD,
-    OPENING,
-    POSITION,
-    POSITION_TIME,
-    REFERENCE,
-    SEEN,
-    SHOWN,
-    Seen,
-)
+from birthsim_env.loop.rows import ACTION, POSITION, SHOWN, Seen
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.loop.stage import block, numbers, scratch
+from birthsim_env.loop.stage import block, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFEST = 4000.0
@@ -71,11 +61,8 @@ NAMES = (
 VALVE_NAMES = tuple(f"opening of the valve of chamber {chamber}, 1" for chamber in ("P1", "N1", "P2", "N2"))
 """What they say without a law."""
 
-MET = tuple(
-    f"unexplained force on piston {i}, {when}, {FORCE_UNIT:g} N"
-    for when in ("now", "when last moving out", "when last moving in")
-    for i in (1, 2)
-)
+MET = tuple(f"unexplained force on piston {i}, {about}, {FORCE_UNIT:g} N" for i, _, about, _ in unexplained.Met.entries())
+"""What is said of ``unexplained.Met``."""
 
 
 def action_names(settings: ResidualSettings) -> tuple[str, ...]:
@@ -95,97 +82,118 @@ def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
     return (*map(str, ENTRIES), *last, *memory_names(settings))
 
 
+class Correction(Rows):
+    """What the policy says at one instant."""
+
+    force = rows("1 2", "N", "force along a cylinder")
+    rate = rows("1 2", "N/s", "rate of that force")
+    powers = rows("x y", "1", "power of ``STIFFENING`` of the stiffness")
+    damping_factor = row("1", "factor of the damping; 0: the law's own")
+
+
+class Constants(Numbers):
+    """Of the stage."""
+
+    sampled = number("1", "1 with sampled positions")
+    more_rows = number("1", "rows of memory besides, of the observer of sampled positions")
+    actions = number("1", "length of an action")
+    authority = number("N", "force of an action of 1")
+    time_constant = number("s", "of the low-pass that an action passes")
+    quickness = number("1", "fraction of a change that passes it in a period")
+    level = number("m/s", "speed error below which nothing is an oscillation")
+    unit = number("N", "``FORCE_UNIT``")
+    has_law = number("1", "1 with a law")
+    stiffens = number("1", "1 where the impedance has a stiffness")
+    damps = number("1", "1 where it has a damping")
+    belief = part(Belief, "of the observer of the pistons")
+
+
+class Memory(Rows):
+    """What the stage remembers."""
+
+    smooth = rows(max(VALVES, *IMPEDANCES.values()), "1", "smoothed action")
+    limiter = part(authority.Limiter, "authority")
+    met = part(unexplained.Met, "forces met")
+    ways = part(unexplained.Ways, "which ways pistons have moved")
+    pistons = part(Pistons, "observer")
+
+
 @helper
-def stiffen(force: Array, powers: Array, rows: Array) -> None:
-    """Changes a reference ``rows`` (15, N) to stiffness K' = K STIFFENING^``powers`` (2, N), its target moved by F/K - F/K'.
+def stiffen(force: Array, powers: Array, asked: Reference) -> None:
+    """Changes what is ``asked`` of N lanes to K' = K STIFFENING^``powers`` (2, N), the target moved by F/K - F/K'.
 
     K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does. ``force`` (2, N), N, is the
     hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
     """
-    for i in range(rows.shape[1]):
+    stiffness, position = asked.stiffness, asked.position
+    for i in range(powers.shape[1]):
         for axis in range(2):
             if powers[axis, i] != 0.0:
-                asked = rows[8 + axis, i]
-                wanted = asked * exact.exp2(_STIFFENING_DOUBLINGS * powers[axis, i])
-                rows[8 + axis, i] = max(min(wanted, max(asked, STIFFEST)), min(asked, SOFTEST))
-                rows[axis, i] += force[axis, i] / asked - force[axis, i] / rows[8 + axis, i]
+                before = stiffness[axis, i]
+                wanted = before * exact.exp2(_STIFFENING_DOUBLINGS * powers[axis, i])
+                stiffness[axis, i] = max(min(wanted, max(before, STIFFEST)), min(before, SOFTEST))
+                position[axis, i] += force[axis, i] / before - force[axis, i] / stiffness[axis, i]
 
 
 @helper
-def _tell(action: Array, left: Array, most: float, time_constant: float, quickness: float, smooth: Array, told: Array) -> None:
-    """Writes forces, N, their rates, N/s, and, of actions that have them, powers of stiffness and the damping factor (7, N);
-    ``smooth`` (size, N) goes on by one period towards ``action``."""
-    size = action.shape[0]
+def _correct(action: Array, left: Array, about: Constants, smooth: Array, said: Correction) -> None:
+    """Writes what actions (size, N) say; ``smooth`` goes on by one period towards them."""
+    size, most = action.shape[0], about.authority
     for i in range(action.shape[1]):
         for k in range(2):
             strength = most * left[k, i]
-            told[k, i] = strength * smooth[k, i]
-            told[2 + k, i] = strength / time_constant * (action[k, i] - smooth[k, i])
-            told[4 + k, i] = max(smooth[2 + k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
-        told[6, i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth[4, i], 0.0)) if size > 4 else 0.0
+            said.force[k, i] = strength * smooth[k, i]
+            said.rate[k, i] = strength / about.time_constant * (action[k, i] - smooth[k, i])
+            said.powers[k, i] = max(smooth[2 + k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
+        said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth[4, i], 0.0)) if size > 4 else 0.0
         for k in range(size):
-            smooth[k, i] += quickness * (action[k, i] - smooth[k, i])
+            smooth[k, i] += about.quickness * (action[k, i] - smooth[k, i])
 
 
-CONSTANTS = (
-    *("sampled", "rows", "size", "authority", "time_constant", "quickness", "level", "unit"),
-    *("has_law", "stiffens", "damps"),
-)
-"""Constants of the stage: 1 with sampled positions; rows of the observer; length of an action; authority, N; time constant, s,
-and quickness of the low-pass; speed error, m/s, below which nothing is an oscillation; ``FORCE_UNIT``; 1 with a law, 1 where
-the impedance has a stiffness and 1 where it has a damping. The observer's ``Belief`` follows."""
-SAMPLED, OBSERVER, SIZE, AUTHORITY, CONSTANT, QUICKNESS, LEVEL_ROW, UNIT, HAS_LAW, STIFFENS, DAMPS = range(11)
-SMOOTH, LIMITER = 0, max(VALVES, *IMPEDANCES.values())
-MET_ROWS = LIMITER + authority.ROWS
-WAYS = MET_ROWS + unexplained.ROWS
-PISTONS = WAYS + 4
-"""Rows of memory at which its parts begin: smoothed action; authority; forces met; which ways pistons have moved; observer."""
+@helper
+def _observe(seen: Seen, pistons: Pistons, about: Constants, joints: Joints) -> None:
+    """Brings the observer up to what is measured, and writes the ``joints``."""
+    belief, given = about.belief, Given(scratch(Given.size)[:, : joints.rows.shape[1]])
+    for i in range(joints.rows.shape[1]):
+        for k in range(2):
+            given.force[k, i], given.believed[k, i] = seen.user_force[k, i], 0.0
+        given.moving[i], given.noise[i] = 1.0, belief.noise
+    if about.sampled > 0.0:
+        observers.observe(pistons, seen, seen.pressure, given, belief)
+        for i in range(joints.rows.shape[1]):
+            for k in range(2):
+                joints.position[k, i], joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
+    else:
+        point = Point(seen.rows[POSITION : POSITION + Point.size])
+        disturbance_observer.observe(pistons, point, seen.pressure, given, belief, joints)
 
 
 @kernel
-def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s, about = block(seen, SEEN), numbers(constants, len(CONSTANTS) + Belief.size)
-    belief, size, sampled = Belief(about[len(CONSTANTS) :]), int(about[SIZE]), about[SAMPLED] > 0.0
-    p, period = belief.rig, belief.period
-    m = block(memory, PISTONS + int(about[OBSERVER]))[:, :n]
-    own = scratch(17)[:, :n]
-    joints, told, given, pistons, signals = own[:4], own[4:11], Given(own[11:17]), Pistons(m[PISTONS:]), Seen(s[:, :n])
+def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    size, belief, signals = int(about.actions), about.belief, Seen(seen.rows[:, :n])
+    own = Memory(block(memory, Memory.size + int(about.more_rows))[:, :n])
+    joints, said = Joints(scratch(Joints.size)[:, :n]), Correction(scratch(Correction.size)[:, :n])
+    _observe(signals, own.pistons, about, joints)
+    unexplained.remember(joints, own.pistons.disturbance, belief.rig, belief.period, own.ways, own.met)
+    limiter, action, shown, asked, target = own.limiter, signals.action[:size], signals.shown, signals.asked, signals.reference
+    authority.limit_authority(joints, target, belief.rig, belief.period, about.level, limiter)
+    _correct(action, limiter.left, about, own.smooth, said)
     for i in range(n):
-        for k in range(2):
-            given.force[k, i], given.believed[k, i] = signals.user_force[k, i], 0.0
-        given.moving[i], given.noise[i] = 1.0, belief.noise
-    if sampled:
-        observers.observe(pistons, signals, signals.pressure, given, belief)
-        for i in range(n):
-            for k in range(2):
-                joints[k, i], joints[2 + k, i] = pistons.position[k, i], pistons.speed[k, i]
-    else:
-        point = Point(s[POSITION:POSITION_TIME, :n])
-        disturbance_observer.observe(pistons, point, signals.pressure, given, belief, Joints(joints))
-    disturbance, force = pistons.disturbance, signals.user_force
-    met, limiter, target = m[MET_ROWS:WAYS], m[LIMITER:MET_ROWS], s[REFERENCE:ASKED, :n]
-    unexplained.remember(joints, disturbance, p, period, m[WAYS:PISTONS], met)
-    authority.limit_authority(joints, target, p, period, about[LEVEL_ROW], limiter)
-    action, smooth = s[ACTION : ACTION + size, :n], m[SMOOTH : SMOOTH + size]
-    left = limiter[: authority.SOFTNESS : authority.CYLINDER]
-    _tell(action, left, about[AUTHORITY], about[CONSTANT], about[QUICKNESS], smooth, told)
-    asked = s[ASKED:FEEDFORWARD, :n]
-    for i in range(n):
-        for row in range(REFERENCES):
-            asked[row, i] = target[row, i]
-        for row in range(4):
-            s[FEEDFORWARD + row, i] = told[row, i]
-        s[FEEDFORWARD + 4, i] = told[6, i] if about[DAMPS] > 0.0 else 0.0
-        told[4, i], told[5, i] = told[4, i] - limiter[authority.SOFTNESS, i], told[5, i] - limiter[authority.SOFTNESS, i]
+        for k in range(Reference.size):
+            asked.rows[k, i] = target.rows[k, i]
         for k in range(size):
-            s[SHOWN + k, i] = smooth[k, i]
-        s[SHOWN + size, i], s[SHOWN + size + 1, i] = left[0, i], left[1, i]
-        for k in range(unexplained.ROWS):
-            s[SHOWN + size + 2 + k, i] = max(-LIMIT, min(LIMIT, met[k, i] / about[UNIT]))
-        for valve in range(4 if about[HAS_LAW] == 0.0 else 0):
-            s[OPENING + valve, i] = action[valve, i]
-    if about[STIFFENS] > 0.0:
-        stiffen(force, told[4:6], asked)
+            shown[k, i] = own.smooth[k, i]
+        for k in range(2):
+            signals.feedforward.force[k, i], signals.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
+            said.powers[k, i] = said.powers[k, i] - limiter.softness[i]
+            shown[size + k, i] = limiter.left[k, i]
+        signals.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
+        for k in range(unexplained.Met.size):
+            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, own.met.rows[k, i] / about.unit))
+        for valve in range(4 if about.has_law == 0.0 else 0):
+            signals.opening[valve, i] = action[valve, i]
+    if about.stiffens > 0.0:
+        stiffen(signals.user_force, said.powers, asked)
     return 0
 
 
@@ -206,16 +214,14 @@ class ResidualLaw(StagedController):
         settings, board = self.settings, self.parameters.electronics
         pistons = observers.fresh_memory(self.parameters, sampled)
         belief = observers.belief(self.parameters, observers.BANDWIDTH if sampled else unexplained.BANDWIDTH)
-        constants = {
-            **{"sampled": sampled, "rows": len(pistons), "size": settings.size},
-            **{"authority": settings.authority, "time_constant": settings.time_constant},
-            **{"quickness": 1.0 - exact.number("exp", -board.control_period / settings.time_constant)},
-            **{"level": authority.LEVEL, "unit": FORCE_UNIT, "has_law": self._law is not None},
-            **{"stiffens": settings.impedance != "fixed", "damps": settings.impedance == "variable"},
-        }
-        fresh = np.concatenate([np.zeros(PISTONS), pistons])
-        fresh[LIMITER:MET_ROWS] = authority.FRESH
-        own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *belief]), fresh)
+        constants = Constants.numbers(
+            sampled=sampled, more_rows=len(pistons) - Pistons.size, actions=settings.size, authority=settings.authority,
+            time_constant=settings.time_constant, level=authority.LEVEL, unit=FORCE_UNIT, has_law=self._law is not None,
+            quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
+            stiffens=settings.impedance != "fixed", damps=settings.impedance == "variable", belief=belief,
+        )  # fmt: skip
+        fresh = Memory.lane(limiter=authority.Limiter.lane(left=1.0), pistons=pistons)
+        own = LawStage(_stage, constants, fresh)
         return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
@@ -247,9 +253,9 @@ class ResidualLaw(StagedController):
         self.action[:] = actions
 
     @property
-    def limiter(self) -> Array:
-        """Memory of what limits the authority, (``authority.ROWS``, N)."""
-        return self._memories[0][LIMITER:MET_ROWS]
+    def limiter(self) -> authority.Limiter:
+        """What limits the authority."""
+        return Memory(self._memories[0]).limiter
 
     @property
     def asked(self) -> Reference:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from baselines.registry import resolved
 from birthsim_env.physics.rig.values import is_within, shown
 
 NO_LAW = "none"
@@ -26,11 +27,16 @@ IMPEDANCES = {"fixed": 2, "variable_kp": 4, "variable": 5}
 """Impedance mode (the vocabulary of robosuite) -> length of an action: forces; and stiffness; and damping."""
 
 
+def is_one_of(name: str, allowed: tuple[str, ...]) -> bool:
+    """Whether a law, or what else has a name, is among those allowed, whichever of its names is given."""
+    return name in allowed or resolved(name) in [resolved(one) for one in allowed]
+
+
 @dataclass(frozen=True)
 class ResidualSettings:
     """What a residual may do.
 
-    - ``law`` underneath, one of ``LAWS``.
+    - ``law`` underneath, one of ``LAWS``, by its short name or as ``admittance[learn=false]``.
     - ``impedance``: with ``"fixed"`` an action is a force along each cylinder; with ``"variable_kp"`` also the stiffness Kclx,
       Kcly that the law works with; with ``"variable"`` its damping besides. Without a law, and on the
       admittance laws, only ``"fixed"``.
@@ -57,13 +63,13 @@ class ResidualSettings:
                 raise ValueError(f"{name} = {shown(value)}; allowed: more than {low:g}, at most {high:g}")
         for name, allowed in (("law", LAWS), ("impedance", tuple(IMPEDANCES))):
             value = getattr(self, name)
-            if not isinstance(value, str) or value not in allowed:
+            if not isinstance(value, str) or not is_one_of(value, allowed):
                 raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(map(repr, allowed))}")
         if self.impedance != "fixed" and (self.law.startswith("admittance") or self.law == NO_LAW):
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
         if not isinstance(self.force_sensor, bool):
             raise ValueError(f"force_sensor = {shown(self.force_sensor)}; allowed: True, False")
-        if not self.force_sensor and (self.impedance != "fixed" or self.law in FORCE_LAWS):
+        if not self.force_sensor and (self.impedance != "fixed" or is_one_of(self.law, FORCE_LAWS)):
             raise ValueError(
                 f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "
                 f"and a law other than {', '.join(map(repr, FORCE_LAWS))}, which need the hand's force"

@@ -6,11 +6,13 @@ turns. What was met when the piston last moved out and in tells weight and frict
 
 from __future__ import annotations
 
+from baselines.estimation.rows import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, rows
 
 BANDWIDTH = 60.0
 """1/s, of the observer where speeds are measured; assumed."""
@@ -21,27 +23,44 @@ MOVING = 0.005
 AVERAGE = 0.2
 """s of sliding over which what was met is averaged; assumed."""
 
-ROWS = 6
-"""Unexplained force now, when last moving out, when last moving in: N, of cylinders 1 and 2 each."""
+
+class Met(Rows):
+    """Unexplained force on the pistons."""
+
+    now = rows("1 2", "N", "now")
+    out = rows("1 2", "N", "when last moving out")
+    inwards = rows("1 2", "N", "when last moving in")
+
+
+class Ways(Rows):
+    """Which ways pistons have moved."""
+
+    out = rows("1 2", "1", "1 where a piston has moved out")
+    inwards = rows("1 2", "1", "1 where it has moved in")
 
 
 @helper
-def remember(joints: Array, disturbance: Array, p: Array, period: float, seen: Array, met: Array) -> None:
-    """``seen`` (4, N) is 1 where cylinder 1, 2 has moved out, in; ``met`` (ROWS, N)."""
+def _meet(last: Array, moved: Array, cylinder: int, i: int, moves: bool, force: float, fraction: float) -> None:
+    """What was met one way, ``last`` (2, N), averaged while the piston ``moves`` that way."""
+    if moves:
+        last[cylinder, i] += (fraction if moved[cylinder, i] > 0.0 else 1.0) * (force - last[cylinder, i])
+        moved[cylinder, i] = 1.0
+    elif moved[cylinder, i] == 0.0:
+        last[cylinder, i] = force
+
+
+@helper
+def remember(joints: Joints, disturbance: Array, p: Array, period: float, ways: Ways, met: Met) -> None:
+    """Brings what is ``met`` in N lanes up to a ``disturbance`` (2, N), m/s2."""
     fraction = 1.0 - exact.exp(-period / AVERAGE)
-    for i in range(joints.shape[1]):
-        kappa = geometry.pose(
-            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
-        )[5]
+    for i in range(joints.rows.shape[1]):
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        _, _, _, _, _, kappa, _, _ = geometry.pose(
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+        )
         for cylinder in range(2):
             mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
-            force, speed = mass * disturbance[cylinder, i], joints[2 + cylinder, i]
-            met[cylinder, i] = force
-            for way in range(2):
-                row = 2 * way + cylinder
-                moves = speed > MOVING if way == 0 else speed < -MOVING
-                if moves:
-                    met[2 + row, i] += (fraction if seen[row, i] > 0.0 else 1.0) * (force - met[2 + row, i])
-                    seen[row, i] = 1.0
-                elif seen[row, i] == 0.0:
-                    met[2 + row, i] = force
+            force, speed = mass * disturbance[cylinder, i], joints.speed[cylinder, i]
+            met.now[cylinder, i] = force
+            _meet(met.out, ways.out, cylinder, i, speed > MOVING, force, fraction)
+            _meet(met.inwards, ways.inwards, cylinder, i, speed < -MOVING, force, fraction)

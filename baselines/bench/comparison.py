@@ -18,7 +18,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
-from baselines.registry import CONTROLLERS, SLOW, make_controller
+from baselines.registry import LISTED, SLOW, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import drawn_by
@@ -89,8 +89,8 @@ WITHOUT_RATIO = ("restarts", "saturation")
 
 
 def default_controllers() -> list[str]:
-    """Every controller of the registry but the slow ones."""
-    return [name for name in CONTROLLERS if name not in SLOW]
+    """Every controller that is compared but the slow ones."""
+    return [name for name in LISTED if name not in SLOW]
 
 
 def all_conditions(

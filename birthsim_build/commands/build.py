@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run, seed_number
-from baselines.registry import CONTROLLERS, SLOW
+from baselines.registry import LISTED, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
@@ -77,7 +77,7 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
     if RESIDUAL in controllers:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if arguments.all:
-        controllers = [name for name in CONTROLLERS if name not in SLOW]
+        controllers = [name for name in LISTED if name not in SLOW]
     return make_bundle(rig, scenarios, sensors, controllers, policies, arguments.seed, alone)
 
 

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 from baselines.commands.shared import run
-from baselines.registry import CONTROLLERS, SLOW
+from baselines.registry import LISTED, SLOW
 from baselines.work.files import make_folder, write_json, write_text
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
@@ -52,7 +52,7 @@ def _targets(arguments: argparse.Namespace) -> None:
     require_linker()
     folder, rig = make_folder(arguments.out), Parameters()
     bundle = make_bundle(rig, ["circle"], ["ideal", "lab"], LAWS, [POLICY])
-    every = make_bundle(rig, SCENARIOS, SENSORS, [name for name in CONTROLLERS if name not in SLOW], [POLICY])
+    every = make_bundle(rig, SCENARIOS, SENSORS, [name for name in LISTED if name not in SLOW], [POLICY])
     results: dict[str, tuple[Report, list[Line]]] = {}
     for target, build, check in (
         ("wasm", build_wasm, _in_node),

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError, create_model
 
 from baselines import about
-from baselines.registry import CONTROLLERS, controller_names
+from baselines.registry import CONTROLLERS, listed_names
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -97,10 +97,10 @@ def opening_settings(rig: Parameters, policies: Sequence[str] = ()) -> Settings:
 
 
 def controller_choices(policies: Sequence[str] = ()) -> list[dict[str, str]]:
-    """Every controller of the registry, every policy that comes with the package, and ``policies`` (folders): name, title,
+    """Every controller that is compared, every policy that comes with the package, and ``policies`` (folders): name, title,
     what it is (``about``), and what is ``missing``."""
     choices = []
-    for name in controller_names():
+    for name in listed_names():
         choice = {"name": name, "title": name.replace("-", " "), "about": about.CONTROLLERS.get(name, "")}
         if name == "nonlinear-mpc" and importlib.util.find_spec("casadi") is None:
             choice["missing"] = "pip install 'birthsim[mpc]'"

@@ -81,7 +81,7 @@ ALL = ("--all", "--controllers", "backstepping")
 BAD = [
     ("evaluate", ("--env", "BirthSIM/Square-v1"), "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v1, "),
     ("evaluate", ("--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1, "),
-    ("evaluate", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, backstepping-weight, "),
+    ("evaluate", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, admittance, "),
     (
         "evaluate",
         ("--controller", "nowhere.py:Mine"),
@@ -144,7 +144,7 @@ BAD = [
     ("train", ("--config", "{tmp}/own.py"), "own.py' is no TOML: "),
     ("train", ("--config", "{tmp}/rig.toml"), "rig.toml': table 'mechanics'; allowed: training, residual"),
     ("train", ("--algorithm", "dqn"), "--algorithm: invalid choice: 'dqn' (choose from"),
-    ("train", ("--law", "pid"), "--law: invalid choice: 'pid' (choose from"),
+    ("train", ("--law", "pid"), "law = 'pid'; allowed: 'backstepping', 'backstepping-weight', "),
     ("train", ("--impedance", "soft"), "--impedance: invalid choice: 'soft' (choose from"),
     ("train", ("--law", "none", "--impedance", "variable"), "impedance = 'variable'; allowed: 'fixed', law = 'none' has no"),
     ("train", ("--seeds", "0"), "--seeds: '0'; allowed: a whole number >= 1"),

@@ -8,14 +8,14 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.registry import LIMITED, SLOW, controller_names, make_controller
+from baselines.registry import LIMITED, SLOW, listed_names, make_controller
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
-NAMES = [*controller_names(), *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
+NAMES = [*listed_names(), *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
     pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW))
     for name in NAMES for sensors in SENSORS

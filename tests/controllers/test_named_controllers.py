@@ -8,7 +8,7 @@ import pytest
 
 from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import checked_command
-from baselines.registry import controller_names, make_controller
+from baselines.registry import SHORT_NAMES, controller_names, make_controller, resolved
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
 
@@ -79,7 +79,7 @@ def test_two_files_of_one_name_are_two_controllers(tmp_path):
 
 
 def test_the_named_controllers_are_the_law_with_and_without_weight():
-    assert {"backstepping", "backstepping-weight", "residual"} <= set(controller_names())
+    assert {"backstepping", "admittance", "residual"} <= set(controller_names())
     env = gymnasium.make_vec(CIRCLE, num_envs=2)
     env.reset(seed=0)
     for name, weight in (("backstepping", False), ("backstepping-weight", True)):
@@ -87,10 +87,28 @@ def test_the_named_controllers_are_the_law_with_and_without_weight():
         np.testing.assert_array_equal(make_controller(name, RIG).command(env.measurement, env.reference), expected)
 
 
+@pytest.mark.parametrize("name", SHORT_NAMES)
+def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
+    assert resolved(name) == resolved(SHORT_NAMES[name])
+    assert resolved(f"limited:{name}[lead_time=2]") == (resolved(name)[0], {**resolved(name)[1], "lead_time": 2.0})
+    short, long = (make_controller(one, RIG) for one in (name, SHORT_NAMES[name]))
+    assert type(short) is type(long)
+    for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
+        assert one.function is other.function
+        np.testing.assert_array_equal(one.constants, other.constants)
+
+
+def test_options_that_a_law_in_cartesian_coordinates_lacks_are_refused():
+    with pytest.raises(ValueError, match=r"weight_compensation = True is unknown; allowed for backstepping: pneumatic_gain, "):
+        make_controller("backstepping-cartesian[weight_compensation=true]", RIG)
+    with pytest.raises(ValueError, match=r"learn = 2\.0; allowed: True or False"):
+        make_controller("admittance[learn=2]", RIG)
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("backsteping", r"controller = 'backsteping'; allowed: backstepping, backstepping-weight, .*path/to/file\.py:Class"),
+        ("backsteping", r"controller = 'backsteping'; allowed: backstepping, admittance, .*path/to/file\.py:Class"),
         ("", r"controller = ''; allowed: backstepping"),
         ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
         ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),

@@ -13,7 +13,7 @@ from baselines.bench.haptics.recording import record
 from baselines.bench.haptics.worlds import Condition, resting, uses_force
 from baselines.bench.rig_port import RigPort
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
-from baselines.registry import CONTROLLERS, UNCONTROLLED, make_controller
+from baselines.registry import LISTED, UNCONTROLLED, make_controller
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -35,7 +35,7 @@ def test_series_of_a_piston() -> None:
     assert missed(0.1) / missed(0.05) == pytest.approx(8, rel=0.01)
 
 
-@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"nonlinear-mpc"}))
+@pytest.mark.parametrize("name", sorted(set(LISTED) - {"nonlinear-mpc"}))
 def test_every_law_declares_the_stiffness_that_is_asked_for(name: str) -> None:
     """(18) loses nothing of a stiffness that is the same along x and y; mass and damping are positive definite."""
     declared = declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0]))

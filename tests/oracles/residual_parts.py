@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.residual import authority, unexplained
+from baselines.estimation.rows import Joints
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
@@ -15,37 +16,37 @@ class AuthorityLimiter:
     """``fraction`` (2, N) of the authority that is left along cylinders 1 and 2, and ``softness`` (N,) for the law."""
 
     def __init__(self, period: float, lane_parameters: Array) -> None:
-        self._period, self._p, self._memory = period, lane_parameters, np.zeros((authority.ROWS, 0))
+        self._period, self._p, self._limiter = period, lane_parameters, authority.Limiter(np.zeros((authority.Limiter.size, 0)))
 
     @property
     def fraction(self) -> Array:
-        return self._memory[: authority.SOFTNESS : authority.CYLINDER]
+        return self._limiter.left
 
     @property
     def softness(self) -> Array:
-        return np.asarray(self._memory[authority.SOFTNESS])
+        return self._limiter.softness
 
     def reset(self, lanes: Mask) -> None:
-        if self._memory.shape[1] != len(lanes):
-            self._memory = np.zeros((authority.ROWS, len(lanes)))
-        self._memory[:, lanes] = authority.FRESH[:, None]
+        if self._limiter.rows.shape[1] != len(lanes):
+            self._limiter = authority.Limiter(np.zeros((authority.Limiter.size, len(lanes))))
+        self._limiter.rows[:, lanes] = authority.Limiter.lane(left=1.0)[:, None]
 
     def update(self, joints: Array, reference: Reference) -> None:
-        authority.limit_authority(joints, reference.rows, self._p, self._period, authority.LEVEL, self._memory)
+        authority.limit_authority(Joints(joints), reference, self._p, self._period, authority.LEVEL, self._limiter)
 
 
 class UnexplainedForceObserver:
-    """``met`` (ROWS, N) of N lanes, brought up once per control period."""
+    """``met`` (6, N) of N lanes, brought up once per control period."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._period, self._p = parameters.electronics.control_period, parameter_column(parameters)
         self._rig, self._sampled = parameters, Sampled(parameters)
-        self.met: Array = np.zeros((unexplained.ROWS, 0))
+        self.met: Array = np.zeros((unexplained.Met.size, 0))
         self.joints: Array = np.zeros((4, 0))
 
     def reset(self, lanes: Mask) -> None:
         if self.met.shape[1] != len(lanes):
-            self.met, self._seen = np.zeros((unexplained.ROWS, len(lanes))), np.zeros((4, len(lanes)))
+            self.met, self._seen = np.zeros((unexplained.Met.size, len(lanes))), np.zeros((unexplained.Ways.size, len(lanes)))
             self._measured = Measured(self._rig, unexplained.BANDWIDTH, len(lanes))
             self._sampled = Sampled(self._rig)
         self._measured.pistons.fresh[lanes] = 1.0
@@ -57,4 +58,5 @@ class UnexplainedForceObserver:
         observer = self._sampled if measurement.sampled else self._measured
         self.joints = np.ascontiguousarray(observer.update(measurement, force, np.zeros_like(force)))
         disturbance = np.ascontiguousarray(observer.pistons.disturbance)
-        unexplained.remember(self.joints, disturbance, self._p, self._period, self._seen, self.met)
+        ways, met = unexplained.Ways(self._seen), unexplained.Met(self.met)
+        unexplained.remember(Joints(self.joints), disturbance, self._p, self._period, ways, met)

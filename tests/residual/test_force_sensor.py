@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import agents
 from agents.policy.controller import ResidualController
 from agents.residual.law import observation_names
 from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
+from baselines.registry import SHORT_NAMES
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensors import SENSORS
 
@@ -106,10 +109,19 @@ def test_the_controller_hides_the_force_by_itself(law, sensors):
         np.testing.assert_array_equal(outside.simulation.plant.state, inside.simulation.plant.state)
 
 
-@pytest.mark.parametrize("law", FORCE_LAWS)
+@pytest.mark.parametrize("law", [*FORCE_LAWS, "admittance", "admittance[learn=false]"])
 def test_a_law_that_reads_the_force_is_refused(law):
-    with pytest.raises(ValueError, match=f"force_sensor = False with law = '{law}'"):
+    with pytest.raises(ValueError, match=re.escape(f"force_sensor = False with law = '{law}'")):
         ResidualSettings(law, force_sensor=False)
+
+
+@pytest.mark.parametrize("law", ["backstepping-force-first", "admittance-sensorless"])
+def test_a_law_is_the_same_by_its_name_with_options(law):
+    actions = np.full((STEPS, LANES, 2), 0.3, np.float32)
+    for one, other in zip(course(law, actions), course(SHORT_NAMES[law], actions), strict=True):
+        np.testing.assert_array_equal(one, other)
+    with pytest.raises(ValueError, match=r"law = 'admittance\[gain=60\]'; allowed: 'backstepping', "):
+        ResidualSettings("admittance[gain=60]")
 
 
 def test_an_impedance_that_varies_is_refused():

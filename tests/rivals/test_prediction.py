@@ -266,9 +266,9 @@ def test_all_other_controllers_do_without_casadi() -> None:
     """In an interpreter that cannot import it."""
     code = (
         "import sys; sys.modules['casadi'] = None\n"
-        "from baselines.registry import CONTROLLERS, make_controller\n"
+        "from baselines.registry import LISTED, make_controller\n"
         "from birthsim_env.physics.rig.parameters import Parameters\n"
-        "for name in set(CONTROLLERS) - {'nonlinear-mpc'}: make_controller(name, Parameters())\n"
+        "for name in set(LISTED) - {'nonlinear-mpc'}: make_controller(name, Parameters())\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

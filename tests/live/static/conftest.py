@@ -44,7 +44,7 @@ def built(tmp_path_factory):
     from birthsim_live.static import pack
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settings, "controller_names", lambda: FEW)
+        patch.setattr(settings, "listed_names", lambda: FEW)
         for module in (seeds, pack):
             patch.setattr(module, "shipped_names", lambda: ["circle"])
         return _built(tmp_path_factory, patch)

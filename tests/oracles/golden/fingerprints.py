@@ -17,7 +17,7 @@ import numpy as np
 
 from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy, shipped_names
-from baselines.registry import CONTROLLERS, SLOW, make_controller
+from baselines.registry import LISTED, SLOW, make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
@@ -35,7 +35,7 @@ EXCEPTIONS = {
 
 def rows() -> dict[str, tuple[str, str, str]]:
     """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
-    chosen = [("circle", "lab", name) for name in CONTROLLERS if name not in {*SLOW, *EXCEPTIONS}]
+    chosen = [("circle", "lab", name) for name in LISTED if name not in {*SLOW, *EXCEPTIONS}]
     for scenario in SCENARIOS:
         driven = ("openings", "backstepping", *(["residual"] if scenario in shipped_names() else []))
         chosen += [(scenario, "ideal", who) for who in driven]
