@@ -1,4 +1,4 @@
-"""What an evaluation measures, accumulated while lanes run (docs/controllers.md): tracking, stiffness, hunting, air."""
+"""What an evaluation measures, accumulated while lanes run: tracking, stiffness, hunting, air."""
 
 from __future__ import annotations
 
