@@ -80,8 +80,7 @@ def packed_rows(rows: Array | None, parts: Sequence[Part]) -> Array:
     every = np.zeros(ROWS)
     if rows is not None:
         every[: WORLD + SEEN] = rows
-    for row, value in FIRST.items():
-        every[WORLD + SEEN + row] = value
+    every[WORLD + SEEN :] = FIRST
     for part in parts:
         for row, value in part.rows.items():
             every[row] = value

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from birthsim_build.image import ENTRY, HEAD, PART_HEAD, Words
-from birthsim_build.layout import INPUTS, ROWS
+from birthsim_build.layout import ROWS, Inputs
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.loop.stage import ARGUMENTS, call, carray, pointer
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -29,7 +29,7 @@ def advance(image: int, periods: int, dispatch: int) -> int:
     into their descriptions, so that an image may have been copied.
     """
     parts, rows, missed = _words(image, HEAD)[2], image + 8 * HEAD, 0
-    seen, inputs, first = rows + 8 * WORLD, rows + 8 * (ROWS - INPUTS), rows + 8 * ROWS
+    seen, inputs, first = rows + 8 * WORLD, rows + 8 * (ROWS - Inputs.size), rows + 8 * ROWS
     part = first
     for _ in range(parts):
         size, stages, tables, _ = _words(part, PART_HEAD)

@@ -95,11 +95,14 @@ class Loop:
         for array, row in placed:
             moves.append(self._move(array, row))
         self._tables: list[NDArray[np.int64]] = []
+        memories: dict[int, int] = {}  # stages may share one
         for stage, closes in [*((one, 0) for one in stages), *((one, 1) for one in closing)]:
             memory = self._rows
             if stage.memory is not None:
-                moves.append(self._move(stage.memory, memory))
-                self._rows += stage.memory.shape[0]
+                memory = memories.setdefault(stage.memory.ctypes.data, memory)
+                if memory == self._rows:
+                    moves.append(self._move(stage.memory, memory))
+                    self._rows += stage.memory.shape[0]
             about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
             for entry, table in zip(about, stage.tables, strict=False):
                 entry[: 1 + table.ndim] = table.ctypes.data, *table.shape

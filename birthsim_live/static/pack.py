@@ -20,13 +20,15 @@ from agents.policy.seeds import best_policy, shipped_names
 from agents.policy.stage import policy_stage
 from agents.residual.law import ResidualLaw
 from baselines.staged import LawStage, StagedController
-from birthsim_build.image import function_name
+from birthsim_build.image import INPUT_MEMORY, function_name
+from birthsim_build.layout import FIRST, Inputs
+from birthsim_build.stages import enter_scenario, outside
 from birthsim_env.assembly import policy_periods
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage
-from birthsim_env.parts.actuation import VALVE_LAYOUTS, ValveActuation
+from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -35,18 +37,21 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig import bridge, clock, frames, hand, recorder, recording, setpoints
+from birthsim_live.rig import clock, frames, hand, recorder, recording, stages
 from birthsim_live.rig.controllers import build_controller, has_damping
-from birthsim_live.rig.session import HIGHEST, LOWEST, PATH_POINTS
+from birthsim_live.rig.lane import PASSES, begun, on_their_clock, path_of, valve_stages
+from birthsim_live.rig.session import HIGHEST, LOWEST
 from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices, opening_settings
 from birthsim_live.server.hub import surroundings
-from birthsim_live.static import stages
 
 SEED = 0
 """Of the world: that of ``Session``."""
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
+
+INPUTS = "inputs"
+"""What a stage has as its memory whose memory are the inputs."""
 
 WITHOUT = "only with birthsim-live"
 """What the page says of a controller that is not compiled."""
@@ -65,7 +70,7 @@ class Packer:
         return {
             "function": self.number(stage),
             "constants": packed(stage.constants),
-            "memory": None if memory is None else packed(memory),
+            "memory": INPUTS if memory is INPUT_MEMORY else None if memory is None else packed(memory),
             "tables": [{"shape": list(table.shape), "data": packed(table)} for table in tables],
         }
 
@@ -109,18 +114,22 @@ def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[
         "rows": {
             **{name.upper(): group.first for layout in (World, Seen) for name, group in layout.groups.items()},
             "WORLD": World.size, "SEEN": Seen.size,
+            "inputs": {name: group.first for name, group in Inputs.groups.items()},
         },
         "info": {
             **{name: [group.first, group.count] for name, group in Info.groups.items()},
             "friction": [Info.size, 2], "flows": [Info.size + 2, 4],
         },
         "rig": rig_numbers(rig),
+        "inputs": packed(FIRST), "passes": PASSES,
         "range": {"low": packed(LOWEST), "high": packed(HIGHEST), "names": at.STATE_NAMES},
         "stages": {
             "plant": packer.stage(plant_stage(Plant(rig), period)),
             "begin": packer.stage(Stage(stages.begin, parameter_column(rig))),
             "show": packer.stage(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
-            "valves": {name: packer.stage(ValveActuation(name).stages(1, False)[0]) for name in VALVE_LAYOUTS},
+            "enter": packer.stage(Stage(enter_scenario, memory=INPUT_MEMORY)),
+            "outside": packer.stage(Stage(outside, memory=INPUT_MEMORY)),
+            "valves": {name: [packer.stage(stage) for stage in valve_stages(name)] for name in VALVE_LAYOUTS},
         },
         "scenarios": {name: scenario(name, packer) for name in SCENARIOS},
         "sensors": {name: sensors(name, rig, packer) for name in SENSORS},
@@ -147,20 +156,10 @@ def rig_numbers(rig: Parameters) -> dict[str, Any]:
 
 def scenario(name: str, packer: Packer) -> dict[str, Any]:
     """A scenario: its stages, which are the same in every episode, and the path of its target."""
-    parts: tuple[Any, ...] = SCENARIOS[name].nominal()
-    for part in parts:
-        part.prepare(1)
-        part.begin(0, stream(SEED, 0, "reference"))
-    instants = np.linspace(0.0, SCENARIOS[name].duration, PATH_POINTS)
-    points = np.round(np.concatenate([parts[0].sample(np.array([t]))[:2] for t in instants], axis=1).T, 6)
-    trajectory, force, schedule = (packer.stage(part.stage()) for part in parts)
-    return {
-        "duration": SCENARIOS[name].duration,
-        "trajectory": trajectory,
-        "force": force,
-        "schedule": schedule,
-        "path": (points if np.ptp(points, axis=0).any() else points[:1]).tolist(),
-    }
+    parts: Any = begun(name, SEED, 0)
+    target, force, setpoints = (packer.stage(part.stage()) for part in parts)
+    duration = SCENARIOS[name].duration
+    return {"duration": duration, "target": target, "force": force, "setpoints": setpoints, "path": path_of(parts, duration)}
 
 
 def sensors(name: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
@@ -170,6 +169,7 @@ def sensors(name: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
     for episode in range(EPISODES):
         model.begin(0, stream(SEED, episode, "sensors"))
         own = [model.stage(), *([model.board_stage()] if hasattr(model, "board_stage") else [])]
+        own = [one for stage in own for one in on_their_clock(stage, rig.electronics.control_period, INPUT_MEMORY)]
         episodes.append([[packed(table) for table in stage.tables] for stage in own])
     drawn = [
         [k for k, tables in enumerate(zip(*every, strict=True)) if len(set(tables)) > 1]
@@ -222,8 +222,6 @@ def packed_policies(rig: Parameters, packer: Packer, policies: Sequence[str] = (
 def numbers_of_the_page() -> dict[str, float]:
     """Constants of ``birthsim_live.rig``, which the worker shares."""
     return {
-        "least_time": bridge.LEAST_TIME, "pace": bridge.PACE, "negligible": bridge.NEGLIGIBLE,
-        "setpoint_transition": setpoints.TRANSITION, "hand_transition": hand.TRANSITION,
-        "drag_limit": hand.DRAG_LIMIT, "patience": hand.PATIENCE, "drag_damping": hand.DRAG_DAMPING,
+        "patience": hand.PATIENCE,
         "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
     }  # fmt: skip

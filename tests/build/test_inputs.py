@@ -9,6 +9,7 @@ from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
 from birthsim_build.check.running import ROW, library_loop, node_rows
 from birthsim_build.image import HEAD
 from birthsim_build.layout import ROWS
+from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
 from birthsim_env import StiffnessSchedule, UserForce
 from birthsim_env.parts.scenarios import SCENARIOS
 from tests.build.targets import assert_same_bits, need_program
@@ -88,6 +89,21 @@ def test_setpoints_of_a_person(in_node):
     rows = in_node(inputs=inputs)
     expected = loop_rows("circle", "ideal", LOOP["controller"], stiffness=Chosen())
     assert_same_bits(rows[:, SHARED], expected[:, SHARED])
+
+
+def test_setpoints_and_a_hand_s_force_pass_over(in_node):
+    at, since = 1300, (np.arange(PERIODS) - 1300) * 1e-3  # a push of the scenario is on
+    later, once = np.where(since >= 0, 0.0, 1.0), np.where(since == 0, 1.0, 0.0)
+    inputs = {"keep_Kclx": later, "keep_force": later, "pass_setpoints": once, "pass_force": once}
+    rows = in_node(inputs={**inputs, "add_Kclx": np.where(since >= 0, 3000.0, 0.0)})
+    stiffness, force = rows[:, ROW["reference_Kclx"]], rows[:, ROW["force_x"]]
+    assert force[at - 1] > 1
+    assert (stiffness[at], force[at]) == (stiffness[at - 1], force[at - 1])
+    for found, start, end, lasts in ((stiffness, 2000.0, 3000.0, SETPOINTS_TIME), (force, force[at - 1], 0.0, FORCE_TIME)):
+        u = np.clip(since / lasts, 0.0, 1.0)[at:]
+        passed = u**3 * (10 - 15 * u + 6 * u * u)
+        assert found[at:] == pytest.approx(start + passed * (end - start), rel=1e-9, abs=1e-9)
+        assert found[-1] == end
 
 
 def test_one_valve_per_cylinder(in_node):

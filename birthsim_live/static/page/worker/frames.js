@@ -8,18 +8,16 @@ const INFO = {
   pneumatic_setpoint: "pneumatic_stiffness_setpoint", friction: "friction", flows: "flows",
 };
 
-const NOWHERE = [NaN, NaN];
-
 /** The present instant: name -> numbers, in the order of FIELDS. */
 export function instant(session) {
-  const { show, seen, world, pack, hands } = session;
+  const { show, seen, world, inputs, rows, pack, hands } = session;
   show.run(seen, world);
   const known = {
     time: [session.time],
     episode_time: [session.episodeTime],
-    scenario_force: hands.scenarioNow,
-    drag_force: hands.dragNow,
-    pointer: hands.pointer ?? NOWHERE,
+    scenario_force: inputs.some(rows.inputs.scenario_force, 2),
+    drag_force: inputs.some(rows.inputs.pointer_force, 2),
+    pointer: hands.pointer(world.some(rows.MOTION, 2), inputs.get(rows.inputs.pointer_stiffness)),
   };
   return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? show.memory.some(...pack.info[INFO[name]])]));
 }

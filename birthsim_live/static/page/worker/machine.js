@@ -27,6 +27,7 @@ export class Machine {
     this.buffer = memory.buffer;
     this.free = exports.__heap_base.value;
     this.nothing = { place: 0n };
+    this.inputs = null; // rows that are the memory of several stages
   }
 
   /** The same code with a memory of its own. */
@@ -96,8 +97,8 @@ export class Stage {
     this.machine = machine;
     this.function = machine.exports[`birthsim_stage_${number}`];
     this.constants = BigInt(machine.put(bytesOf(constants)));
-    this.fresh = memory === null ? new Float64Array() : doublesOf(memory);
-    this.memory = machine.rows(this.fresh.length);
+    this.fresh = memory === null || memory === "inputs" ? new Float64Array() : doublesOf(memory);
+    this.memory = memory === "inputs" ? machine.inputs : machine.rows(this.fresh.length);
     const about = new BigInt64Array(TABLE * Math.max(tables.length, 1));
     this.tables = tables.map(({ shape, data }, k) => {
       const address = machine.put(bytesOf(data));

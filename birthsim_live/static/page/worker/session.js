@@ -2,7 +2,6 @@
 
 import { Law } from "./law.js";
 import { doublesOf } from "./machine.js";
-import { Course, Hands, Setpoints } from "./parts.js";
 import { NOTHING, merged } from "./settings.js";
 
 export class Session {
@@ -23,20 +22,18 @@ export class Session {
     this.column = doublesOf(pack.rig.column);
     this.world = machine.rows(this.rows.WORLD);
     this.seen = machine.rows(this.rows.SEEN);
-    const { plant, begin, show, valves } = pack.stages;
-    this.plant = machine.stage(plant);
-    this.beginning = machine.stage(begin);
-    this.show = machine.stage(show);
-    this.valves = Object.fromEntries(Object.entries(valves).map(([name, stage]) => [name, machine.stage(stage)]));
+    const first = doublesOf(pack.inputs);
+    this.inputs = machine.inputs = machine.rows(first.length);
+    this.inputs.fill(0, first);
+    const { valves, ...stages } = pack.stages;
+    for (const [name, stage] of Object.entries(stages)) this[name] = machine.stage(stage); // plant, begin, show, enter, outside
+    this.valves = Object.fromEntries(Object.entries(valves).map(([name, own]) => [name, own.map((stage) => machine.stage(stage))]));
     this.scenarios = {};
     this.models = {};
     this.laws = {};
     this.law = this.lawOf(this.settings.controller, policy);
-    const { trajectory, force, schedule, duration } = this.scenario(this.settings.scenario);
-    this.duration = duration;
-    this.course = new Course(this, trajectory);
-    this.setpoints = new Setpoints(this, schedule);
-    this.hands = new Hands(this, force, this.settings.scenario_force, this.settings.drag_stiffness);
+    this.duration = this.scenario(this.settings.scenario).duration;
+    this.hands = new Hands();
     this.episode = 0;
     this.exchange(this.settings.sensors);
     this.reset();
@@ -49,18 +46,13 @@ export class Session {
 
   /** s since the scenario's present episode began. */
   get episodeTime() {
-    return this.time - this.course.begins;
+    return this.time - this.inputs.get(this.rows.inputs.begins);
   }
 
   /** The stages of a scenario, made once. */
   scenario(name) {
-    const { trajectory, force, schedule, ...rest } = this.pack.scenarios[name];
-    this.scenarios[name] ??= {
-      ...rest,
-      trajectory: this.machine.stage(trajectory),
-      force: this.machine.stage(force),
-      schedule: this.machine.stage(schedule),
-    };
+    const { target, force, setpoints, duration } = this.pack.scenarios[name];
+    this.scenarios[name] ??= { duration, parts: [target, setpoints, force].map((stage) => this.machine.stage(stage)) };
     return this.scenarios[name];
   }
 
@@ -84,55 +76,60 @@ export class Session {
     begun[this.episode % begun.length].forEach((tables, k) => {
       for (const [table, bytes] of Object.entries(tables)) this.model.stages[k].fill(Number(table), bytes);
     });
-    this.first = null;
+    this.inputs.set(this.rows.inputs.sensors_begin, this.world.get(this.rows.TICK) + 1);
   }
 
-  /** Run a stage of the sensors on their own clock, which starts where they first measure. */
-  onTheirClock(stage) {
-    const { rows, world, seen } = this;
-    const [tick, time] = [world.get(rows.TICK), seen.get(rows.TIME)];
-    if (this.first > 0) {
-      world.set(rows.TICK, tick - this.first);
-      seen.set(rows.TIME, (tick - this.first) * this.period);
-    }
-    stage.run(seen, world);
-    world.set(rows.TICK, tick);
-    seen.set(rows.TIME, time);
+  run(stages) {
+    for (const stage of stages) stage.run(this.seen, this.world);
+  }
+
+  /** What is asked for, and who pushes, at this instant. */
+  look() {
+    this.run([this.enter, ...this.scenario(this.settings.scenario).parts, this.outside]);
   }
 
   measure() {
-    const { rows, seen } = this;
-    this.first ??= this.world.get(rows.TICK);
-    this.onTheirClock(this.model.stages[0]);
-    if (this.first > 0) seen.set(rows.POSITION_TIME, seen.get(rows.POSITION_TIME) + this.first * this.period);
+    this.run(this.model.stages.slice(0, 3));
     this.sampled = this.model.sampled;
   }
 
-  look() {
-    this.course.run();
-    this.setpoints.run();
-    this.hands.run();
-    this.measure();
+  /** Let what has been changed (of `pack.passes`) pass over smoothly from this instant on. */
+  passOver(...what) {
+    this.inputs.fill(this.rows.inputs.passes, this.pack.passes.map((name) => Number(what.includes(name))));
+    this.look();
+  }
+
+  /** Ask for setpoints that are chosen, or for the scenario's. */
+  choose(values) {
+    const { keep, add } = this.rows.inputs;
+    const count = this.rows.ASKED - this.rows.REFERENCE;
+    this.inputs.fill(keep + 8, new Array(count - 8).fill(values ? 0 : 1));
+    this.inputs.fill(add + 8, values ?? [0, 0, 0, 0]);
   }
 
   /** Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay. */
   reset() {
-    const { rows, world, seen } = this;
+    const { rows, world, seen, inputs, settings } = this;
+    const at = rows.inputs;
     this.describeRig();
     this.episode = 0;
     this.lost = null;
     world.set(rows.TICK, 0);
     seen.set(rows.TIME, 0);
-    this.setpoints.choose(chosen(this.settings));
-    for (const part of [this.course, this.setpoints, this.hands]) part.restart();
-    this.beginSensors();
     seen.fill(rows.OPENING, [0, 0, 0, 0]);
-    world.fill(rows.IMPACT, [0, 0]);
+    inputs.set(at.begins, 0);
+    inputs.fill(at.passages, new Array(at.given - at.passages).fill(0));
+    inputs.set(at.keep_force, Number(settings.scenario_force));
+    inputs.set(at.pointer_stiffness, settings.drag_stiffness);
+    this.choose(chosen(settings));
+    this.hands.act(inputs, at);
+    this.beginSensors();
+    inputs.set(at.sensors_begin, 0);
     this.plant.restart();
-    this.course.run();
-    this.setpoints.run();
-    this.beginning.run(seen, world);
+    const [target, setpoints] = this.scenario(settings.scenario).parts;
+    this.run([this.enter, target, setpoints, this.outside, this.begin]);
     this.look();
+    this.measure();
     this.law.reset();
     this.paths += 1;
     if (!this.second) return;
@@ -164,16 +161,23 @@ export class Session {
     if (after.controller !== before.controller) this.law = this.lawOf(after.controller, policy);
     this.settings = after;
     this.describeRig();
+    const passes = [];
+    const [now, then] = [chosen(after), chosen(before)];
+    if (JSON.stringify(now) !== JSON.stringify(then)) {
+      this.choose(now);
+      passes.push("setpoints");
+    }
+    if (after.scenario_force !== before.scenario_force) {
+      this.inputs.set(this.rows.inputs.keep_force, Number(after.scenario_force));
+      passes.push("force");
+    }
+    if (after.sensors !== before.sensors) this.exchange(after.sensors);
     if (after.scenario !== before.scenario) {
       this.duration = this.scenario(after.scenario).duration;
       this.episode = 0;
       this.follow();
-    }
-    const [now, then] = [chosen(after), chosen(before)];
-    if (JSON.stringify(now) !== JSON.stringify(then)) this.setpoints.choose(now);
-    if (after.sensors !== before.sensors) this.exchange(after.sensors);
-    if (after.scenario_force !== before.scenario_force) this.hands.want(after.scenario_force);
-    this.hands.stiffness = after.drag_stiffness;
+    } else if (passes.length) this.passOver(...passes);
+    this.inputs.set(this.rows.inputs.pointer_stiffness, after.drag_stiffness);
     this.compare(before, changes, compared);
   }
 
@@ -191,10 +195,8 @@ export class Session {
 
   /** Go over to the start of an episode of the scenario. */
   follow() {
-    const { trajectory, force, schedule } = this.scenario(this.settings.scenario);
-    this.course.follow(trajectory);
-    this.hands.follow(force);
-    this.setpoints.follow(schedule);
+    this.inputs.set(this.rows.inputs.begins, this.time);
+    this.passOver(...this.pack.passes);
     this.paths += 1;
   }
 
@@ -214,20 +216,17 @@ export class Session {
   }
 
   advanceOne() {
-    const { rows, seen, world } = this;
+    const { seen } = this;
     const openings = this.law.openings(seen, this.sampled, this.settings.damping);
     if (openings === null) {
       this.lost = `${this.settings.controller} gives up: it has no gains for these setpoints.`;
       return;
     }
-    const valves = this.settings.valves;
-    const action = valves === "two_valves" ? openings : [(openings[0] - openings[1]) / 2, (openings[2] - openings[3]) / 2];
-    seen.fill(rows.ACTION, action);
-    world.fill(rows.IMPACT, [0, 0]);
-    this.valves[valves].run(seen);
-    if (this.model.stages.length > 1 && this.first !== null) this.onTheirClock(this.model.stages[1]);
-    this.plant.run(seen, world);
+    seen.fill(this.rows.OPENING, openings);
+    this.hands.act(this.inputs, this.rows.inputs);
+    this.run([...this.valves[this.settings.valves], ...this.model.stages.slice(3), this.plant]);
     this.look();
+    this.measure();
     this.lost = this.leftRange();
     if (this.lost === null && this.episodeTime > this.duration - this.period / 2) {
       this.episode += 1;
@@ -253,7 +252,7 @@ export class Session {
 
   /** What the scenario asks for at this time. */
   scenarioSetpoints() {
-    const asked = this.setpoints.scenario();
+    const asked = this.inputs.some(this.rows.inputs.scenario_stiffness, 4);
     return Object.fromEntries(this.pack.stiffnesses.map((name, k) => [name, Math.round(1e3 * asked[k]) / 1e3]));
   }
 
@@ -265,6 +264,29 @@ export class Session {
 
   path() {
     return this.pack.scenarios[this.settings.scenario].path;
+  }
+}
+
+/** What the person's hand does, or null: { position, id } of a hand at a place, { force, id } of one that pushes. */
+class Hands {
+  constructor() {
+    this.hold = null;
+    this.used = null;
+  }
+
+  /** Do so from now on. */
+  act(inputs, at) {
+    const { position, force, id } = this.hold ?? {};
+    inputs.set(at.pointer_held, Number(Boolean(position)));
+    if (position) inputs.fill(at.pointer, position);
+    inputs.fill(at.push, force ?? [0, 0]);
+    this.used = id ?? this.used;
+  }
+
+  /** Where the spring from `place` ends, or would end for a hand that pushes; nowhere where there is no hand. */
+  pointer(place, stiffness) {
+    const { position, force } = this.hold ?? {};
+    return position ?? place.map((value, k) => (force ? value + force[k] / stiffness : NaN));
   }
 }
 
