@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from baselines.admittance.controller import AdmittanceBackstepping
+    from baselines.admittance.controller import AdmittanceController
     from baselines.backstepping.cartesian_controller import CartesianBackstepping
     from baselines.backstepping.controller import BacksteppingController
     from baselines.backstepping.lyapunov import LyapunovFunction
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from baselines.registry import controller_names, make_controller
 
 _PLACES = {
-    "AdmittanceBackstepping": "admittance.controller",
+    "AdmittanceController": "admittance.controller",
     "BacksteppingController": "backstepping.controller",
     "CartesianBackstepping": "backstepping.cartesian_controller",
     "Controller": "controller",
@@ -28,7 +28,7 @@ _PLACES = {
 """Public name -> where it lives; it is imported when it is first used."""
 
 __all__ = [
-    "AdmittanceBackstepping",
+    "AdmittanceController",
     "BacksteppingController",
     "CartesianBackstepping",
     "Controller",

@@ -9,7 +9,7 @@ import numpy as np
 
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.values import is_within, limits, shown
+from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
 
 BEYOND = 1000.0
 """A gain may be so many times below the lowest, or above the highest, that tuning tries."""
@@ -114,6 +114,13 @@ def check_gains(controller: Tunable, gains: Mapping[str, float]) -> None:
                 else f"a positive number{limits(least=least, most=most)}"
             )
             raise ValueError(f"{name} = {shown(value)}; allowed: {words}")
+
+
+def check_flags(flags: Mapping[str, object]) -> None:
+    """Raises ``ValueError`` for a value that is neither True nor False, nor 1 or 0."""
+    for name, flag in flags.items():
+        if not (isinstance(flag, (bool, np.bool_)) or (is_finite(flag) and flag in (0, 1))):
+            raise ValueError(f"{name} = {shown(flag)}; allowed: True or False")
 
 
 def require_stiffness(reference: Reference, least: float) -> None:

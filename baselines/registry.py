@@ -11,8 +11,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
-from baselines.admittance.adaptive_controller import AdaptiveAdmittance, SensorlessAdmittance
-from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
@@ -39,9 +38,9 @@ CONTROLLERS: dict[str, Factory] = {
     "backstepping-one-valve": partial(BacksteppingController, weight_compensation=True, valves="one_valve"),
     "backstepping-force-first": partial(BacksteppingController, force_first=True),
     "backstepping-cartesian": CartesianBackstepping,
-    "admittance-backstepping": AdmittanceBackstepping,
-    "admittance-adaptive": AdaptiveAdmittance,
-    "admittance-sensorless": SensorlessAdmittance,
+    "admittance-backstepping": partial(AdmittanceController, learn=False),
+    "admittance-adaptive": AdmittanceController,
+    "admittance-sensorless": partial(AdmittanceController, force_sensor=False),
     "pid": PositionPID,
     "lqr": LinearQuadratic,
     "sliding-mode": SlidingMode,
@@ -102,13 +101,12 @@ def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
     factory: Any = _factory(bare_name(name))
     kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
-    if tunable := getattr(kind, "TUNABLE", None):
-        return list(tunable)
     parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+    named, fixed = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD], getattr(factory, "keywords", {})
+    tunable = getattr(kind, "TUNABLE", {})
+    if len(named) < len(parameters) and not tunable:
         return None
-    fixed = getattr(factory, "keywords", {})
-    return [parameter.name for parameter in parameters[1:] if parameter.name not in fixed]
+    return [*(name for name in named[1:] if name not in fixed), *tunable]
 
 
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:

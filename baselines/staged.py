@@ -102,6 +102,14 @@ class StagedController:
             given = (feedforward_force, feedforward_rate, damping_factor)
             told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *told)[:, 0]
+        if self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor)):
+            self.explain(measurement, reference)
+        return self._openings.copy()
+
+    def run_stages(
+        self, measurement: Measurement, reference: Reference, told: tuple[Array | None, Array | None, Array | None]
+    ) -> int:
+        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve."""
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         if measurement.acceleration is None and any(one.feels for one in self._made):
@@ -116,12 +124,10 @@ class StagedController:
             unchanged.flags.writeable = False
             placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, feedforward_force, feedforward_rate, damping_factor, self.TOLD)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.TOLD)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
-        if self._loop.run():
-            self.explain(measurement, reference)
-        return self._openings.copy()
+        return self._loop.run()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.admittance.law import sustained
+from baselines.admittance.rows import HalfWave
 from baselines.backstepping.cartesian_law import across, along
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
@@ -72,7 +73,7 @@ def limit_authority(joints: Array, target: Array, p: Array, period: float, level
         error2 = joints[3, i] - along(target[2, i], target[3, i], sine, cosine)
         memory[SOFTNESS, i] *= kept
         for row, error in ((0, error1), (CYLINDER, error2)):
-            peak = sustained(memory, row + 1, i, error, period, level, level)
+            peak = sustained(HalfWave(memory[row + 1 : row + CYLINDER]), i, error, period, level, level)
             if peak > SWING:
                 memory[SOFTNESS, i] = min(memory[SOFTNESS, i] + SOFTENING, MOST_SOFTENING)
             if peak > 0.0:

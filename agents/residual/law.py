@@ -17,6 +17,7 @@ import numpy as np
 from agents.residual import authority, unexplained
 from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSettings
 from baselines.estimation import disturbance_observer, observers
+from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import LawStage, StagedController
@@ -27,20 +28,17 @@ from birthsim_env.loop.rows import (
     OPENING,
     POSITION,
     POSITION_TIME,
-    PRESSURE,
     REFERENCE,
     SEEN,
     SHOWN,
-    TIME,
-    USER_FORCE,
-    VELOCITY,
+    Seen,
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage, block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -131,48 +129,41 @@ def _tell(action: Array, left: Array, most: float, time_constant: float, quickne
 
 
 CONSTANTS = (
-    *("sampled", "rows", "period", "noise", "size", "authority", "time_constant", "quickness", "level", "unit"),
+    *("sampled", "rows", "size", "authority", "time_constant", "quickness", "level", "unit"),
     *("has_law", "stiffens", "damps"),
 )
-"""Constants of the stage: 1 with sampled positions; rows of the observer; control period, s; position noise, m; length of an
-action; authority, N; time constant, s, and quickness of the low-pass; speed error, m/s, below which nothing is an oscillation;
-``FORCE_UNIT``; 1 with a law, 1 where the impedance has a stiffness and 1 where it has a damping. The rig follows."""
-SAMPLED, OBSERVER, PERIOD, NOISE, SIZE, AUTHORITY, CONSTANT, QUICKNESS, LEVEL_ROW, UNIT, HAS_LAW, STIFFENS, DAMPS = range(13)
+"""Constants of the stage: 1 with sampled positions; rows of the observer; length of an action; authority, N; time constant, s,
+and quickness of the low-pass; speed error, m/s, below which nothing is an oscillation; ``FORCE_UNIT``; 1 with a law, 1 where
+the impedance has a stiffness and 1 where it has a damping. The observer's ``Belief`` follows."""
+SAMPLED, OBSERVER, SIZE, AUTHORITY, CONSTANT, QUICKNESS, LEVEL_ROW, UNIT, HAS_LAW, STIFFENS, DAMPS = range(11)
 SMOOTH, LIMITER = 0, max(VALVES, *IMPEDANCES.values())
 MET_ROWS = LIMITER + authority.ROWS
 WAYS = MET_ROWS + unexplained.ROWS
 PISTONS = WAYS + 4
 """Rows of memory at which its parts begin: smoothed action; authority; forces met; which ways pistons have moved; observer."""
-MEASURED_ROWS = 5
 
 
 @kernel
 def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s, about = block(seen, SEEN), numbers(constants, len(CONSTANTS) + PARAMETERS)
-    p, size, sampled, period = about[len(CONSTANTS) :], int(about[SIZE]), about[SAMPLED] > 0.0, about[PERIOD]
+    s, about = block(seen, SEEN), numbers(constants, len(CONSTANTS) + Belief.size)
+    belief, size, sampled = Belief(about[len(CONSTANTS) :]), int(about[SIZE]), about[SAMPLED] > 0.0
+    p, period = belief.rig, belief.period
     m = block(memory, PISTONS + int(about[OBSERVER]))[:, :n]
     own = scratch(17)[:, :n]
-    joints, disturbance, told, nothing, moving = own[:4], own[4:6], own[6:13], own[13:15], own[15]
+    joints, told, given, pistons, signals = own[:4], own[4:11], Given(own[11:17]), Pistons(m[PISTONS:]), Seen(s[:, :n])
     for i in range(n):
-        nothing[0, i], nothing[1, i], moving[i] = 0.0, 0.0, 1.0
-    force, pistons = s[USER_FORCE:REFERENCE, :n], m[PISTONS:]
-    position, velocity, pressures = s[POSITION:VELOCITY, :n], s[VELOCITY:POSITION_TIME, :n], s[PRESSURE:USER_FORCE, :n]
+        for k in range(2):
+            given.force[k, i], given.believed[k, i] = signals.user_force[k, i], 0.0
+        given.moving[i], given.noise[i] = 1.0, belief.noise
     if sampled:
-        observers.observe(
-            pistons, s[TIME, :n], position, s[POSITION_TIME, :n], velocity, pressures, p, period, observers.BANDWIDTH,
-            about[NOISE], force, nothing, moving,
-        )  # fmt: skip
+        observers.observe(pistons, signals, signals.pressure, given, belief)
+        for i in range(n):
+            for k in range(2):
+                joints[k, i], joints[2 + k, i] = pistons.position[k, i], pistons.speed[k, i]
     else:
-        disturbance_observer.observe(
-            pistons, position, velocity, pressures, force, nothing, p, period, unexplained.BANDWIDTH, pistons[4], joints
-        )
-    for i in range(n):
-        if sampled:
-            for k in range(4):
-                joints[k, i] = pistons[k, i]
-            disturbance[0, i], disturbance[1, i] = pistons[4, i], pistons[5, i]
-        else:
-            disturbance[0, i], disturbance[1, i], pistons[4, i] = pistons[2, i], pistons[3, i], 0.0
+        point = Point(s[POSITION:POSITION_TIME, :n])
+        disturbance_observer.observe(pistons, point, signals.pressure, given, belief, Joints(joints))
+    disturbance, force = pistons.disturbance, signals.user_force
     met, limiter, target = m[MET_ROWS:WAYS], m[LIMITER:MET_ROWS], s[REFERENCE:ASKED, :n]
     unexplained.remember(joints, disturbance, p, period, m[WAYS:PISTONS], met)
     authority.limit_authority(joints, target, p, period, about[LEVEL_ROW], limiter)
@@ -212,18 +203,18 @@ class ResidualLaw(StagedController):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
-        rows = observers.memory_rows(self.parameters) if sampled else MEASURED_ROWS
+        pistons = observers.fresh_memory(self.parameters, sampled)
+        belief = observers.belief(self.parameters, observers.BANDWIDTH if sampled else unexplained.BANDWIDTH)
         constants = {
-            **{"sampled": sampled, "rows": rows, "period": board.control_period, "noise": board.position_noise},
-            **{"size": settings.size, "authority": settings.authority, "time_constant": settings.time_constant},
+            **{"sampled": sampled, "rows": len(pistons), "size": settings.size},
+            **{"authority": settings.authority, "time_constant": settings.time_constant},
             **{"quickness": 1.0 - exact.number("exp", -board.control_period / settings.time_constant)},
             **{"level": authority.LEVEL, "unit": FORCE_UNIT, "has_law": self._law is not None},
             **{"stiffens": settings.impedance != "fixed", "damps": settings.impedance == "variable"},
         }
-        fresh = np.zeros(PISTONS + rows)
+        fresh = np.concatenate([np.zeros(PISTONS), pistons])
         fresh[LIMITER:MET_ROWS] = authority.FRESH
-        fresh[PISTONS + (observers.FRESH if sampled else 4)] = 1.0
-        own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *self._p]), fresh)
+        own = LawStage(_stage, np.array([*(constants[name] for name in CONSTANTS), *belief]), fresh)
         return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
-from birthsim_env.parts.sensors.sensor_errors import CELLS, SCALED
+from birthsim_env.parts.sensors.sensor_errors import Errors
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -38,7 +38,7 @@ def true_figures(env: Any) -> NDArray[np.float32]:
     figures: Array = np.zeros((FIGURES, env.num_envs))
     figures[: len(rows)] = simulation.plant.lane_parameters[rows] / simulation.nominal[rows, None]
     if isinstance(simulation.sensors, HonestSensors):
-        figures[len(rows) : -2] = simulation.sensors.errors[CELLS:SCALED] / PRESSURE_UNIT
+        figures[len(rows) : -2] = Errors(simulation.sensors.errors).cells / PRESSURE_UNIT
         figures[-2:] = simulation.sensors.shift(simulation.motion[:2]) / PLACE_UNIT
     return figures.T.astype(np.float32)
 

@@ -8,21 +8,20 @@ halved as well.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance import law as admittance_law
-from baselines.admittance import stage as at
+from baselines.admittance import knowledge, stage
+from baselines.admittance.rows import Constants, Gains, Memory
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.controller import check_gains, require_stiffness
+from baselines.controller import check_flags, check_gains, require_stiffness
+from baselines.estimation import inertial
 from baselines.estimation.admittance import DAMPING_RATIO
-from baselines.estimation.observers import FRESH, memory_rows
-from baselines.estimation.stages import compliant_motion
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import HANDED, POSITION
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.lanes import Array
@@ -31,21 +30,46 @@ from birthsim_env.physics.rig.parameters import Parameters
 LEAST_FRACTION = 0.35
 """Lower bound of the gain reduction. With less gain friction holds the piston."""
 
+SAMPLED_LEAST, MOST_FALLS = 0.5, 3.0
+"""With sampled positions and a force sensor, where it learns: the least fraction of the gain, and how many times a large half
+wave lowers it at once. A late tracker makes light rigs swing at 10 Hz until the gain has fallen; with less gain than this a
+noisy one makes them swing at 1 Hz. Found by trial, in randomised worlds with data-sheet sensors; without a force sensor
+friction then hunts more."""
 
-class AdmittanceBackstepping(StagedController):
-    """Renders any stiffness matrix through friction, given a force sensor.
+MOST_BIAS = 2.0
+"""assumed: a force sensor's bias is at most so many times that believed."""
 
-    The stage turns the measured force into the motion that the hand should find. It estimates what is not known of the rig,
-    friction above all. ``admittance_law`` follows the motion with a stiff loop.
+IDEAL = {
+    **{"gain": 90.0, "rest_gain": 90.0, "rest_push": 1.0, "bandwidth": 108.0, "friction_fraction": 1.0, "friction_rate": 4.0},
+    **{"dead_zone": 0.0, "lead_time": 0.0011, "oscillation": 0.1, "yielding": 0.94},
+}
+LAB = {
+    **{"gain": 68.0, "rest_gain": 35.6, "rest_push": 2.0, "bandwidth": 110.0, "pressure_bandwidth": 30.0},
+    **{"friction_fraction": 0.943, "friction_rate": 4.0, "dead_zone": 6.2e-6, "lead_time": 0.0005, "oscillation": 0.092},
+    "yielding": 0.93,
+}
+
+
+class AdmittanceController(StagedController):
+    """Renders any stiffness matrix through friction.
+
+    The law turns the hand's force into the motion that the hand should find, estimates what is not known of the rig, friction
+    above all, and follows the motion with a stiff loop (``law``). Without a force sensor it estimates the hand's force from
+    pressures and motion, and never reads ``Measurement.user_force``.
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
+        force_sensor: whether the hand's force is measured.
+        learn: whether it learns, beside this, the friction of sliding pistons (not without a force sensor, since nothing tells
+            friction from the hand), the tracker's noise and the force sensor's bias, and reads an acceleration sensor where the
+            rig as believed has one and positions are samples.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests.
             rest_push: by how much the position error of a resting piston is multiplied.
             bandwidth: 1/s, of the observer of disturbances.
             pressure_bandwidth: 1/s, of the observer of pressures, where their cells are noisy (``lab`` sensors).
             friction_fraction: fraction of the believed friction that is fed forward along the reference.
+            friction_rate: 1/s, at which friction is learned; 0 learns nothing.
             dead_zone: m, of a resting piston's error. lead_time: s, in which a spool follows.
             oscillation: m/s. Where the speed error swings beyond it, each sustained half wave multiplies the gain by yielding.
 
@@ -64,68 +88,58 @@ class AdmittanceBackstepping(StagedController):
         "lead_time": (5e-4, 5e-3),
         "oscillation": (0.02, 0.2),
         "yielding": (0.8, 1.0),
+        "friction_rate": (0.0, 20.0),
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
-        "ideal": {
-            "gain": 90.0,
-            "rest_gain": 90.0,
-            "rest_push": 1.0,
-            "bandwidth": 108.0,
-            "friction_fraction": 1.0,
-            "dead_zone": 0.0,
-            "lead_time": 0.0011,
-            "oscillation": 0.1,
-            "yielding": 0.94,
-        },
-        "lab": {
-            "gain": 68.0,
-            "rest_gain": 35.6,
-            "rest_push": 2.0,
-            "bandwidth": 110.0,
-            "pressure_bandwidth": 30.0,
-            "friction_fraction": 0.943,
-            "dead_zone": 6.2e-6,
-            "lead_time": 0.0005,
-            "oscillation": 0.092,
-            "yielding": 0.93,
-        },
+        "ideal": IDEAL,
+        "lab": LAB,
+        "lab, learning": {**LAB, "rest_gain": 45.0},
+        "inertial": {**IDEAL, "rest_gain": 45.0, "pressure_bandwidth": 30.0},
     }
 
-    def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
+    def __init__(
+        self,
+        parameters: Parameters | str | Path | None = None,
+        force_sensor: bool = True,
+        learn: bool = True,
+        **gains: float,
+    ) -> None:
         check_gains(self, gains)
+        check_flags({"force_sensor": force_sensor, "learn": learn})
         if gains.get("yielding", 1.0) > 1:
             raise ValueError(f"yielding = {gains['yielding']!r}; allowed: at most 1, where oscillations cost no gain")
         super().__init__(parameters)
+        self._force_sensor, self._learn = bool(force_sensor), bool(learn)
         self._gains: dict[str, dict[str, float]] = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
 
     @property
     def gain_fraction(self) -> Array:
         """What oscillations across and along cylinder 2 have left of the gain, (2, N): 1 where there were none."""
-        return self._memories[-1][[at.LAW + row for row in admittance_law.GAIN_SHARES]]
+        follower = Memory(self._memories[-1]).follower
+        return np.stack([follower.across.fraction, follower.along.fraction])
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        g, rig = self._gains["lab" if sampled else "ideal"], self.parameters
-        period, rows = rig.electronics.control_period, memory_rows(rig) if sampled else at.MEASURED_ROWS
-        cells = exact.number("exp", -(g["pressure_bandwidth"] if sampled else math.inf) * period)
-        constants = {
-            **{"sampled": sampled, "rows": rows, "period": period},
-            **{"trust": 1.0 - cells, "noise": rig.electronics.position_noise, "pneumatic_gain": PNEUMATIC_GAIN},
-            **{
-                "quickness": 1.0 - exact.number("exp", -period / g["lead_time"]),
-                "least_fraction": LEAST_FRACTION,
-                "most_falls": 1.0,
-                **g,
-            },
-        }
-        fresh = np.zeros(at.PISTONS + rows)
-        fresh[[at.CHAMBERS + 12, at.PISTONS + (FRESH if sampled else 4)]] = 1.0
-        fresh[[at.LAW + row for row in admittance_law.GAIN_SHARES]] = 1.0
-        law = LawStage(at.control, np.array([*(constants[name] for name in at.CONSTANTS), *self._p]), fresh)
-        return [compliant_motion(rig), law]
+        rig, noisy = self.parameters, sampled
+        board, learns_force = rig.electronics, self._learn and self._force_sensor
+        inert = sampled and learns_force and board.acceleration_bandwidth > 0
+        sampled = sampled and not inert
+        kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
+        g = self._gains[kind]
+        least, falls = (SAMPLED_LEAST, MOST_FALLS) if sampled and learns_force else (LEAST_FRACTION, 1.0)
+        quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
+        follow = {"pneumatic_gain": PNEUMATIC_GAIN, "quickness": quickness, "least_fraction": least, "most_falls": falls, **g}
+        about = knowledge.beliefs(
+            rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
+            place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
+            most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
+        )  # fmt: skip
+        constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))
+        law = LawStage(stage.control, constants, knowledge.fresh_memory(rig, sampled))
+        return [inertial.law_stage(rig), law] if inert else [law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose stiffness is not positive definite."""

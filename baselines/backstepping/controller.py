@@ -12,8 +12,8 @@ from baselines.backstepping import law as backstepping_law
 from baselines.backstepping.gains import gains_for
 from baselines.backstepping.impedance import paper_impedance
 from baselines.backstepping.stiffest import require_softer, stiffness_range
-from baselines.controller import feedforward_rows, lanes_of
-from baselines.estimation.observers import PistonObserver, measured_joints
+from baselines.controller import check_flags
+from baselines.estimation.observers import measured_joints
 from baselines.estimation.stages import JOINTS, OWN, pistons
 from baselines.impedance import Impedance
 from baselines.staged import LawStage, StagedController
@@ -27,14 +27,14 @@ from birthsim_env.loop.rows import (
     SHOWN,
     USER_FORCE,
 )
-from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
 from birthsim_env.loop.stage import block, numbers
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
+from birthsim_env.physics.rig.values import is_within, limits, shown
 
 PNEUMATIC_GAIN = 30.0
 """c4, 1/s; assumed: the pneumatic stiffness settles within 0.1 s and leaves the valves to the force."""
@@ -121,9 +121,7 @@ class BacksteppingController(StagedController):
         if not isinstance(valves, str) or valves not in VALVE_LAYOUTS:
             raise ValueError(f"valves = {shown(valves)}; allowed: {', '.join(VALVE_LAYOUTS)}")
         flags = {"weight_compensation": weight_compensation, "frozen_friction": frozen_friction, "force_first": force_first}
-        for name, flag in flags.items():
-            if not (isinstance(flag, (bool, np.bool_)) or (is_finite(flag) and flag in (0, 1))):
-                raise ValueError(f"{name} = {shown(flag)}; allowed: True or False")
+        check_flags(flags)
         if force_first and valves == "one_valve":
             raise ValueError("force_first = True; allowed: False with valves = 'one_valve', which control the force alone")
         super().__init__(parameters)
@@ -138,7 +136,6 @@ class BacksteppingController(StagedController):
         self._options[backstepping_law.DAMPING_RATIO] = damping_ratio or 0.0
         self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
         self._options[backstepping_law.FORCE_FIRST] = self.force_first
-        self._observer = PistonObserver(self.parameters, self._p)
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
@@ -148,9 +145,9 @@ class BacksteppingController(StagedController):
         law = LawStage(_stage, np.array([*self._options, *self._p]), np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
-    def reset(self, lanes: Mask | None = None) -> None:
-        super().reset(lanes)
-        self._observer.reset(lanes)
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        self._joints: Array = np.zeros((OWN - JOINTS, lanes))
+        return [(self._joints, JOINTS)]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the first lane whose setpoints are too stiff or have no gains."""
@@ -184,21 +181,11 @@ class BacksteppingController(StagedController):
 
         Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
         """
-        joints, believed = self._joints(measurement, reference, feedforward_force, feedforward_rate, damping_factor)
-        lanes = joints.shape[1]
+        self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor))
+        lanes, joints, believed = self._joints.shape[1], self._joints.copy(), self._asked[REFERENCES:].copy()
         wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
         gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
         flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
         pressures = np.ascontiguousarray(measurement.pressures)  # whatever the caller's layout, one kernel is compiled
         backstepping_law.inspect(joints, pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent)
         return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
-
-    def _joints(
-        self, measurement: Measurement, reference: Reference, force: Array | None, rate: Array | None, factor: Array | None
-    ) -> tuple[Array, Array]:
-        """y1, y2, v1, v2 (4, N), and what the law is told (TOLD, N), from signals whose shapes are checked."""
-        lanes = lanes_of(measurement, reference)
-        told = feedforward_rows(lanes, force, rate, factor)
-        if measurement.sampled:
-            return np.ascontiguousarray(self._observer.update(measurement)), told
-        return measured_joints(measurement, self._p), told

@@ -13,17 +13,32 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import feedforward_rows, require_stiffness
-from birthsim_env.loop.signals import Mask, Measurement, Reference
+from baselines.estimation.rows import Motion, Point
+from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, rows
 
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""
 
 MOVING_SPEED = 1e-3
 """m/s; assumed: a slower reference lets the pistons rest."""
+
+
+class Offset(Rows):
+    """How far the motion is from the target; zero at a new start."""
+
+    position = rows("x y", "m", "from the target")
+    velocity = rows("vx vy", "m/s", "relative to it")
+
+
+class Compliance(Numbers):
+    """What gives way."""
+
+    mass = number("kg", "mass")
+    damping_ratio = number("1", "damping ratio zeta")
+    period = number("s", "control period")
 
 
 @helper
@@ -49,11 +64,11 @@ def is_stiffer(kxx: float, kyy: float, kxy: float, least: float) -> bool:
 
 @helper
 def derivatives(
-    offset: Array, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
+    offset: Offset, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
 ) -> tuple[float, float, float, float]:
-    """Acceleration and jerk of the offset (4, N) of lane ``i`` under a held force; all over the mass."""
+    """Acceleration and jerk of the offset of lane ``i`` under a held force; all over the mass."""
     # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
-    x, y, vx, vy = offset[0, i], offset[1, i], offset[2, i], offset[3, i]
+    x, y, vx, vy = offset.position[0, i], offset.position[1, i], offset.velocity[0, i], offset.velocity[1, i]
     ax, ay = fx - bxx * vx - bxy * vy - kxx * x - kxy * y, fy - bxy * vx - byy * vy - kxy * x - kyy * y
     jx, jy = -bxx * ax - bxy * ay - kxx * vx - kxy * vy, -bxy * ax - byy * ay - kxy * vx - kyy * vy
     return ax, ay, jx, jy
@@ -61,111 +76,72 @@ def derivatives(
 
 @helper
 def advance(
-    offset: Array, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
+    offset: Offset, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
     kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float,
 ) -> None:  # fmt: skip
-    """Carries the offset (4, N) of lane ``i`` on by one period."""
-    vx, vy = offset[2, i], offset[3, i]
+    """Carries the offset of lane ``i`` on by one period."""
+    vx, vy = offset.velocity[0, i], offset.velocity[1, i]
     sx, sy = -bxx * jx - bxy * jy - kxx * ax - kxy * ay, -bxy * jx - byy * jy - kxy * ax - kyy * ay
     # Taylor's series to the third order: the system is linear and w x period is below 0.06.
-    offset[0, i] += period * (vx + period * (ax / 2.0 + period * jx / 6.0))
-    offset[1, i] += period * (vy + period * (ay / 2.0 + period * jy / 6.0))
-    offset[2, i] += period * (ax + period * (jx / 2.0 + period * sx / 6.0))
-    offset[3, i] += period * (ay + period * (jy / 2.0 + period * sy / 6.0))
+    offset.position[0, i] += period * (vx + period * (ax / 2.0 + period * jx / 6.0))
+    offset.position[1, i] += period * (vy + period * (ay / 2.0 + period * jy / 6.0))
+    offset.velocity[0, i] += period * (ax + period * (jx / 2.0 + period * sx / 6.0))
+    offset.velocity[1, i] += period * (ay + period * (jy / 2.0 + period * sy / 6.0))
 
 
 @helper
-def give_way(
-    offset: Array, reference: Array, force: Array, mass: float, ratio: float, period: float, factor: Array, motion: Array
-) -> None:  # fmt: skip
-    """``offset`` (4, N): xr - xt and its rate, zero at a new start, carried on by one period; ``factor`` (N,) of the
-    damping, at least 1. ``motion`` (8, N)."""
-    for i in range(offset.shape[1]):
-        kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
-        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio * max(1.0, factor[i]))
+def give_way(offset: Offset, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
+    """Writes ``motion`` and carries ``offset`` on by one period; returns how many setpoints are not positive definite.
+
+    ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1.
+    """
+    missed, mass = 0, about.mass
+    for i in range(factor.shape[0]):
+        stiffer = is_stiffer(asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i], 0.0)
+        missed += 0 if stiffer else 1
+    for i in range(factor.shape[0]):
+        kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, about.damping_ratio * max(1.0, factor[i]))
         ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
-        motion[0, i], motion[1, i] = reference[0, i] + offset[0, i], reference[1, i] + offset[1, i]
-        motion[2, i], motion[3, i] = reference[2, i] + offset[2, i], reference[3, i] + offset[3, i]
-        motion[4, i], motion[5, i] = reference[4, i] + ax, reference[5, i] + ay
-        motion[6, i], motion[7, i] = reference[6, i] + jx, reference[7, i] + jy
-        advance(offset, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+        for axis in range(2):
+            motion.position[axis, i] = asked.position[axis, i] + offset.position[axis, i]
+            motion.velocity[axis, i] = asked.velocity[axis, i] + offset.velocity[axis, i]
+        motion.acceleration[0, i], motion.acceleration[1, i] = asked.acceleration[0, i] + ax, asked.acceleration[1, i] + ay
+        motion.jerk[0, i], motion.jerk[1, i] = asked.jerk[0, i] + jx, asked.jerk[1, i] + jy
+        advance(offset, i, about.period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+    return missed
 
 
 @helper
-def mark_moving(motion: Array, moving: Array) -> None:
-    """``moving`` (N,) gets 1 where the velocity of ``motion`` (4 or more, N), m/s, is above ``MOVING_SPEED``, else 0."""
-    for i in range(motion.shape[1]):
-        moving[i] = 1.0 if motion[2, i] * motion[2, i] + motion[3, i] * motion[3, i] > MOVING_SPEED * MOVING_SPEED else 0.0
+def mark_moving(motion: Motion, moving: Array) -> None:
+    """``moving`` (N,) gets 1 where the velocity of ``motion``, m/s, is above ``MOVING_SPEED``, else 0."""
+    for i in range(moving.shape[0]):
+        vx, vy = motion.velocity[0, i], motion.velocity[1, i]
+        moving[i] = 1.0 if vx * vx + vy * vy > MOVING_SPEED * MOVING_SPEED else 0.0
 
 
 @kernel
-def _forecast(
-    offset: Array,
-    reference: Array,
-    force: Array,
-    mass: float,
-    ratio: float,
-    period: float,
-    ticks: NDArray[np.int64],
-    ahead: Array,
-) -> None:
-    """``offset`` (4, N) one period from now; ``ticks`` (M,) increasing; writes ``ahead`` (M, 4, N): x, y, vx, vy."""
-    z = offset.copy()
-    for i in range(offset.shape[1]):
-        kxx, kyy, kxy = reference[8, i] / mass, reference[9, i] / mass, reference[14, i] / mass
-        bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
+def forecast(
+    offset: Offset, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
+) -> None:  # fmt: skip
+    """Writes ``ahead`` (M, 4, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
+
+    The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
+    from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
+    """
+    z, mass, period = Offset(offset.rows.copy()), about.mass, about.period
+    for i in range(force.shape[1]):
+        kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
+        bxx, byy, bxy = damping(kxx, kyy, kxy, about.damping_ratio)
         tick = 1
         for k in range(len(ticks)):
             while tick < ticks[k]:
                 ax, ay, jx, jy = derivatives(z, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
                 advance(z, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
                 tick += 1
-            t = tick * period
+            t, now = tick * period, Point(ahead[k])
             for axis in range(2):
-                v, a, j = reference[2 + axis, i], reference[4 + axis, i], reference[6 + axis, i]
-                ahead[k, axis, i] = reference[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0)) + z[axis, i]
-                ahead[k, 2 + axis, i] = v + t * (a + t * j / 2.0) + z[2 + axis, i]
-
-
-class Admittance:
-    """The reference motion of N lanes, one control period at a time.
-
-    Arguments: ``parameters``, the rig as believed (its mass and control period); ``damping_ratio``, zeta, more than 0.
-    """
-
-    def __init__(self, parameters: Parameters, damping_ratio: float = DAMPING_RATIO) -> None:
-        if not (math.isfinite(damping_ratio) and damping_ratio > 0):
-            raise ValueError(f"damping_ratio = {damping_ratio!r}; allowed: a positive number")
-        self._numbers = (parameters.mechanics.mass, float(damping_ratio), parameters.electronics.control_period)
-        self._offset: Array = np.empty((4, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Start anew on the target: all lanes, or those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._offset = np.empty((4, 0))
-        elif self._offset.shape[1]:
-            self._offset[:, lanes] = 0.0
-
-    def update(self, measurement: Measurement, reference: Reference, damping_factor: Array | None = None) -> Array:
-        """Where the end effector should be now, (8, N): x, y and three derivatives, SI; the jerk without the force's rate.
-
-        Called once per control period, with signals over N lanes. ``damping_factor`` (N,) multiplies B; below 1 it is 1. Raises
-        ``ValueError`` for a stiffness that is not positive definite, and for a factor of another shape.
-        """
-        require_stiffness(reference, 0.0)
-        lanes = reference.rows.shape[1]
-        if self._offset.shape[1] != lanes:
-            self._offset = np.zeros((4, lanes))
-        motion, factor = np.empty((8, lanes)), feedforward_rows(lanes, None, None, damping_factor)[4]
-        give_way(self._offset, reference.rows, measurement.user_force, *self._numbers, factor, motion)
-        return motion
-
-    def forecast(self, reference: Reference, force: Array, ticks: NDArray[np.int64]) -> Array:
-        """x, y (m), vx, vy (m/s) of the motion so many periods after the last ``update``, (M, 4, N), if nothing new happens:
-        the force (2, N), N, and the stiffness stay, and the target goes on with the jerk that it has.
-
-        ``ticks`` (M,) are increasing whole numbers from 1 on.
-        """
-        ahead = np.empty((len(ticks), 4, reference.rows.shape[1]))
-        _forecast(self._offset, reference.rows, force, *self._numbers, ticks, ahead)
-        return ahead
+                v, a, j = asked.velocity[axis, i], asked.acceleration[axis, i], asked.jerk[axis, i]
+                x = asked.position[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0))
+                now.position[axis, i] = x + z.position[axis, i]
+                now.velocity[axis, i] = v + t * (a + t * j / 2.0) + z.velocity[axis, i]

@@ -8,15 +8,14 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from __future__ import annotations
 
-import numpy as np
-
+from baselines.estimation.rows import Joints
 from baselines.valve_inverse import driving_flows
-from birthsim_env.loop.signals import Mask
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, rows
 
 
 @helper
@@ -37,12 +36,23 @@ def predicted_pressure(
     return expected
 
 
+class Chambers(Rows):
+    """What is believed of valves and chambers P1, N1, P2, N2."""
+
+    spool = rows(4, "1", "opening of the spool")
+    pressure = rows(4, "Pa", "pressure of the chamber, absolute")
+    opening = rows(4, "1", "opening that was commanded")
+
+
 @helper
 def observe(
-    spools: Array, pressures: Array, openings: Array, measured: Array, joints: Array, p: Array, period: float, fraction: float,
-    fresh: Array,
+    chambers: Chambers, measured: Array, joints: Joints, p: Array, period: float, fraction: float, fresh: Array
 ) -> None:  # fmt: skip
-    """Carries ``spools`` (4, N) and ``pressures`` (4, N) on by one period, in which ``openings`` (4, N) were commanded."""
+    """Carries ``chambers`` on by one period to whose end pressures (4, N), Pa, were ``measured``, with a trust ``fraction`` in
+    them.
+
+    ``joints`` are those of its start. Where ``fresh`` (N,) is 1 valves are shut and pressures as measured.
+    """
     kept = exact.exp(-period / p[at.TAU])
     # Of the way that is left to the command, the mean over the period.
     mean = (1.0 - kept) * p[at.TAU] / period
@@ -51,50 +61,13 @@ def observe(
         half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         area_p, area_n = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         area = area_p if chamber % 2 == 0 else area_n
-        for i in range(spools.shape[1]):
-            away = spools[chamber, i] - openings[chamber, i]
+        for i in range(fresh.shape[0]):
+            opening = chambers.opening[chamber, i]
+            away = chambers.spool[chamber, i] - opening
             expected = predicted_pressure(
-                pressures[chamber, i], openings[chamber, i] + mean * away, area, half + sign * joints[cylinder, i],
-                sign * joints[2 + cylinder, i], period, p,
+                chambers.pressure[chamber, i], opening + mean * away, area, half + sign * joints.position[cylinder, i],
+                sign * joints.speed[cylinder, i], period, p,
             )  # fmt: skip
-            new = fresh[i] > 0.0
-            pressures[chamber, i] = (
-                measured[chamber, i] if new else fraction * measured[chamber, i] + (1.0 - fraction) * expected
-            )
-            spools[chamber, i] = 0.0 if new else openings[chamber, i] + kept * away
-
-
-class ChamberObserver:
-    """Spools and chamber pressures of N lanes as they are believed to be, one control period at a time.
-
-    Arguments: the control ``period``, s, the rig (PARAMETERS,), and ``bandwidth``, w in 1/s, infinite for exact cells.
-    ``spools`` (4, N) start shut; ``openings`` (4, N), which the next ``update`` takes for commanded, are for the controller to
-    fill.
-    """
-
-    def __init__(self, period: float, lane_parameters: Array, bandwidth: float) -> None:
-        self._p, self._period, self._fraction = lane_parameters, period, 1.0 - exact.number("exp", -bandwidth * period)
-        self.spools: Array = np.empty((4, 0))
-        self.openings: Array = np.empty((4, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self.spools = np.empty((4, 0))
-        elif self.spools.shape[1]:
-            self._fresh[lanes] = 1.0
-
-    def update(self, measured: Array, joints: Array) -> Array:
-        """Pressures (4, N), Pa, after one more period, from those ``measured`` (4, N) at its end.
-
-        ``joints`` (4, N): y1, y2 (m), v1, v2 (m/s) at its start.
-        """
-        lanes = measured.shape[1]
-        if self.spools.shape[1] != lanes:
-            self.spools, self.openings = np.zeros((4, lanes)), np.zeros((4, lanes))
-            self._pressures, self._fresh = np.zeros((4, lanes)), np.ones(lanes)
-        observe(
-            self.spools, self._pressures, self.openings, measured, joints, self._p, self._period, self._fraction, self._fresh
-        )  # fmt: skip
-        self._fresh[:] = 0.0
-        return self._pressures
+            new, shown = fresh[i] > 0.0, measured[chamber, i]
+            chambers.pressure[chamber, i] = shown if new else fraction * shown + (1.0 - fraction) * expected
+            chambers.spool[chamber, i] = 0.0 if new else opening + kept * away

@@ -10,22 +10,19 @@ from __future__ import annotations
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 
-ROWS = 2
-"""The bias of both axes, N."""
-
 TIME = 0.25
 """s; assumed: over which the force is averaged. Noise of 0.1 N at 1 kHz leaves 6 mN."""
 
 
 @helper
-def tare(memory: Array, time: Array, measured: Array, most: float, period: float, force: Array) -> None:
-    """Writes ``force`` (2, N), N: ``measured`` (2, N) less its mean until ``TIME``, of which +-``most`` N count."""
+def tare(bias: Array, time: Array, measured: Array, most: float, period: float, force: Array) -> None:
+    """Writes ``force`` (2, N), N: ``measured`` (2, N) less its mean until ``TIME``, of which +-``most`` N count, ``bias``."""
     for i in range(time.shape[0]):
         samples = time[i] / period + 1.0
         for axis in range(2):
             if samples < 1.5:
-                memory[axis, i] = 0.0
+                bias[axis, i] = 0.0
             if time[i] < TIME:
-                told = max(-most, min(most, measured[axis, i]))
-                memory[axis, i] += (told - memory[axis, i]) / samples
-            force[axis, i] = measured[axis, i] - memory[axis, i]
+                counted = max(-most, min(most, measured[axis, i]))
+                bias[axis, i] += (counted - bias[axis, i]) / samples
+            force[axis, i] = measured[axis, i] - bias[axis, i]

@@ -11,14 +11,12 @@ mass and of the pressure cells.
 from __future__ import annotations
 
 from baselines.estimation import force_bias
+from baselines.estimation.rows import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-
-ROWS = 8
-"""Deflections of both pistons' bristles, m, their positions a period ago, m, the force low-passed and its bias, N."""
-BRISTLE, BEFORE, FORCE, BIAS = 0, 2, 4, 6
+from birthsim_env.physics.compiled.records import Rows, rows
 
 FRICTION_FRACTION = 0.9
 """a; assumed."""
@@ -30,29 +28,35 @@ MOST_BIAS = 60.0
 """N; assumed: 2 kg of mass and 25 N of friction are below it."""
 
 
-@helper
-def observe(
-    memory: Array, time: Array, joints: Array, unexplained: Array, p: Array, period: float, fresh: Array, force: Array
-) -> None:  # fmt: skip
-    """Carries ``memory`` (ROWS, N) on by one period and writes ``force`` (2, N), N, of the hand.
+class Hand(Rows):
+    """What the observer remembers, and what it found."""
 
-    ``joints`` (4, N): y1, y2 (m), v1, v2 (m/s); ``unexplained`` (2, N), N, is R.
-    """
+    bristle = rows("z1 z2", "m", "deflection of a piston's bristles")
+    before = rows("y1 y2", "m", "position of a piston a period ago")
+    filtered = rows("filtered_x filtered_y", "N", "force, low-passed")
+    bias = rows("bias_x bias_y", "N", "bias of the force")
+    force = rows("x y", "N", "force of the hand")
+
+
+@helper
+def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Array, period: float, fresh: Array) -> None:
+    """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R."""
     share = period / (1.0 / QUICKNESS + period)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints[0, i], joints[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
-        )
+            joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
+            p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
+        )  # fmt: skip
+        new = fresh[i] > 0.0
         for cylinder in range(2):
-            new = fresh[i] > 0.0
             most = (p[at.FC1] if cylinder == 0 else p[at.FC2]) / p[at.BRISTLE_S0]
-            moved = joints[cylinder, i] - memory[BEFORE + cylinder, i]
-            bristle = 0.0 if new else max(-most, min(most, memory[BRISTLE + cylinder, i] + moved))
-            memory[BRISTLE + cylinder, i], memory[BEFORE + cylinder, i] = bristle, joints[cylinder, i]
-        f1 = unexplained[0, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * memory[BRISTLE, i]
-        f2 = unexplained[1, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * memory[BRISTLE + 1, i]
+            moved = joints.position[cylinder, i] - hand.before[cylinder, i]
+            bristle = 0.0 if new else max(-most, min(most, hand.bristle[cylinder, i] + moved))
+            hand.bristle[cylinder, i], hand.before[cylinder, i] = bristle, joints.position[cylinder, i]
+        f1 = unexplained[0, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[0, i]
+        f2 = unexplained[1, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[1, i]
         across, along = -f1 / kappa, f2
         x, y = across * cosine + along * sine, across * sine - along * cosine
-        memory[FORCE, i] = 0.0 if fresh[i] > 0.0 else memory[FORCE, i] + share * (x - memory[FORCE, i])
-        memory[FORCE + 1, i] = 0.0 if fresh[i] > 0.0 else memory[FORCE + 1, i] + share * (y - memory[FORCE + 1, i])
-    force_bias.tare(memory[BIAS:], time, memory[FORCE:BIAS], MOST_BIAS, period, force)
+        hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
+        hand.filtered[1, i] = 0.0 if new else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
+    force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, period, hand.force)

@@ -9,12 +9,11 @@ what the observer found besides, so that it does not depend on what has been lea
 
 from __future__ import annotations
 
+from baselines.estimation.rows import Belief, Joints
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-
-ROWS = 6
-"""Levels of both pistons, offsets, N, and low-passed u."""
-LEVEL, OFFSET, SLIDES = 0, 2, 4
+from birthsim_env.physics.compiled.records import Rows, rows
 
 LAG = 0.02
 """s; assumed: u is low-passed as the observer delays R."""
@@ -29,27 +28,35 @@ LEAST, MOST = 0.2, 3.0
 """Bounds of the level; assumed."""
 
 
+class Friction(Rows):
+    """What is learned of both pistons; the level is 1 at a new start."""
+
+    level = rows("level1 level2", "1", "friction in units of that believed")
+    offset = rows("offset1 offset2", "N", "unexplained force that knows no direction")
+    sliding = rows("u1 u2", "1", "low-passed friction along the reference, in units of Fc")
+
+
 @helper
 def learn(
-    memory: Array, drag: Array, coulomb1: float, coulomb2: float, joints: Array, unexplained: Array, period: float, rate: float,
-    fresh: Array,
+    friction: Friction, drag: Array, joints: Joints, unexplained: Array, rate: float, about: Belief, fresh: Array
 ) -> None:  # fmt: skip
-    """Carries ``memory`` (ROWS, N) on by one period.
+    """Carries ``friction`` on by one period.
 
     ``drag`` (2, N), N, is the believed friction along the reference; ``unexplained`` (2, N), N, is R; ``rate``, a in 1/s.
     """
-    for i in range(drag.shape[1]):
+    p, period = about.rig, about.period
+    for i in range(fresh.shape[0]):
         for cylinder in range(2):
-            coulomb = coulomb1 if cylinder == 0 else coulomb2
+            coulomb = p[at.FC1] if cylinder == 0 else p[at.FC2]
             if fresh[i] > 0.0:
-                memory[LEVEL + cylinder, i], memory[OFFSET + cylinder, i], memory[SLIDES + cylinder, i] = 1.0, 0.0, 0.0
+                friction.level[cylinder, i], friction.offset[cylinder, i], friction.sliding[cylinder, i] = 1.0, 0.0, 0.0
             if coulomb <= 0.0:
                 continue
             u = max(-1.0, min(1.0, drag[cylinder, i] / coulomb))
-            memory[SLIDES + cylinder, i] += period / (LAG + period) * (u - memory[SLIDES + cylinder, i])
-            slides = memory[SLIDES + cylinder, i]
-            if abs(slides) > SLIDING and slides * joints[2 + cylinder, i] > SPEED * abs(slides):
-                level, offset = memory[LEVEL + cylinder, i], memory[OFFSET + cylinder, i]
+            friction.sliding[cylinder, i] += period / (LAG + period) * (u - friction.sliding[cylinder, i])
+            slides = friction.sliding[cylinder, i]
+            if abs(slides) > SLIDING and slides * joints.speed[cylinder, i] > SPEED * abs(slides):
+                level, offset = friction.level[cylinder, i], friction.offset[cylinder, i]
                 error = unexplained[cylinder, i] + level * coulomb * slides + offset
-                memory[LEVEL + cylinder, i] = max(LEAST, min(MOST, level - period * rate * error * slides / coulomb))
-                memory[OFFSET + cylinder, i] = offset - period * rate * error
+                friction.level[cylinder, i] = max(LEAST, min(MOST, level - period * rate * error * slides / coulomb))
+                friction.offset[cylinder, i] = offset - period * rate * error

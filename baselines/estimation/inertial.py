@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.estimation.rows import Point
 from baselines.staged import LawStage
-from birthsim_env.loop.rows import ACCELERATION, HANDED, POSITION, POSITION_TIME, SEEN, TIME, VELOCITY
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen, Signals
+from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 BANDWIDTH = 12.0
@@ -29,57 +30,64 @@ BANDWIDTH = 12.0
 START, START_TIME = 50.0, 0.15
 """1/s and s; assumed: at a start, where bias and speed are unknown, w is larger by so much, which decays with this time."""
 
-X, V, BIAS, FRESH, LAST, SLOT, BEGAN, HISTORY = 0, 2, 4, 6, 7, 8, 9, 10
-"""Rows at which parts of the memory begin: x, y (m); their rates; biases, m/s2; 1 at a new start; time of the newest sample, s;
-where in the history the present stands; time of the start, s; past x, y, a ring."""
 
-PERIOD, WIDTH, ROWS, CONSTANTS = range(4)
-"""Constants of the stage: control period, s; w, 1/s; rows of the memory. ``CONSTANTS`` is their number."""
+class Memory(Rows):
+    """What the observer remembers."""
+
+    position = rows("x y", "m", "position")
+    velocity = rows("vx vy", "m/s", "velocity")
+    bias = rows("bx by", "m/s2", "bias of the acceleration")
+    fresh = row("1", "1 at a new start")
+    newest = row("s", "time of the newest sample")
+    slot = row("1", "where in the past the present stands")
+    began = row("s", "time of the start")
+    past = rows(0, "m", "x, y of the last periods in turns, a ring")
 
 
-def memory_rows(rig: Parameters) -> int:
-    """Rows of the memory that a rig's tracker asks for."""
-    board = rig.electronics
-    return HISTORY + 2 * (int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4)
+class Gains(Numbers):
+    """Constants of the stage."""
+
+    period = number("s", "control period")
+    bandwidth = number("1/s", "bandwidth w")
+    rows_of_memory = number("1", "rows of the memory")
 
 
 @helper
-def observe(
-    memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, acceleration: Array, period: float,
-    bandwidth: float, motion: Array,
-) -> None:  # fmt: skip
-    """Carries ``memory`` (M, N) on by one period and writes ``motion`` (4, N): x, y (m), vx, vy (m/s) now.
+def observe(memory: Memory, signals: Signals, about: Gains, point: Point) -> None:
+    """Carries ``memory`` on by one period and writes ``point``, where the end effector is now.
 
-    ``velocity`` (2, N), m/s, counts at a new start only.
+    The measured velocity counts at a new start only.
     """
-    depth = (memory.shape[0] - HISTORY) // 2
-    for i in range(time.shape[0]):
-        slot = (int(memory[SLOT, i]) + 1) % depth
-        sampled, fresh = position_time[i] - memory[LAST, i], memory[FRESH, i] > 0.0
+    past, period = memory.past, about.period
+    depth = past.shape[0] // 2
+    for i in range(signals.time.shape[0]):
+        time, slot = signals.time[i], (int(memory.slot[i]) + 1) % depth
+        sampled, fresh = signals.position_time[i] - memory.newest[i], memory.fresh[i] > 0.0
         if fresh:
-            memory[BEGAN, i] = time[i]
+            memory.began[i] = time
         # The memory goes no further back than the rig's own description of its tracker.
-        age = min(time[i] - position_time[i], (depth - 2) * period)
-        memory[SLOT, i], memory[LAST, i], memory[FRESH, i] = slot, position_time[i], 0.0
+        age = min(time - signals.position_time[i], (depth - 2) * period)
+        memory.slot[i], memory.newest[i], memory.fresh[i] = slot, signals.position_time[i], 0.0
         periods = age / period
         back = int(periods)
         part = periods - back
-        width = bandwidth + START * exact.exp(-(time[i] - memory[BEGAN, i]) / START_TIME)
+        width = about.bandwidth + START * exact.exp(-(time - memory.began[i]) / START_TIME)
         kept = exact.exp(-width * max(sampled, 0.0))
         for axis in range(2):
             if fresh:
-                memory[X + axis, i], memory[V + axis, i], memory[BIAS + axis, i] = position[axis, i], velocity[axis, i], 0.0
+                memory.position[axis, i], memory.velocity[axis, i] = signals.position[axis, i], signals.velocity[axis, i]
+                memory.bias[axis, i] = 0.0
                 for k in range(depth):
-                    memory[HISTORY + 2 * k + axis, i] = position[axis, i]
+                    past[2 * k + axis, i] = signals.position[axis, i]
             else:
-                rate = acceleration[axis, i] - memory[BIAS + axis, i]
-                memory[X + axis, i] += period * (memory[V + axis, i] + 0.5 * period * rate)
-                memory[V + axis, i] += period * rate
-                memory[HISTORY + 2 * slot + axis, i] = memory[X + axis, i]
+                rate = signals.acceleration[axis, i] - memory.bias[axis, i]
+                memory.position[axis, i] += period * (memory.velocity[axis, i] + 0.5 * period * rate)
+                memory.velocity[axis, i] += period * rate
+                past[2 * slot + axis, i] = memory.position[axis, i]
             if sampled > 0.0 and not fresh:
-                newer = memory[HISTORY + 2 * ((slot - back) % depth) + axis, i]
-                older = memory[HISTORY + 2 * ((slot - back - 1) % depth) + axis, i]
-                innovation = position[axis, i] - (newer + part * (older - newer))
+                newer = past[2 * ((slot - back) % depth) + axis, i]
+                older = past[2 * ((slot - back - 1) % depth) + axis, i]
+                innovation = signals.position[axis, i] - (newer + part * (older - newer))
                 to_position = 1.0 - kept**3
                 to_speed = 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
                 to_rate = (1.0 - kept) ** 3 / sampled**2
@@ -87,28 +95,26 @@ def observe(
                 for k in range(depth):
                     since = age - k * period
                     change = to_position + since * (to_speed + 0.5 * since * to_rate)
-                    memory[HISTORY + 2 * ((slot - k) % depth) + axis, i] += change * innovation
-                memory[X + axis, i] = memory[HISTORY + 2 * slot + axis, i]
-                memory[V + axis, i] += (to_speed + to_rate * age) * innovation
-                memory[BIAS + axis, i] -= to_rate * innovation
-            motion[axis, i], motion[2 + axis, i] = memory[X + axis, i], memory[V + axis, i]
+                    past[2 * ((slot - k) % depth) + axis, i] += change * innovation
+                memory.position[axis, i] = past[2 * slot + axis, i]
+                memory.velocity[axis, i] += (to_speed + to_rate * age) * innovation
+                memory.bias[axis, i] -= to_rate * innovation
+            point.position[axis, i], point.velocity[axis, i] = memory.position[axis, i], memory.velocity[axis, i]
 
 
 @kernel
-def stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Writes x, y, vx, vy to the first rows of ``HANDED``."""
-    s, about = block(seen, SEEN), numbers(constants, CONSTANTS)
-    observe(
-        block(memory, int(about[ROWS]))[:, :n], s[TIME, :n], s[POSITION:VELOCITY, :n], s[POSITION_TIME, :n],
-        s[VELOCITY:POSITION_TIME, :n], s[ACCELERATION : ACCELERATION + 2, :n], about[PERIOD], about[WIDTH],
-        s[HANDED : HANDED + 4, :n],
-    )  # fmt: skip
+def stage(world: int, seen: Seen, memory: int, about: Gains, tables: int, lane: int, n: int) -> int:
+    """Writes a ``Point`` to the first rows that are handed on."""
+    signals = Seen(seen.rows[:, :n])
+    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+    observe(own, signals, about, Point(signals.handed[: Point.size]))
     return 0
 
 
 def law_stage(rig: Parameters) -> LawStage:
-    """The stage for a rig as believed."""
-    rows = memory_rows(rig)
-    fresh = np.zeros(rows)
-    fresh[FRESH] = 1.0
-    return LawStage(stage, np.array([rig.electronics.control_period, BANDWIDTH, rows]), fresh, feels=True)
+    """The stage for a rig as believed, which remembers as much as its tracker asks for."""
+    board = rig.electronics
+    periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4
+    fresh = np.concatenate([Memory.lane(fresh=1.0), np.zeros(2 * periods)])
+    about = Gains.numbers(period=board.control_period, bandwidth=BANDWIDTH, rows_of_memory=len(fresh))
+    return LawStage(stage, about, fresh, feels=True)

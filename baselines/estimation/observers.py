@@ -20,14 +20,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from birthsim_env.loop.signals import Mask, Measurement
+from baselines.estimation.disturbance_observer import accelerations
+from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from birthsim_env.loop.rows import Signals
+from birthsim_env.loop.signals import Measurement
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.inverse_kinematics import piston_motion
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.inverse_kinematics import piston_motion, pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
 BANDWIDTH = 70.0
@@ -59,186 +61,123 @@ STIR = 1.9
 """Low-passed innovation that ends a rest, in standard deviations of the position noise: 4.5 of the low-passed noise."""
 
 
-ESTIMATE, REST, INNOVATION, RELUCTANT, FRESH, LAST, SLOT, HISTORY = 0, 6, 8, 10, 12, 13, 14, 15
-"""Rows at which parts of an observer's memory begin: y1, y2, v1, v2, d1, d2; how far each piston rests, 0 to 1; low-passed
-innovations, m; factors of ``REST_TIME``; 1 at a new start; time of the newest sample, s; where in the history the present
-stands; past y1, y2, a ring."""
+@helper
+def begin(pistons: Pistons, i: int, point: Point, p: Array, joints: Joints) -> None:
+    """Starts lane ``i`` anew where the one lane of ``point`` places the pistons; ``joints`` is scratch."""
+    past = pistons.past
+    piston_motion(point.rows, p, joints.rows, 1)
+    pistons.fresh[i] = 0.0
+    for cylinder in range(2):
+        pistons.position[cylinder, i], pistons.speed[cylinder, i] = joints.position[cylinder, 0], joints.speed[cylinder, 0]
+        pistons.disturbance[cylinder, i], pistons.rest[cylinder, i], pistons.innovation[cylinder, i] = 0.0, 0.0, 0.0
+        pistons.reluctance[cylinder, i] = 1.0
+        for k in range(past.shape[0] // 2):
+            past[2 * k + cylinder, i] = joints.position[cylinder, 0]
 
 
 @helper
-def observe(
-    memory: Array, time: Array, position: Array, position_time: Array, velocity: Array, pressures: Array, p: Array,
-    period: float, bandwidth: float, noise: float, force: Array, believed: Array, moving: Array,
-) -> None:  # fmt: skip
-    """One control period; carries ``memory`` (M, N) on.
+def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Array, period: float) -> float:
+    """Carries positions and speeds of lane ``i`` on by one period of the model; returns kappa where it began."""
+    position, speed = pistons.position, pistons.speed
+    y1, y2, v1, v2 = position[0, i], position[1, i], speed[0, i], speed[1, i]
+    a1, a2, kappa = accelerations(y1, y2, v1, v2, i, pressures, given, p)
+    a1, a2 = a1 + pistons.disturbance[0, i], a2 + pistons.disturbance[1, i]
+    position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
+    position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
+    speed[0, i], speed[1, i] = v1 + period * a1, v2 + period * a2
+    return kappa
 
-    ``force`` (2, N) the user's, N, and ``believed`` (2, N), N along the pistons, as known; ``moving`` (N,) 1 where no piston
-    may rest.
+
+@helper
+def rest(pistons: Pistons, i: int, moving: float, period: float, held: float) -> None:
+    """Brakes resting pistons of lane ``i``, and finds how far they rest; ``held`` is exp(-wr period)."""
+    for cylinder in range(2):
+        speed, resting, reluctance = pistons.speed[cylinder, i], pistons.rest[cylinder, i], pistons.reluctance[cylinder, i]
+        pistons.speed[cylinder, i] = speed - resting * (1.0 - held * held) * speed
+        pistons.disturbance[cylinder, i] -= resting * (1.0 - held) ** 2 / period * speed
+        reluctance += (1.0 - reluctance) * min(period / TRUST_TIME, 1.0)
+        settling = min(period / (REST_TIME * reluctance), 1.0)
+        slow = abs(pistons.speed[cylinder, i]) < REST_SPEED
+        pistons.reluctance[cylinder, i] = reluctance
+        pistons.rest[cylinder, i] = (1.0 - moving) * (resting + (1.0 - resting) * settling if slow else resting)
+
+
+@helper
+def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float, about: Belief, explained: Array) -> None:
+    """Takes a sample: the pistons stood at the one lane of ``joints`` an ``age`` ago, ``sampled`` s after the last one.
+
+    A low-passed innovation beyond ``explained`` (2, 1), m, ends the rest of that piston.
     """
-    estimate, rest, innovations = memory[ESTIMATE:REST], memory[REST:INNOVATION], memory[INNOVATION:RELUCTANT]
-    reluctance, history = memory[RELUCTANT:FRESH], memory[HISTORY:]
-    depth, held = history.shape[0] // 2, exact.exp(-REST_BANDWIDTH * period)
-    motion, joints = scratch(4), scratch(4)
-    motion[2, 0], motion[3, 0] = 0.0, 0.0
-    for i in range(estimate.shape[1]):
-        slot = (int(memory[SLOT, i]) + 1) % depth
-        sampled = position_time[i] - memory[LAST, i]
+    past, slot, period = pistons.past, int(pistons.slot[i]), about.period
+    depth, periods = past.shape[0] // 2, age / period
+    back = min(int(periods), depth - 2)
+    part = min(periods - back, 1.0)
+    for cylinder in range(2):
+        newer = past[2 * ((slot - back) % depth) + cylinder, i]
+        older = past[2 * ((slot - back - 1) % depth) + cylinder, i]
+        innovation = joints.position[cylinder, 0] - (newer + part * (older - newer))
+        pistons.innovation[cylinder, i] += INNOVATION_FRACTION * (innovation - pistons.innovation[cylinder, i])
+        resting = pistons.rest[cylinder, i]
+        if abs(pistons.innovation[cylinder, i]) > explained[cylinder, 0]:
+            pistons.reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
+            pistons.rest[cylinder, i], resting = 0.0, 0.0
+        kept = exact.exp(-about.bandwidth * sampled)
+        to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
+        to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
+        to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
+        # What the sample says of its own instant is carried on to the present: late samples do not destabilise.
+        for k in range(depth):
+            since = age - k * period
+            change = to_position + since * (to_speed + 0.5 * since * to_disturbance)
+            past[2 * ((slot - k) % depth) + cylinder, i] += change * innovation
+        pistons.position[cylinder, i] = past[2 * slot + cylinder, i]
+        pistons.speed[cylinder, i] += (to_speed + to_disturbance * age) * innovation
+        pistons.disturbance[cylinder, i] += to_disturbance * innovation
+
+
+@helper
+def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, about: Belief) -> None:
+    """One control period of N lanes, in which positions are samples and pressures (4, N), Pa, are known."""
+    p, period, held = about.rig, about.period, exact.exp(-REST_BANDWIDTH * about.period)
+    past, point, joints, explained = pistons.past, Point(scratch(Point.size)), Joints(scratch(Joints.size)), scratch(2)
+    depth = past.shape[0] // 2
+    for i in range(signals.time.shape[0]):
+        slot = (int(pistons.slot[i]) + 1) % depth
+        sampled = signals.position_time[i] - pistons.newest[i]
         # The memory goes no further back than the rig's own description of its tracker.
-        age = min(time[i] - position_time[i], (depth - 1) * period)
-        memory[SLOT, i], memory[LAST, i] = slot, position_time[i]
-        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
-        if memory[FRESH, i] > 0.0:
-            memory[FRESH, i] = 0.0
-            motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
-            piston_motion(motion, p, joints, 1)
-            for cylinder in range(2):
-                estimate[cylinder, i] = joints[cylinder, 0]
-                estimate[2 + cylinder, i] = joints[2 + cylinder, 0]
-                estimate[4 + cylinder, i], rest[cylinder, i], innovations[cylinder, i] = 0.0, 0.0, 0.0
-                reluctance[cylinder, i] = 1.0
-                for k in range(depth):
-                    history[2 * k + cylinder, i] = joints[cylinder, 0]
+        age = min(signals.time[i] - signals.position_time[i], (depth - 1) * period)
+        pistons.slot[i], pistons.newest[i] = slot, signals.position_time[i]
+        for axis in range(2):
+            point.position[axis, 0], point.velocity[axis, 0] = signals.position[axis, i], signals.velocity[axis, i]
+        if pistons.fresh[i] > 0.0:
+            begin(pistons, i, point, p, joints)
             continue
-        y1, y2, v1, v2 = estimate[0, i], estimate[1, i], estimate[2, i], estimate[3, i]
-        r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
-        )
-        load1 = (
-            mechanics.piston_force(pressures[0, i], pressures[1, i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
-            - p[at.FV1] * v1
-            + mechanics.user_force1(force[0, i], force[1, i], kappa, sine, cosine)
-            + believed[0, i]
-        )
-        load2 = (
-            mechanics.piston_force(pressures[2, i], pressures[3, i], p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
-            - p[at.FV2] * v2
-            + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
-            + believed[1, i]
-        )
-        a1 = (
-            mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
-            + estimate[4, i]
-        )
-        a2 = mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY]) + estimate[5, i]
-        estimate[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
-        estimate[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
-        estimate[2, i] = v1 + period * a1
-        estimate[3, i] = v2 + period * a2
-        for cylinder in range(2):
-            speed, resting = estimate[2 + cylinder, i], rest[cylinder, i]
-            estimate[2 + cylinder, i] -= resting * (1.0 - held * held) * speed
-            estimate[4 + cylinder, i] -= resting * (1.0 - held) ** 2 / period * speed
-            slow = abs(estimate[2 + cylinder, i]) < REST_SPEED
-            reluctance[cylinder, i] += (1.0 - reluctance[cylinder, i]) * min(period / TRUST_TIME, 1.0)
-            settling = min(period / (REST_TIME * reluctance[cylinder, i]), 1.0)
-            rest[cylinder, i] = (1.0 - moving[i]) * (resting + (1.0 - resting) * settling if slow else resting)
-        history[2 * slot, i] = estimate[0, i]
-        history[2 * slot + 1, i] = estimate[1, i]
+        kappa = predict(pistons, i, pressures, given, p, period)
+        rest(pistons, i, given.moving[i], period, held)
+        past[2 * slot, i], past[2 * slot + 1, i] = pistons.position[0, i], pistons.position[1, i]
         if sampled > 0.0:
-            piston_motion(motion, p, joints, 1)
-            periods = age / period
-            back = min(int(periods), depth - 2)
-            part = min(periods - back, 1.0)
-            for cylinder in range(2):
-                newer = history[2 * ((slot - back) % depth) + cylinder, i]
-                older = history[2 * ((slot - back - 1) % depth) + cylinder, i]
-                innovation = joints[cylinder, 0] - (newer + part * (older - newer))
-                innovations[cylinder, i] += INNOVATION_FRACTION * (innovation - innovations[cylinder, i])
-                explained = STIR * noise / (kappa if cylinder == 0 else 1.0)
-                resting = rest[cylinder, i]
-                if abs(innovations[cylinder, i]) > explained:
-                    reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
-                    rest[cylinder, i], resting = 0.0, 0.0
-                kept = exact.exp(-bandwidth * sampled)
-                to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
-                to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
-                to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
-                # What the sample says of its own instant is carried on to the present: late samples do not destabilise.
-                for k in range(depth):
-                    since = age - k * period
-                    change = to_position + since * (to_speed + 0.5 * since * to_disturbance)
-                    history[2 * ((slot - k) % depth) + cylinder, i] += change * innovation
-                estimate[cylinder, i] = history[2 * slot + cylinder, i]
-                estimate[2 + cylinder, i] += (to_speed + to_disturbance * age) * innovation
-                estimate[4 + cylinder, i] += to_disturbance * innovation
-
-
-@kernel
-def _measured_joints(position: Array, velocity: Array, p: Array, joints: Array) -> None:
-    motion, one = np.empty((4, 1)), np.empty((4, 1))
-    for i in range(position.shape[1]):
-        motion[0, 0], motion[1, 0] = position[0, i], position[1, i]
-        motion[2, 0], motion[3, 0] = velocity[0, i], velocity[1, i]
-        piston_motion(motion, p, one, 1)
-        for row in range(4):
-            joints[row, i] = one[row, 0]
+            piston_motion(point.rows, p, joints.rows, 1)
+            explained[0, 0], explained[1, 0] = STIR * given.noise[i] / kappa, STIR * given.noise[i]
+            correct(pistons, i, joints, sampled, age, about, explained)
 
 
 def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
     """y1, y2 (m), v1, v2 (m/s), (4, N), where position and velocity are measured at every control period."""
-    joints = np.empty((4, measurement.position.shape[1]))
-    _measured_joints(measurement.position, measurement.velocity, lane_parameters, joints)
+    joints = np.empty((Joints.size, measurement.position.shape[1]))
+    pistons_at(np.concatenate([measurement.position, measurement.velocity]), lane_parameters, joints)
     return joints
 
 
-def memory_rows(parameters: Parameters) -> int:
-    """Rows of the memory that a rig's tracker asks for."""
-    board = parameters.electronics
-    return HISTORY + 2 * (int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4)
+def fresh_memory(rig: Parameters, sampled: bool) -> Array:
+    """``Pistons`` of a lane that starts, which remember as much as a rig's tracker asks for where positions are samples."""
+    board = rig.electronics
+    periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4 if sampled else 0
+    return np.concatenate([Pistons.lane(fresh=1.0), np.zeros(2 * periods)])
 
 
-class PistonObserver:
-    """Positions and speeds of both pistons, (4, N): y1, y2 (m), v1, v2 (m/s), from sampled positions.
-
-    After ``update``, ``disturbance`` (2, N), m/s2, is what accelerates the pistons without being known, and ``rest`` (2, N) how
-    far each of them is taken to rest, 0 to 1.
-    """
-
-    def __init__(self, parameters: Parameters, lane_parameters: Array, bandwidth: float = BANDWIDTH) -> None:
-        board = parameters.electronics
-        self._period = board.control_period
-        self._bandwidth, self._noise = bandwidth, board.position_noise
-        self._p = lane_parameters
-        self._rows = memory_rows(parameters)
-        self._memory: Array = np.empty((self._rows, 0))
-
-    @property
-    def disturbance(self) -> Array:
-        """d of both pistons, m/s2, (2, N)."""
-        return self._memory[ESTIMATE + 4 : REST]
-
-    @property
-    def rest(self) -> Array:
-        """How far each piston is taken to rest, 0 to 1, (2, N)."""
-        return self._memory[REST:INNOVATION]
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._memory = np.empty((self._rows, 0))
-        elif self._memory.shape[1]:
-            self._memory[FRESH, lanes] = 1.0
-
-    def update(
-        self,
-        measurement: Measurement,
-        force: Array | None = None,
-        believed: Array | None = None,
-        moving: Array | None = None,
-    ) -> Array:
-        """Take one control period's measurement (over N lanes) and return the estimate (4, N).
-
-        ``force`` (2, N), N, is the user's where it is measured; ``believed`` (2, N), N, acts along the pistons besides.
-        ``moving`` (N,) is 1 where the end effector is to move, else 0; without it no piston is taken to rest.
-        """
-        lanes = measurement.position.shape[1]
-        if self._memory.shape[1] != lanes:
-            self._memory = np.zeros((self._rows, lanes))
-            self._memory[FRESH] = 1.0
-        observe(
-            self._memory, measurement.time, measurement.position, measurement.position_time, measurement.velocity,
-            measurement.pressures, self._p, self._period, self._bandwidth, self._noise,
-            np.zeros((2, lanes)) if force is None else force, np.zeros((2, lanes)) if believed is None else believed,
-            np.ones(lanes) if moving is None else moving,
-        )  # fmt: skip
-        return self._memory[:4]
+def belief(rig: Parameters, bandwidth: float = BANDWIDTH) -> Array:
+    """``Belief`` in a rig."""
+    board = rig.electronics
+    return Belief.numbers(
+        period=board.control_period, bandwidth=bandwidth, noise=board.position_noise, rig=parameter_column(rig)
+    )

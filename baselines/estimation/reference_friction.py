@@ -6,9 +6,8 @@ It is there before an observer sees it, and since it never looks at the measured
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from birthsim_env.loop.signals import Mask
+from baselines.estimation.rows import Joints, Motion
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled import lanes as at
@@ -27,58 +26,28 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
 
 
 @helper
-def rub(motion: Array, p: Array, period: float, bristles: Array, drag: Array) -> None:
-    """Carries ``bristles`` (2, N) on by one period of ``motion`` (8, N) and writes what they hold back, ``drag`` (2, N), N."""
-    one, joints = scratch(4), scratch(4)
-    for i in range(motion.shape[1]):
-        for row in range(4):
-            one[row, 0] = motion[row, i]
-        piston_motion(one, p, joints, 1)
-        bristles[0, i] = bristle(bristles[0, i], joints[2, 0], p[at.FC1], p[at.FS1], p, period)
-        bristles[1, i] = bristle(bristles[1, i], joints[3, 0], p[at.FC2], p[at.FS2], p, period)
+def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -> None:
+    """Carries ``bristles`` (2, N) on by one period of ``motion`` and writes what they hold back, ``drag`` (2, N), N.
+
+    N is at most that of a block.
+    """
+    joints, lanes = Joints(scratch(Joints.size)), bristles.shape[1]
+    piston_motion(motion.rows, p, joints.rows, lanes)
+    for i in range(lanes):
+        bristles[0, i] = bristle(bristles[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, period)
+        bristles[1, i] = bristle(bristles[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, period)
         drag[0, i], drag[1, i] = p[at.BRISTLE_S0] * bristles[0, i], p[at.BRISTLE_S0] * bristles[1, i]
 
 
 @kernel
-def _forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
-    """``ahead`` (M, 4, N): x, y, vx, vy at the ends of the M ``steps``, s; writes ``drag`` (M, 2, N)."""
-    one, joints = np.empty((4, 1)), np.empty((4, 1))
-    for i in range(ahead.shape[2]):
-        z1, z2 = bristles[0, i], bristles[1, i]
-        for k in range(ahead.shape[0]):
-            for row in range(4):
-                one[row, 0] = ahead[k, row, i]
-            piston_motion(one, p, joints, 1)
-            z1 = bristle(z1, joints[2, 0], p[at.FC1], p[at.FS1], p, steps[k])
-            z2 = bristle(z2, joints[3, 0], p[at.FC2], p[at.FS2], p, steps[k])
-            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z1, p[at.BRISTLE_S0] * z2
-
-
-class ReferenceFriction:
-    """Dry friction of both pistons, N, (2, N), along a reference motion. Arguments: control period, s, rig (PARAMETERS,)."""
-
-    def __init__(self, period: float, lane_parameters: Array) -> None:
-        self._period, self._p = period, lane_parameters
-        self._bristles: Array = np.empty((2, 0))
-
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Relax the bristles of all lanes, or of those where ``lanes`` (N,) is True."""
-        if lanes is None:
-            self._bristles = np.empty((2, 0))
-        elif self._bristles.shape[1]:
-            self._bristles[:, lanes] = 0.0
-
-    def update(self, motion: Array) -> Array:
-        """Friction after one more period of ``motion`` (8, N), as ``Admittance.update`` gives it."""
-        lanes = motion.shape[1]
-        if self._bristles.shape[1] != lanes:
-            self._bristles = np.zeros((2, lanes))
-        drag = np.empty((2, lanes))
-        rub(motion, self._p, self._period, self._bristles, drag)
-        return drag
-
-    def forecast(self, ahead: Array, ticks: NDArray[np.int64]) -> Array:
-        """Friction, N, (M, 2, N), along the motion ``ahead`` (M, 4, N) that ``Admittance.forecast`` gives for these ticks."""
-        drag = np.empty((len(ticks), 2, ahead.shape[2]))
-        _forecast(ahead, self._p, self._period * np.diff(ticks, prepend=0), self._bristles, drag)
-        return drag
+def forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
+    """Writes the friction ``drag`` (M, 2, N), N, along a motion ``ahead`` (M, 4, N) with x, y, vx, vy at the ends of the M
+    ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them."""
+    z, lanes = bristles.copy(), bristles.shape[1]
+    joints = Joints(np.empty((Joints.size, lanes)))
+    for k in range(ahead.shape[0]):
+        piston_motion(ahead[k], p, joints.rows, lanes)
+        for i in range(lanes):
+            z[0, i] = bristle(z[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, steps[k])
+            z[1, i] = bristle(z[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, steps[k])
+            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z[0, i], p[at.BRISTLE_S0] * z[1, i]

@@ -4,97 +4,84 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.estimation.admittance import DAMPING_RATIO, give_way, is_stiffer, mark_moving
-from baselines.estimation.observers import BANDWIDTH, ESTIMATE, FRESH, memory_rows, observe
+from baselines.estimation.admittance import DAMPING_RATIO, Compliance, Offset, give_way, mark_moving
+from baselines.estimation.observers import belief, fresh_memory, observe
+from baselines.estimation.rows import Belief, Given, Joints, Motion, Pistons, Point
 from baselines.staged import LawStage
-from birthsim_env.loop.rows import (
-    ASKED,
-    DAMPING,
-    FEEDFORWARD,
-    HANDED,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
-    REFERENCE,
-    SEEN,
-    TIME,
-    USER_FORCE,
-    VELOCITY,
-)
-from birthsim_env.loop.stage import block, numbers, scratch
+from birthsim_env.loop.rows import HANDED, POSITION, Seen
+from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 
-MOTION = HANDED
-"""x and y (m) that the hand should find, and three derivatives."""
-MOVING = MOTION + 8
-"""1 where that motion is faster than ``MOVING_SPEED``, else 0."""
-JOINTS = MOVING + 1
-"""y1, y2 (m), v1, v2 (m/s), measured or estimated."""
-OWN = JOINTS + 4
-"""Rows from here on are for the laws themselves to name."""
 
-MASS, RATIO, PERIOD, COMPLIANT = range(4)
-"""Constants of the compliant motion: mass, kg; damping ratio; control period, s. ``COMPLIANT`` is their number."""
+class Estimate(Rows):
+    """What these stages hand on. A law's own rows follow."""
+
+    motion = part(Motion, "motion that the hand should find")
+    moving = row("1", "1 where that motion is faster than ``MOVING_SPEED``, else 0")
+    joints = part(Joints, "measured or estimated")
+
+
+MOTION, MOVING, JOINTS, OWN = (
+    HANDED + first for first in (Estimate.motion.first, Estimate.moving.first, Estimate.joints.first, Estimate.size)
+)  # fmt: skip
 
 
 @kernel
-def _comply(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Writes ``MOTION`` and ``MOVING``; returns how many stiffness setpoints are not positive definite."""
-    s, about, missed = block(seen, SEEN), numbers(constants, COMPLIANT), 0
-    target, motion = s[ASKED:FEEDFORWARD, :n], s[MOTION:MOVING, :n]
-    for i in range(n):
-        missed += 0 if is_stiffer(target[8, i], target[9, i], target[14, i], 0.0) else 1
-    give_way(
-        block(memory, 4)[:, :n], target, s[USER_FORCE:REFERENCE, :n], about[MASS], about[RATIO], about[PERIOD], s[DAMPING, :n],
-        motion,
-    )  # fmt: skip
-    mark_moving(motion, s[MOVING, :n])
+def _comply(world: int, seen: Seen, offset: Offset, about: Compliance, tables: int, lane: int, n: int) -> int:
+    """Writes motion and ``moving``; returns how many stiffness setpoints are not positive definite."""
+    s = Seen(seen.rows[:, :n])
+    estimate = Estimate(s.handed[: Estimate.size])
+    missed = give_way(Offset(offset.rows[:, :n]), s.asked, s.user_force, about, s.damping_factor, estimate.motion)
+    mark_moving(estimate.motion, estimate.moving)
     return missed
 
 
+def compliance(rig: Parameters) -> Array:
+    """``Compliance`` with the mass of the rig."""
+    return Compliance.numbers(mass=rig.mechanics.mass, damping_ratio=DAMPING_RATIO, period=rig.electronics.control_period)
+
+
 def compliant_motion(rig: Parameters) -> LawStage:
-    """Turns the measured force into ``MOTION``; its memory is what ``give_way`` calls the offset."""
-    return LawStage(_comply, np.array([rig.mechanics.mass, DAMPING_RATIO, rig.electronics.control_period]), np.zeros(4))
+    """Turns the measured force into the motion that the hand should find."""
+    return LawStage(_comply, compliance(rig), Offset.lane())
 
 
-ROWS, TICK, NOISE, INFORMED, RIG = range(5)
-"""Constants of the pistons' stage: rows of the observer's memory, or 0 where speeds are measured; control period, s; position
-noise, m; 1 where the observer is told the user's force and ``MOVING``. The rig follows."""
+class Location(Numbers):
+    """Constants of the stage that finds the pistons."""
+
+    rows_of_memory = number("1", "rows of the observer, 0 where speeds are measured")
+    informed = number("1", "1 where the observer knows the force of the hand and whether the motion moves")
+    belief = part(Belief, "of the observer")
 
 
 @kernel
-def _locate(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Writes ``JOINTS``."""
-    s, about = block(seen, SEEN), numbers(constants, RIG + PARAMETERS)
-    p, rows = about[RIG:], int(about[ROWS])
-    if rows == 0:
-        piston_motion(s[POSITION:POSITION_TIME], p, s[JOINTS:OWN], n)
+def _locate(world: int, seen: Seen, memory: int, about: Location, tables: int, lane: int, n: int) -> int:
+    """Writes the joints."""
+    s, belief = Seen(seen.rows[:, :n]), about.belief
+    estimate, given = Estimate(s.handed[: Estimate.size]), Given(scratch(Given.size)[:, :n])
+    if about.rows_of_memory == 0.0:
+        piston_motion(s.rows[POSITION : POSITION + Point.size], belief.rig, estimate.joints.rows, n)
         return 0
-    nothing, m = scratch(3)[:, :n], block(memory, rows)[:, :n]
+    informed, pistons = about.informed > 0.0, Pistons(block(memory, int(about.rows_of_memory))[:, :n])
     for i in range(n):
-        nothing[0, i], nothing[1, i], nothing[2, i] = 0.0, 0.0, 1.0
-    informed = about[INFORMED] > 0.0
-    observe(
-        m, s[TIME, :n], s[POSITION:VELOCITY, :n], s[POSITION_TIME, :n], s[VELOCITY:POSITION_TIME, :n],
-        s[PRESSURE:USER_FORCE, :n], p, about[TICK], BANDWIDTH, about[NOISE],
-        s[USER_FORCE:REFERENCE, :n] if informed else nothing[:2], nothing[:2], s[MOVING, :n] if informed else nothing[2],
-    )  # fmt: skip
-    for row in range(4):
-        for i in range(n):
-            s[JOINTS + row, i] = m[ESTIMATE + row, i]
+        for k in range(2):
+            given.force[k, i], given.believed[k, i] = s.user_force[k, i] if informed else 0.0, 0.0
+        given.moving[i], given.noise[i] = estimate.moving[i] if informed else 1.0, belief.noise
+    observe(pistons, s, s.pressure, given, belief)
+    for i in range(n):
+        for k in range(2):
+            estimate.joints.position[k, i], estimate.joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
     return 0
 
 
 def pistons(rig: Parameters, sampled: bool, informed: bool) -> LawStage:
-    """Finds ``JOINTS``, with an observer where positions are samples.
+    """Finds the joints, with an observer where positions are samples.
 
-    Where it is ``informed`` it knows the user's force, and lets pistons rest while ``MOVING`` says that nothing moves.
+    Where it is ``informed`` it knows the hand's force, and lets pistons rest while nothing is to move.
     """
-    board, rows = rig.electronics, memory_rows(rig) if sampled else 0
-    about = (rows, board.control_period, board.position_noise, informed)
-    fresh = np.zeros(rows)
-    fresh[FRESH : FRESH + 1] = 1.0
-    return LawStage(_locate, np.array([*about, *parameter_column(rig)]), fresh)
+    fresh = fresh_memory(rig, sampled) if sampled else np.zeros(0)
+    return LawStage(_locate, Location.numbers(rows_of_memory=len(fresh), informed=informed, belief=belief(rig)), fresh)

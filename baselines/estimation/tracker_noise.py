@@ -10,10 +10,7 @@ from __future__ import annotations
 
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
-
-ROWS = 8
-"""x, y and time of the last two samples, the variance of a sample, m2, and the number of samples so far."""
-BEFORE, LAST, VARIANCE, COUNT = 0, 3, 6, 7
+from birthsim_env.physics.compiled.records import Rows, row, rows
 
 SAMPLES = 100.0
 """assumed: samples over which the variance is averaged, 0.4 s at 240 Hz."""
@@ -25,27 +22,38 @@ CLIP = 9.0
 """assumed: no e^2 counts for more than so many times its expectation; of normal noise 0.3 % are clipped."""
 
 
+class Tracker(Rows):
+    """The last two samples and what they say of the noise."""
+
+    older = rows("older_x older_y", "m", "sample before the newest")
+    older_time = row("s", "of that sample")
+    newest = rows("newest_x newest_y", "m", "newest sample")
+    newest_time = row("s", "of that sample")
+    variance = row("m2", "variance of a sample")
+    count = row("1", "samples so far")
+
+
 @helper
-def observe(memory: Array, position: Array, position_time: Array, believed: float, fresh: Array) -> None:
-    """Carries ``memory`` (ROWS, N) on by one period. ``believed``, m, is the standard deviation at a new start."""
+def observe(tracker: Tracker, position: Array, position_time: Array, believed: float, fresh: Array) -> None:
+    """Carries ``tracker`` on by one period. ``believed``, m, is the standard deviation at a new start."""
+    older, newest = tracker.older, tracker.newest
     for i in range(position_time.shape[0]):
         x, y, t = position[0, i], position[1, i], position_time[i]
         if fresh[i] > 0.0:
-            for k in range(0, VARIANCE, 3):
-                memory[k, i], memory[k + 1, i], memory[k + 2, i] = x, y, t
-            memory[VARIANCE, i], memory[COUNT, i] = believed * believed, 0.0
-        first, second = memory[LAST + 2, i] - memory[BEFORE + 2, i], t - memory[LAST + 2, i]
+            older[0, i], older[1, i], tracker.older_time[i] = x, y, t
+            newest[0, i], newest[1, i], tracker.newest_time[i] = x, y, t
+            tracker.variance[i], tracker.count[i] = believed * believed, 0.0
+        first, second = tracker.newest_time[i] - tracker.older_time[i], t - tracker.newest_time[i]
         if second <= 0.0:
             continue
         if first > 0.0:
             q = second / first
-            ex = x - memory[LAST, i] - q * (memory[LAST, i] - memory[BEFORE, i])
-            ey = y - memory[LAST + 1, i] - q * (memory[LAST + 1, i] - memory[BEFORE + 1, i])
+            ex = x - newest[0, i] - q * (newest[0, i] - older[0, i])
+            ey = y - newest[1, i] - q * (newest[1, i] - older[1, i])
             scale = 1.0 / (1.0 + (1.0 + q) * (1.0 + q) + q * q)
-            variance = memory[VARIANCE, i]
-            told = 0.5 * (min(ex * ex * scale, CLIP * variance) + min(ey * ey * scale, CLIP * variance))
-            memory[COUNT, i] = min(memory[COUNT, i] + 1.0, SAMPLES - FIRST)
-            memory[VARIANCE, i] = variance + (told - variance) / (FIRST + memory[COUNT, i])
-        for k in range(3):
-            memory[BEFORE + k, i] = memory[LAST + k, i]
-        memory[LAST, i], memory[LAST + 1, i], memory[LAST + 2, i] = x, y, t
+            variance = tracker.variance[i]
+            found = 0.5 * (min(ex * ex * scale, CLIP * variance) + min(ey * ey * scale, CLIP * variance))
+            tracker.count[i] = min(tracker.count[i] + 1.0, SAMPLES - FIRST)
+            tracker.variance[i] = variance + (found - variance) / (FIRST + tracker.count[i])
+        older[0, i], older[1, i], tracker.older_time[i] = newest[0, i], newest[1, i], tracker.newest_time[i]
+        newest[0, i], newest[1, i], tracker.newest_time[i] = x, y, t

@@ -3,7 +3,7 @@
 At every control period the flows into the four chambers are planned over a horizon of ``prediction``, with the least sum of
 squares of its residuals within what the valves can give: one Gauss-Newton step from the plan of the period before (real-time
 iteration), a quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their
-characteristic. Motion, friction and disturbances are those of ``state_estimator``, as for ``admittance-backstepping``.
+characteristic. Motion, friction and disturbances are those that the admittance law knows when it does not learn.
 
 These commands found the tolerances (with ideal, then with lab and 16 trials) by the search that birthsim-tune had before it
 used Optuna. It was as short as its trials are long; the best was the same for both:
@@ -17,9 +17,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.controller import check_gains, lanes_of
+from baselines.admittance.informed import Informed
+from baselines.controller import check_gains
 from baselines.estimation.admittance import DAMPING_RATIO
-from baselines.estimation.state_estimator import Estimate, StateEstimator
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
 from baselines.valve_inverse import flow_ranges, openings_for_flows
@@ -83,8 +83,7 @@ class NonlinearMPC:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             speed_tolerance (m/s), stiffness_tolerance (N/m) and flow_tolerance (kg/s) are errors that count as much as a
-            position error of ``POSITION_TOLERANCE``. The others are bandwidth, pressure_bandwidth and friction_fraction of
-            ``StateEstimator``.
+            position error of ``POSITION_TOLERANCE``. The others are gains of ``AdmittanceController`` too.
 
     Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
     """
@@ -123,7 +122,7 @@ class NonlinearMPC:
         self.parameters = load_parameters(parameters)
         self._p, self._period = parameter_column(self.parameters), self.parameters.electronics.control_period
         chosen = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
-        self._estimator = {kind: StateEstimator(self.parameters, kind == "lab", own) for kind, own in chosen.items()}
+        self._informed = Informed(self.parameters, chosen)
         periods = np.maximum(np.round(np.array(STEPS) / self._period), 1)
         self._steps, self._ticks = periods * self._period, np.cumsum(periods).astype(np.int64)
         self._planners = {kind: self._planner(own) for kind, own in chosen.items()}
@@ -140,8 +139,7 @@ class NonlinearMPC:
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        for estimator in self._estimator.values():
-            estimator.reset(lanes)
+        self._informed.reset(lanes)
         if lanes is None:
             self._plan = np.empty((0, 0))
         elif len(self._plan):
@@ -155,27 +153,23 @@ class NonlinearMPC:
         """
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference))[:, 0]
-        lanes, count = lanes_of(measurement, reference), len(self._steps)
-        kind = "lab" if measurement.sampled else "ideal"
-        estimator, planner = self._estimator[kind], self._planners[kind]
-        now = estimator.update(measurement, reference)
+        informed, planner = self._informed, self._planners["lab" if measurement.sampled else "ideal"]
+        informed.update(measurement, reference)
+        known, memory = informed.known, informed.memory
+        lanes, pressures = known.drag.shape[1], memory.chambers.pressure
         if len(self._plan) != lanes:
-            self._plan = np.zeros((lanes, FLOWS * count))
-        low, high, flows = (q / FLOW for q in flow_ranges(now.pressures, now.spools, self._p))
-        given = self._given(now, reference, flows, *estimator.forecast(now, reference, self._ticks))
+            self._plan = np.zeros((lanes, FLOWS * len(self._steps)))
+        low, high, flows = (q / FLOW for q in flow_ranges(pressures, memory.chambers.spool, self._p))
+        ahead, unseen = informed.forecast(reference, self._ticks)
+        asked = reference.pneumatic_stiffness + self._period * self._ticks[:, None, None] * reference.pneumatic_stiffness_rate
+        now = [memory.joints.rows, pressures / PRESSURE, flows, known.given.force]
+        given = np.concatenate([*now, *(along.reshape(-1, lanes) for along in (unseen, ahead, asked))])
         for lane in range(lanes):
             self._plan[lane] = planner.improve(self._plan[lane], given[:, lane], low[:, lane], high[:, lane])
-        openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), now.pressures, self._p)
+        openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), pressures, self._p)
         self._advance_plan()
-        estimator.commanded(openings)
+        memory.chambers.opening[:] = openings
         return openings
-
-    def _given(self, now: Estimate, reference: Reference, flows: Array, ahead: Array, disturbance_force: Array) -> Array:
-        """What ``residuals`` asks for, (G, N)."""
-        times = self._period * self._ticks[:, None, None]
-        asked = reference.pneumatic_stiffness + times * reference.pneumatic_stiffness_rate
-        nodes = [along.reshape(-1, along.shape[2]) for along in (disturbance_force, ahead, asked)]
-        return np.concatenate([now.joints, now.pressures / PRESSURE, flows, now.force, *nodes])
 
     def _advance_plan(self) -> None:
         """The plan as the next period will see it: each step's flow moves towards that of the next."""

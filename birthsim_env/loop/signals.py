@@ -26,17 +26,26 @@ compliance = helper(displacement)
 """``displacement`` for kernels."""
 
 
-class Reference(Rows):
-    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,); ``command`` refuses other shapes."""
+class Motion(Rows):
+    """Where the end effector should be."""
 
     position = rows("x y", "m", "target of the end effector")
     velocity = rows("vx vy", "m/s", "of the target")
     acceleration = rows("ax ay", "m/s2", "of the target")
     jerk = rows("jx jy", "m/s3", "of the target")
+
+
+class Setpoints(Rows):
+    """How stiff the rig should be."""
+
     stiffness = rows("Kclx Kcly", "N/m", "setpoint of closed-loop stiffness")
     pneumatic_stiffness = rows("Kpneu1 Kpneu2", "N/m", "setpoint of the pneumatic stiffness (9) of a cylinder")
     pneumatic_stiffness_rate = rows("dKpneu1 dKpneu2", "N/(m s)", "rate of that setpoint")
     stiffness_coupling = row("N/m", "what couples x and y: closed-loop stiffness is [[Kclx, Kclxy], [Kclxy, Kcly]]", "Kclxy")
+
+
+class Reference(Motion, Setpoints):
+    """What a controller is asked to do at one instant. ``rows`` is (15, N) or (15,); ``command`` refuses other shapes."""
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop.signals import Motion, Setpoints
 from birthsim_env.parts.drawn.seeding import is_vectorised
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
@@ -48,12 +49,12 @@ def checked_start(
     Raises ``ValueError`` where it is not finite, leaves the workspace of ``rig``, or is no stiffness, within ``duration`` s.
     ``nominal`` (PARAMETERS,) is the rig's column.
     """
-    motion = _sampler("reference", trajectory, 8, lanes, num_envs)
-    setpoints = _sampler("stiffness", stiffness, 7, lanes, num_envs)
+    motion = _sampler("reference", trajectory, Motion.size, lanes, num_envs)
+    setpoints = _sampler("stiffness", stiffness, Setpoints.size, lanes, num_envs)
     instants, together = np.linspace(0.0, duration, CHECKS), max(1, TOGETHER // len(lanes))
     start = np.concatenate([motion(instants[:1]), setpoints(instants[:1])])
     groups = (instants[k : k + together] for k in range(0, CHECKS, together))
-    if not all(_is_plain(motion(group), setpoints(group), nominal) for group in groups):
+    if not all(_is_plain(Motion(motion(group)), Setpoints(setpoints(group)), nominal) for group in groups):
         _explain(trajectory, stiffness, lanes, num_envs, instants, rig)
     return start
 
@@ -94,11 +95,11 @@ def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> Non
         cylinder = getattr(rig, name)
         shorter = max(cylinder.stroke - 2 * SPARE, 0.5 * cylinder.stroke)
         object.__setattr__(tight, name, dataclasses.replace(cylinder, stroke=shorter))
-    stiff, p = np.ones((7, lanes)), parameter_column(tight)
-    stiff[6] = 0.0
+    stiff, p = Setpoints(np.ones((Setpoints.size, lanes))), parameter_column(tight)
+    stiff.stiffness_coupling[:] = 0.0
     for instant in np.linspace(0.0, duration, CHECKS):
         motion = one.sample(np.full(lanes, instant))
-        if not _is_plain(motion, stiff, p):
+        if not _is_plain(Motion(motion), stiff, p):
             try:
                 inverse_geometry(motion[:2], tight)
             except ValueError as error:
@@ -128,18 +129,19 @@ def _of_all(name: str, part: Any, size: int, num_envs: int, instant: float) -> A
 
 
 @kernel
-def _is_plain(motion: Array, setpoints: Array, p: Array) -> bool:
-    """Whether no lane of ``motion`` (8, L) and ``setpoints`` (7, L) is anywhere near what the check refuses."""
+def _is_plain(motion: Motion, asked: Setpoints, p: Array) -> bool:
+    """Whether no lane is anywhere near what the check refuses."""
     doubtful = 0
-    for i in range(motion.shape[1]):
+    for i in range(motion.rows.shape[1]):
         size = 0.0
-        for row in range(8):
-            size += abs(motion[row, i])
-        for row in range(7):
-            size += abs(setpoints[row, i])
-        kx, ky, kxy = setpoints[0, i], setpoints[1, i], setpoints[6, i]
-        soft = min(min(kx, ky), min(setpoints[2, i], setpoints[3, i])) <= 0.0 or kxy * kxy >= kx * ky
-        doubtful += 0 if size < math.inf and not soft and well_inside(motion[0, i], motion[1, i], p) else 1
+        for row in range(motion.rows.shape[0]):
+            size += abs(motion.rows[row, i])
+        for row in range(asked.rows.shape[0]):
+            size += abs(asked.rows[row, i])
+        kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
+        softest = min(min(kx, ky), min(asked.pneumatic_stiffness[0, i], asked.pneumatic_stiffness[1, i]))
+        inside = well_inside(motion.position[0, i], motion.position[1, i], p)
+        doubtful += 0 if size < math.inf and not (softest <= 0.0 or kxy * kxy >= kx * ky) and inside else 1
     return doubtful == 0
 
 

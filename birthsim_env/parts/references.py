@@ -12,12 +12,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
-from birthsim_env.loop.stage import Stage, block, table2
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Motion
+from birthsim_env.loop.stage import Stage, table2
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 
 FARTHEST = 10.0
@@ -65,22 +67,28 @@ class _Planned(Trajectory):
         return few
 
 
+class Round(Rows):
+    """A circle."""
+
+    centre = rows("x y", "m", "centre")
+    radius = row("m", "radius")
+    rate = row("rad/s", "angular speed")
+
+
 @helper
-def _circle(time: Array, own: Array, rows: Array) -> None:
-    """``own`` (4, N): centre x, y (m), radius (m), angular speed (rad/s)."""
-    for i in range(time.shape[0]):
-        w = own[3, i]
-        cosine, sine = own[2, i] * exact.cosine(w * time[i]), own[2, i] * exact.sine(w * time[i])
-        rows[0, i], rows[1, i] = own[0, i] + cosine, own[1, i] + sine
-        rows[2, i], rows[3, i] = -w * sine, w * cosine
-        rows[4, i], rows[5, i] = -w * w * cosine, -w * w * sine
-        rows[6, i], rows[7, i] = w * w * w * sine, -w * w * w * cosine
+def _circle(time: Array, own: Round, target: Motion, n: int) -> None:
+    for i in range(n):
+        w = own.rate[i]
+        cosine, sine = own.radius[i] * exact.cosine(w * time[i]), own.radius[i] * exact.sine(w * time[i])
+        target.position[0, i], target.position[1, i] = own.centre[0, i] + cosine, own.centre[1, i] + sine
+        target.velocity[0, i], target.velocity[1, i] = -w * sine, w * cosine
+        target.acceleration[0, i], target.acceleration[1, i] = -w * w * cosine, -w * w * sine
+        target.jerk[0, i], target.jerk[1, i] = w * w * w * sine, -w * w * w * cosine
 
 
 @kernel
-def _circle_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s = block(seen, SEEN)
-    _circle(s[TIME, :n], table2(tables, 0)[:, lane : lane + n], s[REFERENCE : REFERENCE + 8, :n])
+def _circle_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    _circle(seen.time, Round(table2(tables, 0)[:, lane : lane + n]), seen.reference, n)
     return 0
 
 
@@ -99,7 +107,7 @@ class Circle(_Planned):
         self.centre, self.radius, self.period = centre, radius, period
 
     def prepare(self, num_envs: int) -> None:
-        self._own = np.zeros((4, num_envs))
+        self._own = np.zeros((Round.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -107,9 +115,9 @@ class Circle(_Planned):
 
     @vectorised
     def sample(self, time: Array) -> Array:
-        rows = np.empty((8, time.shape[0]))
-        _circle(time, self._own, rows)
-        return rows
+        target = Motion(np.empty((Motion.size, time.shape[0])))
+        _circle(time, Round(self._own), target, len(time))
+        return target.rows
 
     def stage(self) -> Stage:
         """``sample``, compiled into the closed loop."""
@@ -127,14 +135,25 @@ def minimum_jerk(u: float, order: int) -> float:
     return value if order == 0 else slope if order == 1 else bend if order == 2 else jerk
 
 
+class Line(Rows):
+    """A straight line, then an arc."""
+
+    start = rows("x y", "m", "where it starts")
+    heading = row("rad", "from x")
+    straight = row("m", "length of the line")
+    radius = row("m", "of the arc")
+    angle = row("rad", "of the arc")
+    begins = row("s", "when the motion begins")
+    ends = row("s", "when it ends")
+
+
 @helper
-def _path(time: Array, own: Array, rows: Array) -> None:
-    """``own`` (8, N): start x, y, heading (rad), straight length, arc radius (m), arc angle (rad), first and last time (s)."""
-    for i in range(time.shape[0]):
-        heading, straight, radius, angle = own[2, i], own[3, i], own[4, i], own[5, i]
-        lasts = own[7, i] - own[6, i]
+def _path(time: Array, own: Line, target: Motion, n: int) -> None:
+    for i in range(n):
+        heading, straight, radius, angle = own.heading[i], own.straight[i], own.radius[i], own.angle[i]
+        lasts = own.ends[i] - own.begins[i]
         total = straight + radius * abs(angle)
-        u = (time[i] - own[6, i]) / lasts
+        u = (time[i] - own.begins[i]) / lasts
         s = total * minimum_jerk(u, 0)
         ds = total * minimum_jerk(u, 1) / lasts
         dds = total * minimum_jerk(u, 2) / lasts**2
@@ -147,20 +166,19 @@ def _path(time: Array, own: Array, rows: Array) -> None:
             along += exact.sine(turned) / curvature
             across = (1.0 - exact.cosine(turned)) / curvature
         cosine, sine = exact.cosine(heading), exact.sine(heading)
-        rows[0, i] = own[0, i] + cosine * along - sine * across
-        rows[1, i] = own[1, i] + sine * along + cosine * across
+        target.position[0, i] = own.start[0, i] + cosine * along - sine * across
+        target.position[1, i] = own.start[1, i] + sine * along + cosine * across
         tx, ty = exact.cosine(heading + turned), exact.sine(heading + turned)
         normal = curvature * ds * ds
         jerk_t, jerk_n = ddds - curvature * curvature * ds * ds * ds, 3.0 * curvature * ds * dds
-        rows[2, i], rows[3, i] = tx * ds, ty * ds
-        rows[4, i], rows[5, i] = tx * dds - ty * normal, ty * dds + tx * normal
-        rows[6, i], rows[7, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
+        target.velocity[0, i], target.velocity[1, i] = tx * ds, ty * ds
+        target.acceleration[0, i], target.acceleration[1, i] = tx * dds - ty * normal, ty * dds + tx * normal
+        target.jerk[0, i], target.jerk[1, i] = tx * jerk_t - ty * jerk_n, ty * jerk_t + tx * jerk_n
 
 
 @kernel
-def _path_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s = block(seen, SEEN)
-    _path(s[TIME, :n], table2(tables, 0)[:, lane : lane + n], s[REFERENCE : REFERENCE + 8, :n])
+def _path_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    _path(seen.time, Line(table2(tables, 0)[:, lane : lane + n]), seen.reference, n)
     return 0
 
 
@@ -196,7 +214,7 @@ class Path(_Planned):
         self.begins, self.ends = begins, ends
 
     def prepare(self, num_envs: int) -> None:
-        self._own = np.zeros((8, num_envs))
+        self._own = np.zeros((Line.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -205,9 +223,9 @@ class Path(_Planned):
 
     @vectorised
     def sample(self, time: Array) -> Array:
-        rows = np.empty((8, time.shape[0]))
-        _path(time, self._own, rows)
-        return rows
+        target = Motion(np.empty((Motion.size, time.shape[0])))
+        _path(time, Line(self._own), target, len(time))
+        return target.rows
 
     def stage(self) -> Stage:
         """``sample``, compiled into the closed loop."""

@@ -10,12 +10,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from birthsim_env.loop.rows import REFERENCE, SEEN, TIME
-from birthsim_env.loop.stage import Stage, block, numbers, table3
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Setpoints
+from birthsim_env.loop.stage import Stage, numbers, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.references import LONGEST, SHORTEST, minimum_jerk
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.rig.values import checked_number, checked_range, shown
 
 SOFTEST, STIFFEST = 1e-3, 1e7
@@ -63,7 +65,7 @@ class StiffnessSchedule:
             raise ValueError(f"times = {shown(times)}; allowed: starting at 0, with as many setpoints as times")
         if not all(sooner < later for sooner, later in pairwise(times)):
             raise ValueError(f"times = {shown(times)}; allowed: increasing (s)")
-        for setpoint in (number for column in columns for number in column):
+        for setpoint in (entry for column in columns for entry in column):
             checked_range("stiffness setpoint", setpoint, "N/m", least=SOFTEST, most=STIFFEST)
         for across in closed_loop_xy or ():
             checked_range("closed_loop_xy", across, "N/m", least=-STIFFEST, most=STIFFEST)
@@ -78,7 +80,7 @@ class StiffnessSchedule:
     def prepare(self, num_envs: int) -> None:
         """Make room for ``num_envs`` lanes."""
         self._starts: Array = np.array(self.times, dtype=np.float64)
-        self._values: Array = np.zeros((len(self.times), 5, num_envs))
+        self._values: Array = np.zeros((len(self.times), Phase.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -99,37 +101,55 @@ class StiffnessSchedule:
     @vectorised
     def sample(self, time: Array) -> Array:
         """Setpoints (7, N) at ``time`` (N,), s."""
-        rows = np.empty((7, time.shape[0]))
-        _sample(time, self._starts, self._values, self.transition, rows)
-        return rows
+        asked, schedule = Setpoints(np.empty((Setpoints.size, time.shape[0]))), Schedule(self._constants())
+        _sample(time, schedule, self._values, asked, len(time))
+        return asked.rows
+
+    def _constants(self) -> Array:
+        return Schedule.numbers(transition=self.transition, starts=self._starts)
 
     def stage(self) -> Stage:
         """``sample``, compiled into the closed loop."""
-        constants = np.array([self.transition, *self._starts])
-        return Stage(_schedule_stage, constants, tables=(self._values,))
+        return Stage(_schedule_stage, self._constants(), tables=(self._values,))
+
+
+class Phase(Rows):
+    """What is asked for in one phase."""
+
+    stiffness = rows("Kclx Kcly", "N/m", "closed-loop stiffness")
+    pneumatic = rows("Kpneu1 Kpneu2", "N/m", "pneumatic stiffness")
+    coupling = row("N/m", "closed-loop stiffness that couples x and y")
+
+
+class Schedule(Numbers):
+    """When it is asked for."""
+
+    transition = number("s", "how long a change of the pneumatic stiffness takes")
+    starts = rows(0, "s", "of the phases")
 
 
 @helper
-def _sample(time: Array, starts: Array, values: Array, transition: float, rows: Array) -> None:
-    for i in range(time.shape[0]):
-        phase = 0
+def _sample(time: Array, schedule: Schedule, values: Array, asked: Setpoints, n: int) -> None:
+    """``values`` (P, 5, N): what is asked for in each ``Phase``."""
+    starts, transition = schedule.starts, schedule.transition
+    for i in range(n):
+        k = 0
         # Half a microsecond of grace: a phase that starts on a control instant starts there, whatever the rounding.
-        while phase + 1 < starts.shape[0] and time[i] >= starts[phase + 1] - 5e-7:
-            phase += 1
-        rows[0, i], rows[1, i], rows[6, i] = values[phase, 0, i], values[phase, 1, i], values[phase, 4, i]
-        u = (time[i] - starts[phase]) / transition
-        for k in range(2):
-            now = values[phase, 2 + k, i]
-            before = values[max(phase - 1, 0), 2 + k, i]
-            rows[2 + k, i] = before + (now - before) * minimum_jerk(u, 0)
-            rows[4 + k, i] = (now - before) * minimum_jerk(u, 1) / transition
+        while k + 1 < starts.shape[0] and time[i] >= starts[k + 1] - 5e-7:
+            k += 1
+        phase, last, u = Phase(values[k]), Phase(values[max(k - 1, 0)]), (time[i] - starts[k]) / transition
+        asked.stiffness_coupling[i] = phase.coupling[i]
+        for axis in range(2):
+            asked.stiffness[axis, i] = phase.stiffness[axis, i]
+            now, before = phase.pneumatic[axis, i], last.pneumatic[axis, i]
+            asked.pneumatic_stiffness[axis, i] = before + (now - before) * minimum_jerk(u, 0)
+            asked.pneumatic_stiffness_rate[axis, i] = (now - before) * minimum_jerk(u, 1) / transition
 
 
 @kernel
-def _schedule_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: transition, s; starts of the phases, s."""
-    s, values = block(seen, SEEN), table3(tables, 0)
-    about = numbers(constants, 1 + values.shape[0])
-    rows = s[REFERENCE + 8 : REFERENCE + 15, :n]
-    _sample(s[TIME, :n], about[1:], values[:, :, lane : lane + n], about[0], rows)
+def _schedule_stage(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """Constants: ``Schedule``."""
+    values = table3(tables, 0)
+    schedule = Schedule(numbers(constants, Schedule.size + values.shape[0]))
+    _sample(seen.time, schedule, values[:, :, lane : lane + n], seen.reference, n)
     return 0

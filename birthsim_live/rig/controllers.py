@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
@@ -14,7 +14,7 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.settings import RESIDUAL
 
-DAMPED = (BacksteppingController, AdmittanceBackstepping, TrackingController)
+DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
 """Laws that can be told to damp more."""
 
 

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.admittance import adaptive_stage as at
+from baselines.admittance.rows import Constants, Memory
 from baselines.bench.evaluation import evaluate
 from baselines.bench.sensor_floor import circle_floor, probe_floor
 from baselines.commands.honest import as_described
@@ -51,7 +51,7 @@ def test_friction_that_is_not_as_believed_is_learned_on_a_circle(factor):
                for k, rig_cylinder in ((1, rig.cylinder1), (2, rig.cylinder2))}  # fmt: skip
     law = make_controller("admittance-adaptive", rig)
     result = evaluate("BirthSIM/Circle-v1", law, "adaptive", 1, 0, progress=False, parameters=rig.replace(changes))
-    levels = law._memories[0][at.FRICTION : at.FRICTION + 2, 0]
+    levels = Memory(law._memories[0]).friction.level[:, 0]
     assert not result.lost[0]
     np.testing.assert_allclose(levels, factor, rtol=0.2)
 
@@ -104,6 +104,7 @@ def test_large_swings_lower_the_gain_at_once_only_with_sampled_positions_and_a_f
         law = make_controller(name, Parameters())
         for sampled in (False, True):
             given = law.law_stages(sampled)[0].constants
-            told[name, sampled] = [given[at.CONSTANTS.index(own)] for own in ("least_fraction", "most_falls")]
+            gains = Constants(given).gains
+            told[name, sampled] = [gains.least_fraction, gains.most_falls]
     assert told.pop(("admittance-adaptive", True)) == [0.5, 3.0]
     assert set(map(tuple, told.values())) == {(0.35, 1.0)}

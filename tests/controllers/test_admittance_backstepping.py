@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from baselines.admittance import law as admittance_law
-from baselines.admittance.controller import LEAST_FRACTION, AdmittanceBackstepping
-from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
+from baselines.admittance.controller import LEAST_FRACTION, AdmittanceController
+from baselines.admittance.knowledge import fresh_memory
+from baselines.admittance.rows import Gains, Known, Memory
+from baselines.estimation.observers import belief
+from baselines.estimation.rows import Belief
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.physics.compiled.lanes import SPOOLS, Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -26,11 +31,9 @@ ANOTHER = Parameters().replace(
 )  # fmt: skip
 
 
-def remembered(lanes: int) -> Array:
+def remembered(lanes: int) -> Memory:
     """The memory of a law that has just started."""
-    memory = np.zeros((admittance_law.MEMORY, lanes))
-    memory[admittance_law.GAIN_SHARES] = 1.0
-    return memory
+    return Memory(np.repeat(fresh_memory(Parameters(), False)[:, None], lanes, axis=1))
 
 
 @dataclasses.dataclass
@@ -49,25 +52,26 @@ class Law:
 
     def command(
         self, now: rigid_body.Instant, motion: Array, user: Array, disturbance_force: Array,
-        rest: Array | None = None, moving: float = 1.0, memory: Array | None = None, spools: Array | None = None,
+        rest: Array | None = None, moving: float = 1.0, memory: Memory | None = None, spools: Array | None = None,
         told: Array | None = None, pneumatic: Array | None = None,
     ) -> Array:  # fmt: skip
         lanes = motion.shape[1]
-        target, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
-        target[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
+        seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
+        memory = remembered(lanes) if memory is None else memory
+        seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
+        seen.feedforward.rows[:] = 0.0 if told is None else told
+        memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures
+        memory.chambers.spool[:], memory.pistons.rest[:] = 0.0 if spools is None else spools, 0.0 if rest is None else rest
+        known.motion.rows[:], known.given.force[:], known.unseen[:] = motion, user, disturbance_force
+        known.given.moving[:] = moving
         # A spool that follows as fast as it does by itself is told where to go, no further.
         quickness = 1 - np.exp(-PERIOD / (self.lead_time or self.rig.valves.time_constant))
-        admittance_law.command(
-            np.concatenate([now.piston, now.speed]), now.pressures, motion, target, user, disturbance_force,
-            np.zeros((2, lanes)) if rest is None else rest, np.full(lanes, moving),
-            np.zeros((4, lanes)) if spools is None else spools, parameter_column(self.rig), PERIOD,
-            np.array([
-                30.0, self.gain, self.rest_gain, self.rest_push, self.dead_zone, quickness, 0.06, 0.9, LEAST_FRACTION, 1.0
-            ]),
-            np.zeros((4, lanes)) if told is None else told,
-            remembered(lanes) if memory is None else memory, openings,
+        gains = Gains.numbers(
+            pneumatic_gain=30.0, gain=self.gain, rest_gain=self.rest_gain, rest_push=self.rest_push, dead_zone=self.dead_zone,
+            quickness=quickness, oscillation=0.06, yielding=0.9, least_fraction=LEAST_FRACTION, most_falls=1.0,
         )  # fmt: skip
-        return openings
+        admittance_law.command(seen, memory, known, Gains(gains), Belief(belief(self.rig)))
+        return seen.opening
 
 
 def near(now: rigid_body.Instant, rig: Parameters, user: Array, seed: int, fraction: float = 1.0) -> tuple[Array, Measurement]:
@@ -211,8 +215,9 @@ def test_the_lead_opens_a_valve_no_further_than_fully() -> None:
 
 def watched(errors: Array, fall: float = 0.9, level: float = 0.06, least: float = 0.35, most: float = 1.0) -> Array:
     """The gain fraction after each of the speed errors (T,), one per period."""
-    memory, row = remembered(1), admittance_law.WATCH_N
-    return np.array([admittance_law.watch(memory, row, 0, float(error), PERIOD, level, fall, least, most) for error in errors])
+    gains = Gains(Gains.lane(oscillation=level, yielding=fall, least_fraction=least, most_falls=most))
+    one = remembered(1).follower.along
+    return np.array([admittance_law.watch(one, 0, float(error), PERIOD, gains) for error in errors])
 
 
 TIMES = PERIOD * np.arange(2000)
@@ -272,7 +277,7 @@ def test_a_direction_that_oscillates_is_held_more_softly_and_the_other_is_not(di
     for way in (pose.across, pose.beam):
         motion = resting.copy()
         motion[:2] -= error * way
-        openings = law.command(now, motion, nothing, nothing, memory=memory.copy())
+        openings = law.command(now, motion, nothing, nothing, memory=Memory(memory.rows.copy()))
         jerk = (rigid_body.acceleration_and_jerk(openings, now, rig, nothing, nothing)[1] * way).sum()
         left = 0.9**3 * c if way is shaken else c
         assert -jerk / error == pytest.approx(left**3 + 2 * left, rel=1e-4)
@@ -286,7 +291,7 @@ def test_the_gain_fraction_is_that_of_the_direction() -> None:
     beam = wanted.position / np.hypot(*wanted.position)
     across = np.array([-beam[1], beam[0]])
     way = across * np.array([1.0, 0.0, 1.0, 0.0]) + beam * np.array([0.0, 1.0, 1.0, 0.0])
-    law, rate = AdmittanceBackstepping(rig, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
+    law, rate = AdmittanceController(rig, learn=False, oscillation=0.06, yielding=0.9), 2 * np.pi * 10.0
     for time in TIMES[:1000]:
         clock, speed = np.full(lanes, time), 0.1 * np.sin(rate * time) * way
         place = wanted.position - 0.1 / rate * np.cos(rate * time) * way
@@ -301,7 +306,7 @@ def held(told: Array, unmeasured: Array, seconds: float = 1.5) -> tuple[Array, A
     the law is told of the forces ``told`` (2, N), N, along them, and not that a hand pushes with ``unmeasured`` (2, N), N."""
     rig, lanes = closed_loop.FRICTIONLESS, told.shape[1]
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), 2000.0)
-    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceBackstepping(rig)
+    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceController(rig, learn=False)
     start = plant.piston.copy()
 
     def blind(plant: Plant, time: float, force: Array) -> Measurement:
@@ -324,7 +329,7 @@ def test_a_belief_holds_the_pistons_against_it_whatever_the_observer_finds() -> 
 
     A force that is really there and unknown is observed anyway, and what is told comes on top: lanes 5 to 7 are told the truth.
     """
-    rig, c = closed_loop.FRICTIONLESS, AdmittanceBackstepping.TUNED["ideal"]["gain"]
+    rig, c = closed_loop.FRICTIONLESS, AdmittanceController.TUNED["ideal"]["gain"]
     told = np.array([[12.0, -12.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 12.0, -12.0, 0.0, 0.0, 0.0, 0.0]])
     push = np.zeros((2, 8))
     push[:, 4:] = [[10.0, 10.0, 0.0, -8.0], [0.0, 0.0, 10.0, 5.0]]
@@ -343,7 +348,7 @@ def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
     lanes = 3
     wanted = closed_loop.holding(np.array([[0.5, 0.45, 0.55], [0.0, 0.05, -0.1]]), 2000.0)
     plant = closed_loop.resting_at(wanted, Parameters())
-    plain, zero, several, single = (AdmittanceBackstepping() for _ in range(4))
+    plain, zero, several, single = (AdmittanceController(learn=False) for _ in range(4))
     rng = np.random.default_rng(0)
     for tick in range(50):
         push = rng.uniform(-5, 5, (2, lanes))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.admittance import law
+from baselines.admittance.rows import HalfWave
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.controllers.test_admittance_backstepping import PERIOD, Law, near, remembered
 from tests.oracles import derived_law as derived
@@ -42,11 +43,11 @@ def test_three_equal_gains_with_both_springs_of_backstepping() -> None:
 
 def ended(peaks: list[float], seconds: float, level: float = 0.05) -> list[float]:
     """What ``sustained`` says at the end of each half wave of an error with these peaks, each ``seconds`` long."""
-    memory, said = np.zeros((law.MEMORY, 1)), []
+    wave, said = HalfWave(np.zeros((HalfWave.size, 1))), []
     for k, peak in enumerate([*peaks, peaks[-1]]):
         for tick in range(round(seconds / PERIOD)):
             way = (-1) ** k * peak * (1.0 if tick % 2 else 0.9)
-            found = law.sustained(memory, law.WATCH_T + 1, 0, way, PERIOD, level, 0.0)
+            found = law.sustained(wave, 0, way, PERIOD, level, 0.0)
             if tick == 0:
                 said.append(found)
             else:
@@ -74,7 +75,7 @@ def test_the_gain_of_motion_fades_with_a_tenth_of_a_second() -> None:
     Law(rig).command(now, motion, nothing, nothing, moving=1.0, memory=memory)
     for _ in range(100):
         Law(rig).command(now, motion, nothing, nothing, moving=0.0, memory=memory)
-    assert memory[law.MOTION_FRACTION, 0] == pytest.approx(math.exp(-1.0), rel=1e-6)
+    assert memory.follower.moved[0] == pytest.approx(math.exp(-1.0), rel=1e-6)
 
 
 def test_position_errors_count_up_to_six_millimetres() -> None:

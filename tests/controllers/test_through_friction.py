@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.admittance.controller import AdmittanceController
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.registry import make_controller
@@ -54,7 +54,7 @@ def test_exact_sensors_and_friction_off_by_a_quarter(law: str, monkeypatch: pyte
     """
     closed_loop.shorten_probes(monkeypatch)
     probes = pushes((5.0, -40.0), (slippery(0.75, law), slippery(1.25, law)))
-    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED)))
+    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False)))
     assert error.max() < 0.002
     assert hunting.max() < 0.01
 
@@ -64,7 +64,7 @@ def test_coupled_setpoints_through_friction(monkeypatch: pytest.MonkeyPatch) -> 
     closed_loop.shorten_probes(monkeypatch)
     probes = pushes((15.0, -30.0), (slippery(0.75), slippery(1.25)), (3000.0,))
     probes.stiffness[1:] = [[1500.0], [800.0]]
-    answers = run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED))
+    answers = run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False))
     off = np.hypot(*(answers.displacement - answers.expected)) / np.hypot(*answers.expected)
     assert np.hypot(*answers.expected).min() > 0.005
     assert off.max() < 0.002
@@ -78,7 +78,7 @@ def test_a_trackers_samples(law: str) -> None:
     95 % 0.61 %, worst 2.3 %; hunting 0.42 mm.
     """
     probes = pushes((5.0, -40.0), (slippery(1.0, law),))
-    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=11))
+    error, hunting = errors(probes, run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False), "lab", seed=11))
     assert np.quantile(error, 0.95) < 0.01
     assert error.max() < 0.05
     assert hunting.max() < 0.5
@@ -89,7 +89,8 @@ def test_a_trackers_samples_over_many_seeds() -> None:
     found = []
     probes = pushes((5.0, -5.0, 10.0, -10.0, 20.0, -20.0, 40.0, -40.0))
     for seed in range(4):
-        found.append(errors(probes, run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), "lab", seed=100_000 * seed)))
+        law = AdmittanceController(BELIEVED, learn=False)
+        found.append(errors(probes, run_stiffness_test(probes, law, "lab", seed=100_000 * seed)))
     error, hunting = np.array(found).swapaxes(0, 1)
     assert np.quantile(error, 0.95) < 0.01
     assert error.max() < 0.05
@@ -102,7 +103,8 @@ def test_it_comes_back_calmly_from_a_load_beyond_its_strength(sensors: str) -> N
     back within 3 mm and stays there. With unbounded errors it swung by 100 mm for two seconds."""
     rig = BELIEVED.replace({"mechanics.mass": 5.0, "valves.time_constant": 0.007})
     wanted = closed_loop.holding(np.array([[0.55], [0.0]]), 2000.0)
-    plant, law, tracker = closed_loop.resting_at(wanted, rig), AdmittanceBackstepping(BELIEVED), LabSensors(rig.electronics, 1)
+    plant, law = closed_loop.resting_at(wanted, rig), AdmittanceController(BELIEVED, learn=False)
+    tracker = LabSensors(rig.electronics, 1)
     tracker.begin(0, np.random.default_rng(0))
     off = []
     for tick in range(2800):
@@ -129,7 +131,7 @@ def test_a_hundred_unknown_rigs_are_held(sensors: str) -> None:
     force[lane % 2, lane] = rng.uniform(5, 30, lanes) * rng.choice([-1, 1], lanes)
     stiffness[:2] = rng.uniform(1000, 4000, lanes)
     probes = StiffnessTest(np.ascontiguousarray(np.resize(POSES, (lanes, 2)).T), force, stiffness, rigs)
-    answers = run_stiffness_test(probes, AdmittanceBackstepping(BELIEVED), sensors)
+    answers = run_stiffness_test(probes, AdmittanceController(BELIEVED, learn=False), sensors)
     error, hunting = errors(probes, answers)
     assert not answers.lost.any()
     assert np.quantile(error, 0.95) < (0.001 if sensors == "ideal" else 0.02)
@@ -157,7 +159,7 @@ def recorded(lanes: int, ticks: int, sensors: str) -> list[tuple[Measurement, Re
         tracker.begin(lane, np.random.default_rng(lane))
     wanted = closed_loop.holding(np.repeat([[0.5], [0.0]], lanes, axis=1), np.linspace(1500, 3000, lanes))
     wanted.rows[14] = 500.0
-    plant, law, record = closed_loop.resting_at(wanted, BELIEVED), AdmittanceBackstepping(BELIEVED), []
+    plant, law, record = closed_loop.resting_at(wanted, BELIEVED), AdmittanceController(BELIEVED, learn=False), []
 
     def sense(plant: Plant, time: float, force: Array) -> Measurement:
         if sensors == "ideal":
@@ -179,7 +181,7 @@ def recorded(lanes: int, ticks: int, sensors: str) -> list[tuple[Measurement, Re
 def test_some_gains_are_for_the_tracker_alone(gain: str, value: float) -> None:
     """Where sensors are exact no piston is taken to rest and no pressure averaged: those gains change no bit there."""
     for sensors in ("ideal", "lab"):
-        tuned, other = AdmittanceBackstepping(BELIEVED), AdmittanceBackstepping(BELIEVED, **{gain: value})
+        tuned, other = AdmittanceController(BELIEVED, learn=False), AdmittanceController(BELIEVED, learn=False, **{gain: value})
         same = [np.array_equal(tuned.command(*pair), other.command(*pair)) for pair in recorded(2, 300, sensors)]
         assert all(same) if sensors == "ideal" else not any(same[-20:])
 
@@ -188,7 +190,7 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
     """1.5 kg with valves of 12 ms, half the mass and three times the lag that are believed: fixed gains oscillate on."""
     rig = Parameters().replace({"mechanics.mass": 1.5, "valves.time_constant": 0.012})
     probes = StiffnessTest(np.array([[0.5], [0.0]]), np.array([[10.0], [0.0]]), np.array([[2000.0], [2000.0], [0.0]]), rig)
-    yielding, fixed = AdmittanceBackstepping(BELIEVED), AdmittanceBackstepping(BELIEVED, yielding=1.0)
+    yielding, fixed = AdmittanceController(BELIEVED, learn=False), AdmittanceController(BELIEVED, learn=False, yielding=1.0)
     (_, calm), (_, shaking) = (
         errors(probes, run_stiffness_test(probes, yielding)),
         errors(probes, run_stiffness_test(probes, fixed)),
@@ -201,7 +203,7 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
 @pytest.mark.parametrize(
     ("gains", "message"),
     [
-        ({"stiffness": 1.0}, r"stiffness = 1.0 is no gain of AdmittanceBackstepping; allowed: gain, rest_gain, rest_push, "),
+        ({"stiffness": 1.0}, r"stiffness = 1.0 is no gain of AdmittanceController; allowed: gain, rest_gain, rest_push, "),
         ({"gain": 0.0}, r"gain = 0.0; allowed: a positive number"),
         ({"bandwidth": np.nan}, r"bandwidth = nan; allowed: a positive number"),
         ({"lead_time": np.inf}, r"lead_time = inf; allowed: a positive number"),
@@ -212,11 +214,11 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
 )
 def test_impossible_gains_are_refused(gains: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        AdmittanceBackstepping(BELIEVED, **gains)
+        AdmittanceController(BELIEVED, learn=False, **gains)
 
 
 def test_springs_that_are_none_are_refused() -> None:
     ((measured, wanted),) = recorded(3, 1, "ideal")
     wanted.rows[14, 2] = 5000.0
     with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 2; allowed: more than 0 N/m in every direction"):
-        AdmittanceBackstepping(BELIEVED).command(measured, wanted)
+        AdmittanceController(BELIEVED, learn=False).command(measured, wanted)

@@ -17,21 +17,23 @@ from birthsim_env.simulation import Simulation
 CONTROLLER = """
 import numpy as np
 from baselines.staged import LawStage, StagedController
-from birthsim_env.loop.rows import ASKED, OPENING, POSITION, SEEN
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.records import Numbers, number
+
+class Gain(Numbers):
+    gain = number("1/m", "opening per error")
 
 @kernel
-def push(world, seen, memory, constants, tables, lane, n):
-    s, gain = block(seen, SEEN), numbers(constants, 1)[0]
+def push(world: int, seen: Seen, memory: int, gain: Gain, tables: int, lane: int, n: int):
     for i in range(n):
-        opened = max(-1.0, min(1.0, gain * (s[ASKED, i] - s[POSITION, i])))
-        s[OPENING, i], s[OPENING + 1, i], s[OPENING + 2, i], s[OPENING + 3, i] = 0.0, 0.0, opened, -opened
+        opened = max(-1.0, min(1.0, gain.gain * (seen.asked.position[0, i] - seen.position[0, i])))
+        seen.opening[:2, i], seen.opening[2, i], seen.opening[3, i] = 0.0, opened, -opened
     return 0
 
 class Pusher(StagedController):
     def law_stages(self, sampled):
-        return [LawStage(push, np.array([20.0]), np.zeros(0))]
+        return [LawStage(push, Gain.numbers(gain=20.0), np.zeros(0))]
 """
 
 SCENARIO = """
@@ -50,24 +52,27 @@ gymnasium.register("Mine/Stroll-v0", "birthsim_env.env:BirthSIMEnv", kwargs={"sc
 
 SENSOR = """
 import numpy as np
-from birthsim_env.loop.rows import POSITION, SEEN
-from birthsim_env.loop.stage import Stage, block, numbers
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors
 from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.parts.sensors.sensors import ideal_stage
 
+class Step(Numbers):
+    step = number("m", "of the position")
+
 @kernel
-def coarse(world, seen, memory, constants, tables, lane, n):
-    s, step = block(seen, SEEN), numbers(constants, 1)[0]
-    ideal_stage(world, seen, memory, constants, tables, lane, n)
+def coarse(world: World, seen: Seen, memory: int, about: Step, tables: int, lane: int, n: int):
+    ideal_stage(world, seen, memory, 0, tables, lane, n)
     for axis in range(2):
         for i in range(n):
-            s[POSITION + axis, i] = step * np.floor(s[POSITION + axis, i] / step + 0.5)
+            seen.position[axis, i] = about.step * np.floor(seen.position[axis, i] / about.step + 0.5)
     return 0
 
 class CoarseSensors(IdealSensors):
     def stage(self):
-        return Stage(coarse, np.array([1e-4]))
+        return Stage(coarse, Step.numbers(step=1e-4))
 
 SENSORS["coarse"] = CoarseSensors
 """
@@ -106,7 +111,7 @@ def test_a_compiled_controller_is_one_file_of_so_many_lines(tmp_path):
         error = env.unwrapped.reference.position[0] - env.unwrapped.measurement.position[0]
         np.testing.assert_array_equal(command[2], np.clip(20.0 * error, -1, 1))
         env.step(command.T.astype(np.float32))
-    assert lines(CONTROLLER) == 15
+    assert lines(CONTROLLER) == 16
 
 
 def test_a_scenario_is_one_file_of_so_many_lines(tmp_path):
@@ -132,4 +137,4 @@ def test_a_compiled_sensor_is_one_file_of_so_many_lines(tmp_path):
         assert np.abs(seen - true).max() <= 0.5001e-4
     simulation: Simulation = env.simulation
     assert len(simulation._loop._pieces) == 1, "all of it is compiled"
-    assert lines(SENSOR) == 18
+    assert lines(SENSOR) == 20

@@ -10,7 +10,7 @@ import pytest
 
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import ASKED, OPENING, SEEN, WORLD, Seen, Signals, World
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import Motion, Reference, Setpoints
 from birthsim_env.loop.stage import Stage, scratch
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
@@ -83,6 +83,7 @@ def test_rows_stand_where_they_are_written():
     assert sum(count for *_, count in World.entries()) == World.size == WORLD
     assert sum(count for *_, count in Seen.entries()) == Seen.size == SEEN
     assert Signals.size == Seen.asked.first == ASKED, "a layout that derives from another one goes on behind it"
+    assert (Setpoints.stiffness.first, Reference.stiffness.first) == (0, Motion.size) == (0, 8), "and each has its own places"
 
 
 def test_views_share_the_array():
@@ -109,8 +110,9 @@ def test_numbers_are_all_given_and_a_lane_is_zero_where_it_is_not_named():
     for wrong in ({"bandwidth": 1.0}, {"bandwidth": 1.0, "corner": 0.0, "observer": 0.0, "damping": 1.0}):
         with pytest.raises(TypeError, match=r"Gains of bandwidth.*allowed: bandwidth, corner, observer"):
             Gains.numbers(**wrong)
-    with pytest.raises(KeyError, match="damping"):
+    with pytest.raises(TypeError, match="Memory of damping; allowed: bristle, observer, since"):
         Memory.lane(damping=1.0)
+    assert History.lane(slot=1.0, past=[2.0, 3.0]).tolist() == [1.0, 2.0, 3.0]
 
 
 def test_a_declaration_that_means_nothing_is_refused():

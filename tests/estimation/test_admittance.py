@@ -10,10 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, sqrtm
 
-from baselines.estimation.admittance import DAMPING_RATIO, Admittance, square_root
-from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
+from baselines.estimation import admittance
+from baselines.estimation.admittance import DAMPING_RATIO, Compliance, Offset, square_root
+from baselines.estimation.rows import Motion
+from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
 
 MASS, PERIOD = 3.0, 1e-3
 COUPLED = np.array([[3000.0, 800.0], [800.0, 1500.0]])
@@ -34,10 +35,23 @@ def asked(position: Array, stiffness: Array) -> Reference:
     return Reference(rows)
 
 
-def pushed(force: Array) -> Measurement:
-    """Only the force (2, N) is looked at."""
-    nothing = np.full((4, force.shape[1]), np.nan)
-    return Measurement(nothing[0], nothing[:2], nothing[0], nothing[:2], nothing, force, sampled=False)
+class Follower:
+    """The kernels with the offset that a stage keeps for them, over N lanes."""
+
+    def __init__(self, lanes: int = 1, ratio: float = DAMPING_RATIO, period: float = PERIOD, mass: float = MASS) -> None:
+        self.offset = Offset(np.zeros((Offset.size, lanes)))
+        self._about = Compliance(Compliance.numbers(mass=mass, damping_ratio=ratio, period=period))
+
+    def update(self, force: Array, reference: Reference, factor: Array | None = None) -> Array:
+        lanes = force.shape[1]
+        motion, factor = Motion(np.empty((Motion.size, lanes))), np.zeros(lanes) if factor is None else factor
+        assert admittance.give_way(self.offset, reference, force, self._about, factor, motion) == 0
+        return motion.rows
+
+    def forecast(self, reference: Reference, force: Array, ticks: Array) -> Array:
+        ahead = np.empty((len(ticks), *self.offset.rows.shape))
+        admittance.forecast(self.offset, reference, force, self._about, ticks, ahead)
+        return ahead
 
 
 def generator(stiffness: Array, mass: float = MASS, ratio: float = DAMPING_RATIO) -> tuple[Array, Array]:
@@ -77,8 +91,8 @@ def test_motion_is_that_of_mass_damper_and_spring() -> None:
     ticks, matrices = 400, np.concatenate([springs(7), [COUPLED]])
     rng = np.random.default_rng(1)
     levels = rng.uniform(-40, 40, (20, 2, len(matrices)))
-    model, reference = Admittance(Parameters()), asked(np.full((2, len(matrices)), 0.1), matrices)
-    got = np.array([model.update(pushed(levels[tick // 20]), reference) for tick in range(ticks)])
+    model, reference = Follower(len(matrices)), asked(np.full((2, len(matrices)), 0.1), matrices)
+    got = np.array([model.update(levels[tick // 20], reference) for tick in range(ticks)])
     got[:, :2] -= 0.1
     for lane, matrix in enumerate(matrices):
 
@@ -109,11 +123,11 @@ def test_a_moving_target_carries_the_motion_along() -> None:
     times = PERIOD * np.arange(800)
     start = np.concatenate([target(0)[0], target(0)[1]])
     truth = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-10, atol=1e-13).y.T
-    model, got = Admittance(Parameters()), []
+    model, got = Follower(), []
     for time in times:
         reference = asked(np.zeros((2, 1)), COUPLED[None])
         reference.rows[:8, 0] = target(time).ravel()
-        got.append(model.update(pushed(force[:, None]), reference)[:, 0])
+        got.append(model.update(force[:, None], reference)[:, 0])
     motion = np.array(got)
     np.testing.assert_allclose(motion[:, :2], truth[:, :2], rtol=0, atol=1e-7)
     np.testing.assert_allclose(motion[:, 2:4], truth[:, 2:], rtol=0, atol=5e-6)
@@ -130,9 +144,9 @@ def test_a_jump_of_the_setpoint_moves_nothing_at_once() -> None:
     """Position and speed go on from where they are, with the new spring, also while the motion is under way."""
     ticks, force = 300, np.array([30.0, 10.0])
     plan = [np.diag([2000.0, 2000.0]), COUPLED, np.diag([800.0, 4000.0])]
-    model, got = Admittance(Parameters()), []
+    model, got = Follower(), []
     for tick in range(ticks):
-        got.append(model.update(pushed(force[:, None]), asked(np.zeros((2, 1)), plan[tick // 100][None]))[:, 0])
+        got.append(model.update(force[:, None], asked(np.zeros((2, 1)), plan[tick // 100][None]))[:, 0])
     expected = exact_motion(lambda tick: force, plan, ticks)
     np.testing.assert_allclose(np.array(got)[:, :2], expected[:, :2], rtol=0, atol=1e-7)
     np.testing.assert_allclose(np.array(got)[:, 2:4], expected[:, 2:4], rtol=0, atol=1e-5)
@@ -143,10 +157,10 @@ def test_at_rest_it_stands_on_the_compliant_target(period: float) -> None:
     """(19), whatever the control period, and without a creep."""
     matrices, rng = np.concatenate([springs(30), [COUPLED]]), np.random.default_rng(2)
     force, position = rng.uniform(-40, 40, (2, 31)), rng.uniform(-0.1, 0.6, (2, 31))
-    model = Admittance(Parameters().replace({"electronics.control_period": period}))
+    model = Follower(31, period=period)
     reference = asked(position, matrices)
     for _ in range(round(4.0 / period)):
-        motion = model.update(pushed(force), reference)
+        motion = model.update(force, reference)
     expected = position + np.linalg.solve(matrices, force.T[..., None])[..., 0].T
     np.testing.assert_allclose(motion[:2], expected, rtol=0, atol=1e-10)
     np.testing.assert_allclose(motion[:2], reference.compliant_target(force), rtol=0, atol=1e-10)
@@ -157,9 +171,9 @@ def test_at_rest_it_stands_on_the_compliant_target(period: float) -> None:
 def test_damping_ratio_and_mass_are_those_asked_for(ratio: float) -> None:
     """A step of force overshoots by exp(-pi zeta / sqrt(1 - zeta^2)) after pi / (w sqrt(1 - zeta^2)), or not at all."""
     mass, stiffness = 5.0, 2000.0
-    model = Admittance(Parameters().replace({"mechanics.mass": mass}), ratio)
+    model = Follower(ratio=ratio, mass=mass)
     reference = asked(np.zeros((2, 1)), stiffness * np.eye(2)[None])
-    path = np.array([model.update(pushed(np.array([[20.0], [0.0]])), reference)[:2, 0] for _ in range(2000)])
+    path = np.array([model.update(np.array([[20.0], [0.0]]), reference)[:2, 0] for _ in range(2000)])
     assert np.all(path[:, 1] == 0)
     peak = path[:, 0].max() / (20.0 / stiffness)
     if ratio < 1:
@@ -174,35 +188,13 @@ def test_a_damping_factor_multiplies_the_damping_of_each_lane() -> None:
     """Lane by lane the motion of an admittance with that much more damping, bit for bit; below 1 it says nothing."""
     factors, force = np.array([0.0, 1.0, 1.5, 2.0]), np.full((2, 4), 20.0)
     reference = asked(np.zeros((2, 4)), np.repeat([COUPLED], 4, axis=0))
-    model = Admittance(Parameters(), 0.8)
-    plain = [Admittance(Parameters(), 0.8 * max(1.0, factor)) for factor in factors]
+    model = Follower(4, 0.8)
+    plain = [Follower(ratio=0.8 * max(1.0, factor)) for factor in factors]
     for _ in range(300):
-        motion = model.update(pushed(force), reference, factors)
+        motion = model.update(force, reference, factors)
         for lane, one in enumerate(plain):
             alone = Reference(reference.rows[:, lane : lane + 1])
-            assert np.array_equal(motion[:, lane : lane + 1], one.update(pushed(force[:, :1]), alone))
-    with pytest.raises(ValueError, match=r"damping_factor has shape \(3,\); allowed: \(4,\)"):
-        model.update(pushed(force), reference, np.ones(3))
-
-
-def test_reset_of_some_lanes_starts_only_those_on_the_target() -> None:
-    reference, force = asked(np.full((2, 3), 0.2), springs(3)), np.full((2, 3), 20.0)
-    model, kept = Admittance(Parameters()), Admittance(Parameters())
-    fresh = np.array([False, True, False])
-    for tick in range(300):
-        if tick == 100:
-            model.reset(fresh)
-        got, expected = model.update(pushed(force), reference), kept.update(pushed(force), reference)
-        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
-        if tick == 100:
-            assert np.array_equal(got[:4, 1], [0.2, 0.2, 0.0, 0.0])
-            assert np.abs(expected[:2, 1] - 0.2).max() > 1e-3
-    model.reset()
-    kept = Admittance(Parameters())
-    assert np.array_equal(model.update(pushed(force), reference), kept.update(pushed(force), reference))
-    # Another number of lanes is another run.
-    fewer = asked(np.full((2, 2), 0.2), springs(2))
-    assert np.array_equal(model.update(pushed(force[:, :2]), fewer)[:2], fewer.position)
+            assert np.array_equal(motion[:, lane : lane + 1], one.update(force[:, :1], alone))
 
 
 @pytest.mark.parametrize("period", [1e-3, 1e-2])
@@ -211,7 +203,7 @@ def test_a_forecast_comes_true_where_nothing_new_happens(period: float) -> None:
 
     From a motion under way, with a lane that has just been reset; asking changes nothing.
     """
-    rig, rng, lanes = Parameters().replace({"electronics.control_period": period}), np.random.default_rng(5), 4
+    rng, lanes = np.random.default_rng(5), 4
     matrices, ticks = np.concatenate([springs(lanes - 1), [COUPLED]]), np.array([1, 2, 3, 7, 8, 20, 57])
     target = rng.uniform(-1, 1, (4, 2, lanes)) * np.array([0.5, 0.3, 2.0, 40.0])[:, None, None]
 
@@ -223,33 +215,18 @@ def test_a_forecast_comes_true_where_nothing_new_happens(period: float) -> None:
             reference.rows[2 * order : 2 * order + 2] = np.sum(terms, axis=0)
         return reference
 
-    model, kept = Admittance(rig), Admittance(rig)
+    model, kept = Follower(lanes, period=period), Follower(lanes, period=period)
     for tick in range(-60, 1):
         force = rng.uniform(-30, 30, (2, lanes))
         if tick == 0:
-            model.reset(np.array([False, True, False, False]))
-            kept.reset(np.array([False, True, False, False]))
-        motion = model.update(pushed(force), at(tick))
-        kept.update(pushed(force), at(tick))
+            model.offset.rows[:, 1] = kept.offset.rows[:, 1] = 0.0
+        motion = model.update(force, at(tick))
+        kept.update(force, at(tick))
     ahead = model.forecast(at(0), force, ticks)
     assert ahead.shape == (len(ticks), 4, lanes)
     np.testing.assert_array_equal(model.forecast(at(0), force, ticks[2:]), ahead[2:])
     for tick in range(1, ticks[-1] + 1):
-        motion = model.update(pushed(force), at(tick))
-        assert np.array_equal(motion, kept.update(pushed(force), at(tick)))
+        motion = model.update(force, at(tick))
+        assert np.array_equal(motion, kept.update(force, at(tick)))
         for found in ahead[ticks == tick]:
             np.testing.assert_allclose(found, motion[:4], rtol=1e-11, atol=1e-13)
-
-
-@pytest.mark.parametrize("ratio", [0.0, -0.5, np.nan, np.inf])
-def test_impossible_damping_ratios_are_refused(ratio: float) -> None:
-    with pytest.raises(ValueError, match=r"damping_ratio = .*; allowed: a positive number"):
-        Admittance(Parameters(), ratio)
-
-
-@pytest.mark.parametrize("matrix", [[[2000, 2500], [2500, 2000]], [[-100, 0], [0, 2000]], [[2000, 0], [0, 0]]])
-def test_a_spring_that_is_not_positive_definite_is_refused(matrix: list[list[float]]) -> None:
-    """The lane is named; it would push the reference away without end."""
-    both = np.array([COUPLED, matrix], dtype=float)
-    with pytest.raises(ValueError, match=r"stiffness setpoint .* N/m in lane 1; allowed: more than 0 N/m in every direction"):
-        Admittance(Parameters()).update(pushed(np.zeros((2, 2))), asked(np.zeros((2, 2)), both))

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.estimation.chamber_observer import ChamberObserver
+from baselines.estimation.chamber_observer import Chambers, observe
+from baselines.estimation.rows import Joints
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -34,8 +35,18 @@ START = np.array([[1.6e5], [5.5e5], [3.0e5], [2.2e5]])
 """Pa, in chambers P1, N1, P2, N2."""
 
 
-def observer(rig: Parameters, bandwidth: float, period: float = PERIOD) -> ChamberObserver:
-    return ChamberObserver(period, parameter_column(rig), bandwidth)
+class Observer:
+    """The kernel with what a stage keeps for it, over N lanes."""
+
+    def __init__(self, rig: Parameters, bandwidth: float, lanes: int = 1, period: float = PERIOD) -> None:
+        self._numbers = (parameter_column(rig), period, 1.0 - math.exp(-bandwidth * period))
+        self._chambers, self.fresh = Chambers(np.zeros((Chambers.size, lanes))), np.ones(lanes)
+        self.spools, self.openings = self._chambers.spool, self._chambers.opening
+
+    def update(self, measured: Array, joints: Array) -> Array:
+        observe(self._chambers, np.ascontiguousarray(measured), Joints(joints), *self._numbers, self.fresh)
+        self.fresh[:] = 0.0
+        return self._chambers.pressure
 
 
 def resting(lanes: int, y1: float = 0.02, y2: float = -0.05) -> Array:
@@ -96,7 +107,7 @@ def truth(rig: Parameters, openings: Array, times: Array) -> tuple[Array, Array]
     return np.array(found)[:, :4], np.array(found)[:, 4:]
 
 
-def believed(estimator: ChamberObserver, openings: Array, times: Array, measured: Callable[[int], Array]) -> Array:
+def believed(estimator: Observer, openings: Array, times: Array, measured: Callable[[int], Array]) -> Array:
     """Spools and pressures (T, 8) of one rig that swings while its valves are told ``openings``."""
     path, joints = [], np.zeros((4, 1))
     for tick, time in enumerate(times):
@@ -114,7 +125,7 @@ def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
     for period in (1e-3, 5e-4):
         times = period * np.arange(round(20 * HOLD / period))
         spools, pressures = truth(rig, openings, times)
-        path = believed(observer(rig, BLIND, period), openings, times, lambda tick: START)
+        path = believed(Observer(rig, BLIND, period=period), openings, times, lambda tick: START)
         np.testing.assert_allclose(path[:, :4], spools, rtol=0, atol=1e-12)
         errors.append(np.abs(path[:, 4:] - pressures).max(axis=0))
     assert np.ptp(pressures, axis=0).min() > 4e4, "there must be something to predict"
@@ -125,7 +136,7 @@ def test_what_was_commanded_tells_spools_and_pressures(rig: Parameters) -> None:
 def test_spools_are_those_of_the_plant() -> None:
     """Also with full openings, and after commands that change at every period."""
     rig, lanes, rng = ANOTHER, 3, np.random.default_rng(0)
-    plant, estimator = Plant(rig, lanes), observer(rig, 150.0)
+    plant, estimator = Plant(rig, lanes), Observer(rig, 150.0, lanes)
     for _ in range(30):
         estimator.update(plant.pressures, resting(lanes))
         np.testing.assert_allclose(estimator.spools, plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
@@ -137,7 +148,8 @@ def test_spools_are_those_of_the_plant() -> None:
 def test_the_lag_is_integrated_over_the_period() -> None:
     """Choked supply, pistons at rest, no leakage: P = P0 + k r T C rho Ps (integral of s dt)/V, without an error of steps."""
     rig, period, tau, rng = TIGHT, 4e-3, 0.006, np.random.default_rng(1)
-    estimator, pressures, spool, expected = observer(rig, BLIND, period), np.full((4, 1), 1.1e5), np.zeros(4), np.full(4, 1.1e5)
+    estimator, pressures = Observer(rig, BLIND, period=period), np.full((4, 1), 1.1e5)
+    spool, expected = np.zeros(4), np.full(4, 1.1e5)
     density = rig.air.reference_density * math.sqrt(rig.air.reference_temperature / rig.air.temperature)
     choked = rig.valves.sonic_conductance * density * rig.air.supply_pressure
     gain = rig.air.polytropic_index * rig.air.gas_constant * rig.air.temperature * choked
@@ -156,7 +168,7 @@ def test_the_lag_is_integrated_over_the_period() -> None:
 def test_shut_chambers_are_compressed_polytropically() -> None:
     """P V^k stays what it was, but for the step's error."""
     rig, period, path = TIGHT, 1e-4, []
-    estimator, joints, times = observer(rig, BLIND, period), np.zeros((4, 1)), period * np.arange(1500)
+    estimator, joints, times = Observer(rig, BLIND, period=period), np.zeros((4, 1)), period * np.arange(1500)
     for time in times:
         path.append(estimator.update(START, joints)[:, 0].copy())
         joints = swinging(time)[:, None]
@@ -171,7 +183,7 @@ def test_shut_chambers_are_compressed_polytropically() -> None:
 def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None:
     """Nothing flows: the mean is true, the variance a first-order filter's, fraction/(2 - fraction), uncorrelated cells."""
     lanes, noise, fraction = 1000, 500.0, 1 - np.exp(-bandwidth * period)
-    estimator, rng, kept = observer(TIGHT, bandwidth, period), np.random.default_rng(2), []
+    estimator, rng, kept = Observer(TIGHT, bandwidth, lanes, period), np.random.default_rng(2), []
     settled = math.ceil(8 / (bandwidth * period))
     for tick in range(settled + 60):
         measured = START + noise * rng.normal(size=(4, lanes))
@@ -187,7 +199,7 @@ def test_noise_of_the_cells_is_averaged(bandwidth: float, period: float) -> None
 def test_an_error_of_the_model_is_followed_with_the_lag_of_the_bandwidth() -> None:
     """Pressures that rise although nothing should flow: T/(e^(w T) - 1) late, nearly 1/w."""
     bandwidth, rise, lag = 150.0, 2e5, PERIOD / math.expm1(150.0 * PERIOD)
-    estimator, pressures = observer(TIGHT, bandwidth), START.copy()
+    estimator, pressures = Observer(TIGHT, bandwidth), START.copy()
     for _ in range(200):
         estimate = estimator.update(pressures, resting(1)).copy()
         behind, pressures = pressures - estimate, pressures + rise * PERIOD
@@ -204,7 +216,7 @@ def test_what_the_model_explains_is_followed_without_lag() -> None:
     times = PERIOD * np.arange(round(20 * HOLD / PERIOD))
     _, pressures = truth(rig, openings, times)
     cells = pressures + 500.0 * np.random.default_rng(4).normal(size=pressures.shape)
-    path = believed(observer(rig, 150.0), openings, times, lambda tick: cells[tick][:, None])[:, 4:]
+    path = believed(Observer(rig, 150.0), openings, times, lambda tick: cells[tick][:, None])[:, 4:]
     filtered = np.empty((5, *cells.shape))
     for own, fraction in zip(filtered, (0.1, 0.2, 0.4, 0.6, 0.8), strict=True):
         own[0] = cells[0]
@@ -225,7 +237,7 @@ def wild(lanes: int, ticks: int) -> tuple[Array, Array, Array]:
 
 def test_exact_cells_are_believed_bit_for_bit() -> None:
     measured, openings, joints = wild(5, 20)
-    estimator = observer(Parameters(), math.inf)
+    estimator = Observer(Parameters(), math.inf, 5)
     for pressures, opening, now in zip(measured, openings, joints, strict=True):
         assert np.array_equal(estimator.update(pressures, now), pressures)
         estimator.openings[:] = opening
@@ -235,10 +247,10 @@ def test_lanes_and_a_new_start() -> None:
     """Lanes do not know of each other; a reset one starts like a new observer, the others go on as if nothing were."""
     measured, openings, joints = wild(3, 40)
     fresh, one = np.array([False, True, False]), slice(1, 2)
-    kept, reset, single, late = (observer(Parameters(), 150.0) for _ in range(4))
+    kept, reset, single, late = (Observer(Parameters(), 150.0, lanes) for lanes in (3, 3, 1, 1))
     for tick in range(40):
         if tick == 20:
-            reset.reset(fresh)
+            reset.fresh[fresh] = 1.0
         expected, got = (estimator.update(measured[tick], joints[tick]) for estimator in (kept, reset))
         alone = np.ascontiguousarray(measured[tick][:, one]), np.ascontiguousarray(joints[tick][:, one])
         assert np.array_equal(single.update(*alone), expected[:, one])
@@ -256,11 +268,6 @@ def test_lanes_and_a_new_start() -> None:
         for estimator in (kept, reset):
             estimator.openings[:] = openings[tick]
         single.openings[:] = openings[tick][:, one]
-    for start_anew in (lambda: reset.reset(), lambda: reset.update(measured[0][:, :2].copy(), joints[0][:, :2].copy())):
-        start_anew()
-        assert np.array_equal(reset.update(measured[7], joints[7]), measured[7])
-        assert not reset.spools.any()
-        assert not reset.openings.any()
 
 
 @pytest.mark.parametrize("period", [2.5e-4, 1e-3, 1e-2])
@@ -268,7 +275,7 @@ def test_pistons_past_their_strokes_leave_pressures_that_can_be(period: float) -
     """Deeper than the dead volume is long, where a chamber would have none left: the believed one keeps its dead volume."""
     rig = Parameters().replace({"chambers.dead_volume": 5e-6, "electronics.control_period": period})
     past = np.array([[0.112, -0.112], [-0.212, 0.212], [1.0, -1.0], [-1.0, 1.0]])
-    estimator, rng, cells = observer(rig, 150.0, period), np.random.default_rng(6), np.full((4, 2), 4e5)
+    estimator, rng, cells = Observer(rig, 150.0, 2, period), np.random.default_rng(6), np.full((4, 2), 4e5)
     for _ in range(200):
         pressures = estimator.update(cells, past * rng.choice([-1, 1], (4, 1)))
         assert 1e5 < pressures.min() <= pressures.max() < 1e6

@@ -8,19 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.estimation.disturbance_observer import DisturbanceObserver
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
+from tests.oracles.observed import Measured
 
 PERIOD = 1e-3
 RIG = Parameters().replace({"geometry.gamma3": 1.45})
-
-
-def observer(bandwidth: float, rig: Parameters = RIG) -> DisturbanceObserver:
-    return DisturbanceObserver(rig.electronics.control_period, parameter_column(rig), bandwidth)
 
 
 def measured(piston: Array, speed: Array, pressures: Array, rig: Parameters, user: Array) -> Measurement:
@@ -34,14 +30,14 @@ def test_an_unknown_force_is_found_with_a_double_pole(bandwidth: float, period: 
     """Cylinder 2 alone, weightless: d follows F/m (1 - (1 + w t) e^(-w t)), in steps with the pole 1 - w T twice."""
     changes = {"mechanics.gravity": 0.0, "cylinder2.viscous_friction": 0.0, "electronics.control_period": period}
     rig = RIG.replace(changes)
-    estimator, unknown, errors = observer(bandwidth, rig), 6.0, []
+    estimator, unknown, errors = Measured(rig, bandwidth, 1), 6.0, []
     a = unknown / rig.mechanics.mass
     pressures = np.full((4, 1), rig.air.atmospheric_pressure)
     times = period * np.arange(round(8 / bandwidth / period))
     for time in times:
         piston, speed = np.array([[0.01], [-0.1 + 0.5 * a * time**2]]), np.array([[0.0], [a * time]])
         estimator.update(measured(piston, speed, pressures, rig, np.zeros((2, 1))), np.zeros((2, 1)), np.zeros((2, 1)))
-        errors.append(estimator.disturbance[:, 0] - [0.0, a])
+        errors.append(estimator.pistons.disturbance[:, 0] - [0.0, a])
     error = np.array(errors)
     assert np.abs(error[:, 0]).max() < 1e-9, "cylinder 1 feels nothing"
     kept = 1 - bandwidth * period
@@ -81,7 +77,7 @@ def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
 
     piston, speed, pressures = swinging(unknown, known, user, 0.3)
     assert np.abs(speed).max() > 0.2, "it must move"
-    estimator = observer(200.0)
+    estimator = Measured(RIG, 200.0, 1)
     for tick, (y, v) in enumerate(zip(piston, speed, strict=True)):
         seen = measured(y[:, None], v[:, None], pressures, RIG, user[:, None])
         joints = estimator.update(seen, user[:, None], known(tick * PERIOD)[:, None])
@@ -91,28 +87,25 @@ def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
             pose = by_points.pose_from_lengths(y[0] + RIG.geometry.k1, r2, RIG.geometry)
             kappa = np.hypot(*by_points.cartesian_velocity(pose, r2, 1.0, 0.0)[0])
             expected = unknown / (RIG.mechanics.mass * np.array([kappa**2, 1.0]))
-            np.testing.assert_allclose(estimator.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
+            np.testing.assert_allclose(estimator.pistons.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
 
 
 def test_lanes_and_a_new_start() -> None:
     """Lanes do not know of each other; a reset one starts from the speed that is measured, without a disturbance."""
     now = rigid_body.near_balance(RIG, 3, seed=7, speed=0.1, push=20.0)
     nothing, fresh = np.zeros((2, 3)), np.array([False, True, False])
-    kept, reset, single, late = (observer(60.0) for _ in range(4))
+    kept, reset, single, late = (Measured(RIG, 60.0, lanes) for lanes in (3, 3, 1, 1))
     seen = measured(now.piston, now.speed, now.pressures, RIG, nothing)
     alone = measured(now.piston[:, 1:2], now.speed[:, 1:2], now.pressures[:, 1:2], RIG, nothing[:, :1])
     for tick in range(40):
         if tick == 20:
-            reset.reset(fresh)
+            reset.pistons.fresh[fresh] = 1.0
         for estimator in (kept, reset):
             estimator.update(seen, nothing, nothing)
         single.update(alone, nothing[:, :1], nothing[:, :1])
-        assert np.array_equal(single.disturbance[:, 0], kept.disturbance[:, 1])
-        assert np.array_equal(reset.disturbance[:, ~fresh], kept.disturbance[:, ~fresh])
+        assert np.array_equal(single.pistons.disturbance[:, 0], kept.pistons.disturbance[:, 1])
+        assert np.array_equal(reset.pistons.disturbance[:, ~fresh], kept.pistons.disturbance[:, ~fresh])
         if tick >= 20:
             late.update(alone, nothing[:, :1], nothing[:, :1])
-            assert np.array_equal(reset.disturbance[:, 1], late.disturbance[:, 0])
-    assert np.abs(kept.disturbance[:, 1] - reset.disturbance[:, 1]).max() > 0.01
-    reset.reset()
-    reset.update(seen, nothing, nothing)
-    assert np.all(reset.disturbance == 0)
+            assert np.array_equal(reset.pistons.disturbance[:, 1], late.pistons.disturbance[:, 0])
+    assert np.abs(kept.pistons.disturbance[:, 1] - reset.pistons.disturbance[:, 1]).max() > 0.01

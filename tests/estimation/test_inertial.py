@@ -5,6 +5,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from baselines.estimation import inertial
+from baselines.estimation.rows import Point
+from birthsim_env.loop.rows import Signals
 from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD, EVERY = 1e-3, 4
@@ -19,9 +21,9 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
 
     The observer started ``old`` s before ``begin``, s.
     """
-    rng, rows = np.random.default_rng(7), inertial.memory_rows(Parameters())
-    memory, told, found, errors = np.zeros((rows, lanes)), np.empty((4, lanes)), [], []
-    memory[inertial.FRESH] = 1.0
+    stage, rng = inertial.law_stage(Parameters()), np.random.default_rng(7)
+    memory, gains = inertial.Memory(np.repeat(stage.fresh[:, None], lanes, axis=1)), inertial.Gains(stage.constants)
+    point, signals, found, errors = Point(np.empty((4, lanes))), Signals(np.zeros((Signals.size, lanes))), [], []
     taken = [(begin, *(np.full((2, lanes), one) for one in motion(begin)))]
     truth = []
     for k in range(ticks):
@@ -30,18 +32,16 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
         if k % EVERY == 0 and rng.uniform() >= lost:
             taken.append((time, x + noise * rng.standard_normal((2, lanes)), v))
         stamp, shown, _ = next(one for one in reversed(taken) if one[0] <= time - latency + 1e-9 or one is taken[0])
-        speed = np.full((2, lanes), v)
-        inertial.observe(
-            memory, np.full(lanes, time), shown, np.full(lanes, stamp), speed, acceleration(time, lanes), PERIOD,
-            inertial.BANDWIDTH, told,
-        )  # fmt: skip
+        signals.time[:], signals.position[:], signals.position_time[:] = time, shown, stamp
+        signals.velocity[:], signals.acceleration[:] = v, acceleration(time, lanes)
+        inertial.observe(memory, signals, gains, point)
         if k == 0:
-            memory[inertial.BEGAN] -= old
-            for row, off in zip((inertial.X, inertial.V, inertial.BIAS), wrong, strict=True):
-                memory[row : row + 2] += off
+            memory.began[:] -= old
+            for own, off in zip((memory.position, memory.velocity, memory.bias), wrong, strict=True):
+                own[:] += off
         truth.append(np.array([[x], [x], [v], [v]]) + np.zeros((4, lanes)))
-        found.append(told.copy())
-        errors.append(told[:2] - x)
+        found.append(point.rows.copy())
+        errors.append(point.position - x)
     return np.array(truth), np.array(found), np.array(errors)[::EVERY]
 
 

@@ -9,25 +9,21 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.estimation.observers import PistonObserver
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
+from tests.oracles.observed import Sampled
 
 PERIOD = 1e-3
 COASTING = Parameters().replace(
     {"mechanics.gravity": 0.0, "cylinder1.viscous_friction": 0.0, "cylinder2.viscous_friction": 0.0, "geometry.gamma3": 1.4}
 )
 """Weightless and without viscous friction: while cylinder 1 rests, the model of cylinder 2 is d2y/dt2 = force / m."""
-
-
-def observer(rig: Parameters, **options: float) -> PistonObserver:
-    return PistonObserver(rig, parameter_column(rig), **options)
 
 
 def samples(piston: Callable[[Array], Array], seconds: float, rig: Parameters, force2: float) -> Iterator[Measurement]:
@@ -58,7 +54,7 @@ def steady(times: Array) -> Array:
 def test_errors_decay_with_a_triple_pole(rate: float, latency: float, bandwidth: float) -> None:
     """Errors at successive samples obey (q - exp(-w/rate))^3 e = 0, q the step from sample to sample, however late they are."""
     rig = COASTING.replace({"electronics.position_rate": rate, "electronics.position_latency": latency})
-    estimator, errors = observer(rig, bandwidth=bandwidth), []
+    estimator, errors = Sampled(rig, bandwidth), []
     for measured in samples(steady, 0.5, rig, force2=6.0):
         estimate = estimator.update(measured)
         truth = steady(measured.time)
@@ -75,7 +71,7 @@ def test_errors_decay_with_a_triple_pole(rate: float, latency: float, bandwidth:
 def test_constant_speed_is_found_without_bias(rate: float, latency: float) -> None:
     """Although the pressures claim an acceleration of 8 m/s2 and the sample is as old as the latency: no error remains."""
     rig = COASTING.replace({"electronics.position_rate": rate, "electronics.position_latency": latency})
-    estimator = observer(rig)
+    estimator = Sampled(rig)
     for measured in samples(steady, 2.0, rig, force2=24.0):
         estimate = estimator.update(measured)
         if measured.time[0] > 1.5:
@@ -103,7 +99,7 @@ def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], R
 
 def watched(rig: Parameters, lanes: int, seconds: float) -> dict[str, Array]:
     """A rig on the circle under exact measurements, while an observer watches through the tracker: (T, 2, N) after 1 s."""
-    reference, estimator, sense = circle(lanes), observer(rig), tracker(rig, lanes)
+    reference, estimator, sense = circle(lanes), Sampled(rig), tracker(rig, lanes)
     plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
     speed, piston_error, speed_error = [], [], []
     for time, _, push, _ in closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds):
@@ -170,18 +166,18 @@ def lane_of(measured: Measurement, lane: int) -> Measurement:
 
 def test_lanes_do_not_know_of_each_other() -> None:
     measurements = recorded(4, 0.4)
-    together = observer(closed_loop.FRICTIONLESS)
+    together = Sampled(closed_loop.FRICTIONLESS)
     estimates = np.array([together.update(m).copy() for m in measurements])
     assert len(np.unique(estimates[-1, 0])) == 4, "every lane has noise of its own"
     for lane in range(4):
-        alone = observer(closed_loop.FRICTIONLESS)
+        alone = Sampled(closed_loop.FRICTIONLESS)
         assert np.array_equal([alone.update(lane_of(m, lane))[:, 0].copy() for m in measurements], estimates[:, :, lane])
 
 
 def test_reset_of_some_lanes_starts_only_those_anew() -> None:
     """A lane that is reset takes what the tracker shows for its position and speed, and goes on from there."""
     measurements, masked = recorded(3, 1.2), np.array([False, True, False])
-    kept, reset = observer(closed_loop.FRICTIONLESS), observer(closed_loop.FRICTIONLESS)
+    kept, reset = Sampled(closed_loop.FRICTIONLESS), Sampled(closed_loop.FRICTIONLESS)
     for tick, measured in enumerate(measurements):
         if tick == 600:
             reset.reset(masked)
@@ -190,15 +186,13 @@ def test_reset_of_some_lanes_starts_only_those_anew() -> None:
         if tick < 600:
             assert np.array_equal(got, expected)
         if tick == 600:
-            late = observer(closed_loop.FRICTIONLESS)
+            late = Sampled(closed_loop.FRICTIONLESS)
             shown = np.linalg.solve(jacobian(got[:2, 1], closed_loop.FRICTIONLESS), measured.velocity[:, 1])
             np.testing.assert_allclose(got[2:, 1], shown, rtol=1e-9)
             assert np.abs(expected[2:, 1]).max() > 0.01
         if tick >= 600:
             assert np.array_equal(got[:, 1], late.update(lane_of(measured, 1))[:, 0])
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
-    reset.reset()
-    assert np.array_equal(reset.update(measurements[0]), observer(closed_loop.FRICTIONLESS).update(measurements[0]))
 
 
 class Differences:

@@ -9,13 +9,31 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from baselines.estimation.reference_friction import ReferenceFriction
+from baselines.estimation import reference_friction
+from baselines.estimation.rows import Motion
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 
 RIG, RATE = Parameters(), 2.5
+
+
+class Friction:
+    """The kernels with the bristles that a stage keeps for them, over N lanes."""
+
+    def __init__(self, lanes: int = 1, rig: Parameters = RIG) -> None:
+        self._p, self._period, self.bristles = parameter_column(rig), rig.electronics.control_period, np.zeros((2, lanes))
+
+    def update(self, motion: Array) -> Array:
+        drag = np.empty_like(self.bristles)
+        reference_friction.rub(Motion(motion), self._p, self._period, self.bristles, drag)
+        return drag
+
+    def forecast(self, ahead: Array, ticks: Array) -> Array:
+        drag = np.empty((len(ticks), *self.bristles.shape))
+        reference_friction.forecast(ahead, self._p, self._period * np.diff(ticks, prepend=0), self.bristles, drag)
+        return drag
 
 
 def circle(times: Array, size: float = 0.06) -> Array:
@@ -48,7 +66,7 @@ def lugre(speed: Callable[[float], float], cylinder: Cylinder, times: Array, rig
 
 def drags(rig: Parameters, times: Array, motion: Callable[[Array], Array]) -> Array:
     """(T, 2): what the class says, one period after the other."""
-    model = ReferenceFriction(rig.electronics.control_period, parameter_column(rig))
+    model = Friction(rig=rig)
     rows = np.zeros((8, len(times)))
     rows[:4] = motion(times)
     return np.array([model.update(np.ascontiguousarray(rows[:, k : k + 1]))[:, 0] for k in range(len(times))])
@@ -108,35 +126,14 @@ def test_a_resting_reference_keeps_its_bristles() -> None:
     assert np.all(drags(RIG, times[:50], lambda at: circle(0 * at) * [[1], [1], [0], [0]]) == 0)
 
 
-def test_lanes_and_a_new_start() -> None:
-    times, fresh = 1e-3 * np.arange(300), np.array([False, True])
-    motion = np.zeros((300, 8, 2))
-    motion[:, :4, 0], motion[:, :4, 1] = circle(times).T, circle(times + 0.9).T
-    kept, reset, single, late = (ReferenceFriction(1e-3, parameter_column(RIG)) for _ in range(4))
-    for tick, wanted in enumerate(motion):
-        if tick == 150:
-            reset.reset(fresh)
-        expected, got = kept.update(wanted), reset.update(wanted)
-        alone = np.ascontiguousarray(wanted[:, 1:])
-        assert np.array_equal(single.update(alone)[:, 0], expected[:, 1])
-        assert np.array_equal(got[:, 0], expected[:, 0])
-        if tick >= 150:
-            assert np.array_equal(late.update(alone)[:, 0], got[:, 1])
-        if tick == 150:
-            assert np.abs(got[:, 1] - expected[:, 1]).max() > 1
-    reset.reset()
-    again = ReferenceFriction(1e-3, parameter_column(RIG))
-    assert np.array_equal(reset.update(motion[9]), again.update(motion[9]))
-
-
 def two_lanes(times: Array) -> Array:
     """(T, 4, 2): the ellipse twice, with different pistons turning round at different times."""
     return np.stack([circle(times).T, circle(times + 0.9).T], axis=2)
 
 
-def under_way(until: float, count: int = 1) -> tuple[list[ReferenceFriction], Array]:
+def under_way(until: float, count: int = 1) -> tuple[list[Friction], Array]:
     """Models that have followed the ellipses for so long, s, and what they said last (2, N)."""
-    models, motion = [ReferenceFriction(1e-3, parameter_column(RIG)) for _ in range(count)], np.zeros((8, 2))
+    models, motion = [Friction(2) for _ in range(count)], np.zeros((8, 2))
     for wanted in two_lanes(np.arange(0, until, 1e-3)):
         motion[:4] = wanted
         drags = [model.update(motion) for model in models]
@@ -152,7 +149,7 @@ def test_a_forecast_is_what_updates_say_later(until: float) -> None:
     found = model.forecast(ahead, np.arange(1, len(ahead) + 1))
     assert np.array_equal(model.forecast(ahead[:5], np.arange(1, 6)), found[:5])
     alone = np.ascontiguousarray(ahead[:, :, 1:])
-    single = ReferenceFriction(1e-3, parameter_column(RIG))
+    single = Friction()
     for wanted in two_lanes(np.arange(0, until, 1e-3)):
         motion[:4] = wanted
         single.update(np.ascontiguousarray(motion[:, 1:]))

@@ -15,7 +15,8 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_arra
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.estimation.test_observers import PERIOD, lane_of, observer, rms
+from tests.estimation.test_observers import PERIOD, lane_of, rms
+from tests.oracles.observed import Sampled
 
 STUCK = np.array([[0.02], [-0.05]])
 """m: where friction holds both pistons."""
@@ -47,14 +48,14 @@ def apparent(rig: Parameters) -> Array:
 
 def spread(moving: float, rig: Parameters = Parameters(), lanes: int = 16) -> dict[str, Array]:  # noqa: B008
     """RMS over lanes and the last second of 2.5 s: errors of position, speed and of the force that friction bears, (2,)."""
-    estimator, kept = observer(rig), []
+    estimator, kept = Sampled(rig), []
     for measured in stuck(rig, lanes, 2.5):
         estimate = estimator.update(measured, moving=np.full(lanes, moving))
         if measured.time[0] >= 1.5:
-            force = (estimator.disturbance * apparent(rig)) + LOAD
+            force = (estimator.pistons.disturbance * apparent(rig)) + LOAD
             kept.append([estimate[:2] - STUCK, estimate[2:], force])
     position, speed, force = (rms(np.array(kept)[:, k]) for k in range(3))
-    return {"position": position, "speed": speed, "force": force, "rest": estimator.rest.mean(axis=1)}
+    return {"position": position, "speed": speed, "force": force, "rest": estimator.pistons.rest.mean(axis=1)}
 
 
 def test_a_stuck_piston_is_seen_with_less_noise() -> None:
@@ -72,16 +73,16 @@ def test_a_stuck_piston_is_seen_with_less_noise() -> None:
 def test_a_piston_that_may_not_rest_never_does() -> None:
     """``moving`` 1 is the observer without rest, bit by bit; and 1 again in the middle of a rest ends it at once."""
     rig, lanes = Parameters(), 3
-    plain, told, sometimes = observer(rig), observer(rig), observer(rig)
+    plain, told, sometimes = Sampled(rig), Sampled(rig), Sampled(rig)
     for measured in stuck(rig, lanes, 1.2):
         late = measured.time[0] >= 1.0
         expected = plain.update(measured).copy()
         assert np.array_equal(told.update(measured, moving=np.ones(lanes)), expected)
-        assert np.all(told.rest == 0)
+        assert np.all(told.pistons.rest == 0)
         sometimes.update(measured, moving=np.full(lanes, float(late)))
         if measured.time[0] == 0.999:
-            assert np.all(sometimes.rest > 0.9)
-        assert not (late and sometimes.rest.any())
+            assert np.all(sometimes.pistons.rest > 0.9)
+        assert not (late and sometimes.pistons.rest.any())
 
 
 @pytest.mark.parametrize("speed", [0.01, 0.03, 0.1])
@@ -92,10 +93,10 @@ def test_a_piston_that_slips_is_noticed(speed: float) -> None:
     position trails by 0.06 mm.
     """
     rig, lanes, woken, errors = Parameters(), 16, np.full(16, np.inf), []
-    estimator = observer(rig)
+    estimator = Sampled(rig)
     for measured in stuck(rig, lanes, 1.5, speed):
         estimate, time = estimator.update(measured, moving=np.zeros(lanes)), measured.time[0]
-        woken = np.where((time >= 1.0) & (estimator.rest[1] < 0.5) & np.isinf(woken), time - 1.0, woken)
+        woken = np.where((time >= 1.0) & (estimator.pistons.rest[1] < 0.5) & np.isinf(woken), time - 1.0, woken)
         if time > 1.4:
             errors.append([estimate[1] - STUCK[1] - speed * (time - 1.0), estimate[3] - speed])
     assert np.median(woken) < 0.00035 / speed + 0.01
@@ -107,12 +108,12 @@ def test_a_piston_that_slips_is_noticed(speed: float) -> None:
 
 def settling(told: bool) -> float:
     """Time in which cylinder 2 comes to rest by 63 % after a slip of 40 ms, of which the observer is told or not, s."""
-    estimator, times, rests = observer(Parameters()), [], []
+    estimator, times, rests = Sampled(Parameters()), [], []
     for measured in stuck(Parameters(), 8, 2.6, 0.05, 0.04):
         time = measured.time[0]
         estimator.update(measured, moving=np.full(8, float(told and 1.0 <= time < 1.08)))
         times.append(time)
-        rests.append(np.median(estimator.rest[1]))
+        rests.append(np.median(estimator.pistons.rest[1]))
     after, seconds = np.array(rests) > 1 - np.exp(-1), np.array(times)
     awake = seconds[(seconds > 1.0) & ~after].min()
     return float(seconds[(seconds > awake) & after].min() - awake)
@@ -141,13 +142,13 @@ def test_other_control_periods(period: float) -> None:
 def test_at_rest_friction_takes_up_the_load_with_a_double_pole() -> None:
     """Without samples: d goes to what friction must bear, in steps with the pole exp(-wr T) twice."""
     rig = Parameters().replace({"electronics.position_noise": 0.0, "electronics.pressure_noise": 0.0})
-    estimator, loads = observer(rig), []
+    estimator, loads = Sampled(rig), []
     for tick, measured in enumerate(stuck(rig, 1, 0.1)):
         frozen = dataclasses.replace(measured, position_time=np.zeros(1))
         if tick == 1:
-            estimator.rest[:] = 1.0
+            estimator.pistons.rest[:] = 1.0
         estimator.update(frozen, moving=np.zeros(1))
-        loads.append((estimator.disturbance * apparent(rig) + LOAD)[:, 0])
+        loads.append((estimator.pistons.disturbance * apparent(rig) + LOAD)[:, 0])
     error, kept = np.array(loads)[1:], np.exp(-REST_BANDWIDTH * PERIOD)
     left = error[2:] - 2 * kept * error[1:-1] + kept**2 * error[:-2]
     np.testing.assert_allclose(left[1:], 0, rtol=0, atol=2e-3 * np.abs(LOAD).max())
@@ -158,19 +159,19 @@ def test_resting_lanes_do_not_know_of_each_other() -> None:
     """Lanes of which one rests, one may not and one slips: each as if alone; and a reset one wakes like a new observer."""
     rig, moving = Parameters(), np.array([0.0, 1.0, 0.0])
     measurements = list(stuck(rig, 3, 1.4, 0.05, 0.9))
-    together, reset = observer(rig), observer(rig)
+    together, reset = Sampled(rig), Sampled(rig)
     estimates = np.array([together.update(m, moving=moving).copy() for m in measurements])
-    late = observer(rig)
+    late = Sampled(rig)
     for lane in range(3):
-        alone = observer(rig)
+        alone = Sampled(rig)
         own = [alone.update(lane_of(m, lane), moving=moving[lane : lane + 1])[:, 0].copy() for m in measurements]
         assert np.array_equal(own, estimates[:, :, lane])
     for tick, measured in enumerate(measurements):
         if tick == 800:
-            assert reset.rest[1, 2] > 0.9
+            assert reset.pistons.rest[1, 2] > 0.9
             reset.reset(np.array([False, False, True]))
         got = reset.update(measured, moving=moving)
         if tick >= 800:
             assert np.array_equal(got[:, 2], late.update(lane_of(measured, 2), moving=moving[2:])[:, 0])
-            assert np.array_equal(reset.rest[:, 2], late.rest[:, 0])
+            assert np.array_equal(reset.pistons.rest[:, 2], late.pistons.rest[:, 0])
         assert np.array_equal(got[:, :2], estimates[tick][:, :2])

@@ -117,7 +117,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
     from agents.residual.env import ResidualEnv
     from agents.residual.settings import ResidualSettings
     from agents.training.configuration import TrainingSettings
-    from baselines.admittance.controller import AdmittanceBackstepping
+    from baselines.admittance.controller import AdmittanceController
     from baselines.backstepping.cartesian_controller import CartesianBackstepping
     from baselines.backstepping.controller import BacksteppingController
     from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
@@ -137,7 +137,7 @@ def _makers() -> dict[str, tuple[Callable[..., Any], bool]]:
         ),
         *(moving_hands.Sine, moving_hands.Noise, moving_hands.Guided),
     )
-    laws = (AdmittanceBackstepping, CartesianBackstepping, BacksteppingController, LinearQuadratic, PositionPID, SlidingMode)
+    laws = (AdmittanceController, CartesianBackstepping, BacksteppingController, LinearQuadratic, PositionPID, SlidingMode)
     return {
         **{part.__name__: (part, False) for part in parts},
         **{law.__name__: (law, True) for law in (*laws, RandomValves)},

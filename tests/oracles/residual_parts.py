@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from agents.residual import authority, unexplained
-from baselines.estimation.disturbance_observer import DisturbanceObserver
-from baselines.estimation.observers import PistonObserver
 from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.oracles.observed import Measured, Sampled
 
 
 class AuthorityLimiter:
@@ -40,26 +39,22 @@ class UnexplainedForceObserver:
 
     def __init__(self, parameters: Parameters) -> None:
         self._period, self._p = parameters.electronics.control_period, parameter_column(parameters)
-        self._measured = DisturbanceObserver(self._period, self._p, unexplained.BANDWIDTH)
-        self._sampled = PistonObserver(parameters, self._p)
+        self._rig, self._sampled = parameters, Sampled(parameters)
         self.met: Array = np.zeros((unexplained.ROWS, 0))
         self.joints: Array = np.zeros((4, 0))
 
     def reset(self, lanes: Mask) -> None:
         if self.met.shape[1] != len(lanes):
             self.met, self._seen = np.zeros((unexplained.ROWS, len(lanes))), np.zeros((4, len(lanes)))
-            self._measured.reset()
-            self._sampled.reset()
-        self._measured.reset(lanes)
+            self._measured = Measured(self._rig, unexplained.BANDWIDTH, len(lanes))
+            self._sampled = Sampled(self._rig)
+        self._measured.pistons.fresh[lanes] = 1.0
         self._sampled.reset(lanes)
         self.met[:, lanes], self._seen[:, lanes] = 0.0, 0.0
 
     def update(self, measurement: Measurement) -> None:
         force = np.ascontiguousarray(measurement.user_force)
         observer = self._sampled if measurement.sampled else self._measured
-        if isinstance(observer, PistonObserver):
-            self.joints = np.ascontiguousarray(observer.update(measurement, force))
-        else:
-            self.joints = observer.update(measurement, force, np.zeros_like(force))
-        disturbance = np.ascontiguousarray(observer.disturbance)
+        self.joints = np.ascontiguousarray(observer.update(measurement, force, np.zeros_like(force)))
+        disturbance = np.ascontiguousarray(observer.pistons.disturbance)
         unexplained.remember(self.joints, disturbance, self._p, self._period, self._seen, self.met)

@@ -110,7 +110,7 @@ def arrays(simulation: Simulation):
     parts = (simulation.plant, simulation.trajectory, simulation.user_force, simulation.stiffness, simulation.sensors)
     for part in parts:
         for name, value in vars(part).items():
-            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_velocity"):
+            if isinstance(value, np.ndarray) and name not in ("_state", "impacts", "_queue", "_shown", "_arrived"):
                 yield f"{type(part).__name__}.{name}", value
 
 
@@ -272,7 +272,7 @@ def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
     env.reset(seed=0)
     sizes = []
     kernel = courses._is_plain
-    monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].shape[1]) or kernel(*given))
+    monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].rows.shape[1]) or kernel(*given))
     env.reset(options={"reset_mask": np.arange(50) < 2})
     assert sum(sizes) == 2 * courses.CHECKS
 

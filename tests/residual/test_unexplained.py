@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents.residual.unexplained import MOVING, ROWS
-from baselines.admittance.controller import AdmittanceBackstepping
+from baselines.admittance.controller import AdmittanceController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
@@ -57,7 +57,7 @@ def seen(sensors: str, seconds: float = 5.0) -> tuple[list[Measurement], Array]:
     tracker = LabSensors(BELIEVED.electronics, LANES)
     for lane in range(LANES):
         tracker.begin(lane, np.random.default_rng(lane))
-    law, record, truth = AdmittanceBackstepping(BELIEVED), [], []
+    law, record, truth = AdmittanceController(BELIEVED, learn=False), [], []
 
     def sense(plant: Plant, time: float, force: Array) -> Measurement:
         exact = closed_loop.ideal(plant, time, force)

@@ -11,7 +11,6 @@ from scipy.optimize import least_squares, lsq_linear
 
 from baselines.bench.comparison import default_controllers
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
-from baselines.estimation.state_estimator import StateEstimator
 from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals
@@ -21,6 +20,7 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.controllers.test_informed import Aware
 from tests.controllers.test_through_friction import recorded
 from tests.controllers.test_valve_inverse import into_chambers
 from tests.oracles import closed_loop, derived_law, rigid_body
@@ -179,19 +179,19 @@ def test_what_is_known_reaches_the_planner_and_its_first_flow_the_valves(sensors
     """
     controller = NonlinearMPC(RIG)
     planner = planners(controller)[sensors]
-    knowing = StateEstimator(RIG, sensors == "lab", NonlinearMPC.TUNED[sensors])
+    knowing = Aware(RIG, NonlinearMPC.TUNED)
     nodes, lanes = np.cumsum(planner.steps), 2
     for tick, (measured, wanted) in enumerate(recorded(lanes, 30, sensors)):
         wanted.rows[12:14] = [[300.0, -200.0], [-150.0, 400.0]]
         openings = controller.command(measured, wanted)
-        now = knowing.update(measured, wanted)
-        ahead, disturbance_force = knowing.forecast(now, wanted, np.round(nodes / PERIOD).astype(np.int64))
+        now = knowing.now(measured, wanted)
+        ahead, unseen = knowing.forecast(wanted, np.round(nodes / PERIOD).astype(np.int64))
         for lane, (plan, given, low, high) in enumerate(planner.asked[-lanes:]):
             air = now.pressures[:, lane]
             flows = [derived_law.net_flow(s, p, RIG) for s, p in zip(now.spools[:, lane], air, strict=True)]
             asked = wanted.rows[10:12, lane] + nodes[:, None] * wanted.rows[12:14, lane]
             own = [now.joints[:, lane], air / PRESSURE, np.array(flows) / FLOW, measured.user_force[:, lane]]
-            nodewise = [part.ravel() for part in (disturbance_force[:, :, lane], ahead[:, :, lane], asked)]
+            nodewise = [part.ravel() for part in (unseen[:, :, lane], ahead[:, :, lane], asked)]
             np.testing.assert_allclose(given, np.concatenate([*own, *nodewise]), rtol=1e-9, atol=1e-12)
             for bound, opening in ((low, -1.0), (high, 1.0)):
                 np.testing.assert_allclose(FLOW * bound, [derived_law.net_flow(opening, p, RIG) for p in air], rtol=1e-9)

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.estimation.observers import PistonObserver
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import INTEGRAL, TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
+from tests.oracles.observed import Sampled
 
 RIVALS = (PositionPID, LinearQuadratic, SlidingMode)
 PERIOD = 1e-3
@@ -164,18 +164,18 @@ def test_the_integral_of_the_pid_rests_while_the_supply_gives_no_more() -> None:
 def test_the_observer_is_told_what_is_known(rival: type[TrackingController]) -> None:
     """The measured force, and in which lanes the compliant motion is faster than 1 mm/s."""
     (law,), rig = rivals(rival, 1), Parameters()
-    told = PistonObserver(rig, parameter_column(rig))
+    told = Sampled(rig)
     for measured, reference in signals(2, 40, True):
         measured = dataclasses.replace(measured, user_force=np.zeros((2, 2)))
         reference.rows[2] = [2e-3, 5e-4]
         law.command(measured, reference)
         told.update(measured, measured.user_force, moving=np.array([1.0, 0.0]))
-    assert np.array_equal(law._memories[1], told._memory)
-    assert told.rest[0, 0] == 0 < told.rest[0, 1]
+    assert np.array_equal(law._memories[1], told.pistons.rows)
+    assert told.pistons.rest[0, 0] == 0 < told.pistons.rest[0, 1]
     pushed = dataclasses.replace(measured, user_force=np.full((2, 2), 3.0))
     law.command(pushed, reference)
     told.update(pushed, pushed.user_force, moving=np.ones(2))
-    assert np.array_equal(law._memories[1][:, 0], told._memory[:, 0])
+    assert np.array_equal(law._memories[1][:, 0], told.pistons.rows[:, 0])
 
 
 def test_the_dead_zone_is_continuous() -> None:

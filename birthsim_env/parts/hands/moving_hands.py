@@ -10,14 +10,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from birthsim_env.loop.rows import MOTION, SEEN, TIME, WORLD
-from birthsim_env.loop.stage import Stage, block, numbers, table2, table3, table4
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.stage import Stage, table2, table3, table4
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
-from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, UserForce, force_block
+from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, UserForce
 from birthsim_env.parts.references import LONGEST, TURNED, minimum_jerk
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.rig.values import checked_range, shown
 
 FADE = 0.5
@@ -27,23 +28,30 @@ WAVES = 16
 """Sines that noise is made of, per axis."""
 
 
+class Wave(Rows):
+    """A sine."""
+
+    amplitude = row("N", "amplitude")
+    rate = row("rad/s", "angular frequency")
+    phase = row("rad", "at the beginning")
+
+
 @helper
-def _waves(time: Array, own: Array, forces: Array) -> None:
-    """``own`` (2, W, 3, N): of axis and wave the amplitude (N), angular frequency (rad/s) and phase (rad)."""
-    for i in range(time.shape[1]):
-        for k in range(time.shape[0]):
-            fraction = minimum_jerk(time[k, i] / FADE, 0)
-            for axis in range(2):
-                total = 0.0
-                for w in range(own.shape[1]):
-                    total += own[axis, w, 0, i] * exact.sine(own[axis, w, 1, i] * time[k, i] + own[axis, w, 2, i])
-                forces[k, axis, i] = fraction * total
+def _waves(time: Array, own: Array, force: Array, n: int) -> None:
+    """``own`` (2, W, 3, N): of each axis the waves, each a ``Wave``."""
+    for i in range(n):
+        fraction = minimum_jerk(time[i] / FADE, 0)
+        for axis in range(2):
+            total = 0.0
+            for w in range(own.shape[1]):
+                wave = Wave(own[axis, w])
+                total += wave.amplitude[i] * exact.sine(wave.rate[i] * time[i] + wave.phase[i])
+            force[axis, i] = fraction * total
 
 
 @kernel
-def _waves_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s = block(seen, SEEN)
-    _waves(s[TIME : TIME + 1, :n], table4(tables, 0)[:, :, :, lane : lane + n], force_block(world, n))
+def _waves_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    _waves(seen.time, table4(tables, 0)[:, :, :, lane : lane + n], world.force, n)
     return 0
 
 
@@ -54,11 +62,12 @@ class _Waves(UserForce):
     waves = 1
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.zeros((2, self.waves, 3, num_envs))
+        self._own: Array = np.zeros((2, self.waves, Wave.size, num_envs))
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
-        _waves(time, self._own, forces)
+        for now, force in zip(time, forces, strict=True):
+            _waves(now, self._own, force, len(now))
         return forces
 
     def stage(self) -> Stage:
@@ -120,49 +129,75 @@ STEP = 0.001
 """s, steps in which the hand's own motion is integrated."""
 
 
+class Arm(Rows):
+    """An arm that goes from place to place."""
+
+    mass = row("kg", "at the hand")
+    stiffness = row("N/m", "of the spring to where it wants to be")
+    damping = row("N s/m", "of the damper beside it")
+    lasts = row("s", "from place to place")
+
+
+class Hand(Rows):
+    """Where the hand is."""
+
+    position = rows("x y", "m", "of the hand")
+    velocity = rows("vx vy", "m/s", "of the hand")
+    origin = rows("x y", "m", "where it began")
+    time = row("s", "of these; infinite before it takes hold of the end effector")
+
+
+class Grip(Numbers):
+    """Skin and fingers."""
+
+    stiffness = number("N/m", "between hand and end effector")
+    damping = number("N s/m", "between hand and end effector")
+
+
 @helper
-def _guide(
-    time: Array, position: Array, velocity: Array, own: Array, points: Array, state: Array, grip: Array, forces: Array
-) -> None:
-    """``own`` (4, N): mass, stiffness and damping of the arm, s from place to place; ``points`` (POINTS, 2, N), m from where
-    it began; ``state`` (7, N): hand's position and velocity, place of the beginning, time; ``grip``: stiffness, damping."""
-    for i in range(time.shape[1]):
-        mass, spring, damper, lasts = own[0, i], own[1, i], own[2, i], own[3, i]
-        if not (state[6, i] <= time[0, i]):
+def _guide(time: Array, motion: Array, arm: Arm, points: Array, hand: Hand, grip: Grip, force: Array, n: int) -> None:
+    """``motion`` (4, N): x, y, vx, vy of the end effector; ``points`` (POINTS, 2, N), m from where the hand began."""
+    for i in range(n):
+        mass, spring, damper, lasts = arm.mass[i], arm.stiffness[i], arm.damping[i], arm.lasts[i]
+        if not (hand.time[i] <= time[i]):
             for axis in range(2):
-                state[axis, i], state[2 + axis, i], state[4 + axis, i] = position[axis, i], velocity[axis, i], position[axis, i]
-            state[6, i] = time[0, i]
-        passed = time[0, i] - state[6, i]
+                hand.position[axis, i], hand.velocity[axis, i] = motion[axis, i], motion[2 + axis, i]
+                hand.origin[axis, i] = motion[axis, i]
+            hand.time[i] = time[i]
+        passed = time[i] - hand.time[i]
         steps = math.ceil(passed / STEP - 1e-6)
         for step in range(steps):
             h = passed / steps
-            now = state[6, i] + h * (step + 1)
+            now = hand.time[i] + h * (step + 1)
             leg = max(0.0, now - CALM) / lasts
             place = int(leg)
             u = 2.0 * (leg - place)
             for axis in range(2):
                 before = points[(place - 1) % POINTS, axis, i] if place > 0 else 0.0
                 way = points[place % POINTS, axis, i] - before
-                wanted = state[4 + axis, i] + before + way * minimum_jerk(u, 0)
+                wanted = hand.origin[axis, i] + before + way * minimum_jerk(u, 0)
                 pace = way * minimum_jerk(u, 1) * 2.0 / lasts if now > CALM and u < 1.0 else 0.0
-                held = grip[0] * (state[axis, i] - position[axis, i]) + grip[1] * (state[2 + axis, i] - velocity[axis, i])
-                push = spring * (wanted - state[axis, i]) + damper * (pace - state[2 + axis, i]) - held
-                state[2 + axis, i] += h * push / mass
-                state[axis, i] += h * state[2 + axis, i]
-        state[6, i] = time[0, i]
+                held = _held(motion, hand, grip, axis, i)
+                push = spring * (wanted - hand.position[axis, i]) + damper * (pace - hand.velocity[axis, i]) - held
+                hand.velocity[axis, i] += h * push / mass
+                hand.position[axis, i] += h * hand.velocity[axis, i]
+        hand.time[i] = time[i]
         for axis in range(2):
-            forces[0, axis, i] = grip[0] * (state[axis, i] - position[axis, i]) + grip[1] * (
-                state[2 + axis, i] - velocity[axis, i]
-            )
+            force[axis, i] = _held(motion, hand, grip, axis, i)
+
+
+@helper
+def _held(motion: Array, hand: Hand, grip: Grip, axis: int, i: int) -> float:
+    """What the grip pulls the end effector with, N."""
+    off, pace = hand.position[axis, i] - motion[axis, i], hand.velocity[axis, i] - motion[2 + axis, i]
+    pull: float = grip.stiffness * off + grip.damping * pace
+    return pull
 
 
 @kernel
-def _guide_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s = block(world, WORLD), block(seen, SEEN)
-    own, points = table2(tables, 0)[:, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
-    position, velocity = w[MOTION : MOTION + 2, :n], w[MOTION + 2 : MOTION + 4, :n]
-    state, grip = block(memory, 7)[:, :n], numbers(constants, 2)
-    _guide(s[TIME : TIME + 1, :n], position, velocity, own, points, state, grip, force_block(world, n))
+def _guide_stage(world: World, seen: Seen, hand: Hand, grip: Grip, tables: int, lane: int, n: int) -> int:
+    arm, points = Arm(table2(tables, 0)[:, lane : lane + n]), table3(tables, 1)[:, :, lane : lane + n]
+    _guide(seen.time, world.motion, arm, points, hand, grip, world.force, n)
     return 0
 
 
@@ -194,9 +229,9 @@ class Guided(UserForce):
         self.mass, self.stiffness, self.reach, self.lasts = mass, stiffness, reach, lasts
 
     def prepare(self, num_envs: int) -> None:
-        self._own: Array = np.ones((4, num_envs))
+        self._own: Array = np.ones((Arm.size, num_envs))
         self._points: Array = np.zeros((POINTS, 2, num_envs))
-        self._state: Array = np.full((7, num_envs), np.inf)
+        self._state: Array = np.full((Hand.size, num_envs), np.inf)
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -206,12 +241,12 @@ class Guided(UserForce):
             size, angle = draw(self.reach, rng), rng.uniform(0, 2 * math.pi)
             x, y = exact.direction(angle)
             put(point, lane, (size * x, size * y))
-        self._state[6, lane] = np.inf  # it takes hold of the end effector wherever that is
+        Hand(self._state).time[lane] = np.inf  # it takes hold of the end effector wherever that is
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((1, 2, time.shape[1]))
-        moving = (np.ascontiguousarray(position), np.ascontiguousarray(velocity))
-        _guide(time, *moving, self._own, self._points, self._state, np.array(self.GRIP), forces)
+        motion, grip = np.concatenate([position, velocity]), Grip(np.array(self.GRIP))
+        _guide(time[0], motion, Arm(self._own), self._points, Hand(self._state), grip, forces[0], time.shape[1])
         return forces
 
     def stage(self) -> Stage:

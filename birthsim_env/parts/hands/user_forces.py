@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.loop.rows import FORCE, SEEN, TIME
-from birthsim_env.loop.stage import Stage, block, carray, pointer, table1, table3
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.stage import Stage, table1, table3
 from birthsim_env.parts.drawn.seeding import Range, draw, put, served, vectorised
 from birthsim_env.parts.references import LONGEST, TURNED
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
 
@@ -71,37 +72,35 @@ def forces_of(hand: UserForce, time: Array, position: Array, velocity: Array) ->
     return checked("user_force.force(...)", force, (instants, 2, lanes), "N")
 
 
-@helper
-def _interpolate(time: Array, knots: Array, counts: Array, forces: Array) -> None:
-    """``knots`` (M, 3, N): time, Fx, Fy; the first ``counts`` (N,) of them count; constant before and after."""
-    for i in range(time.shape[1]):
-        last = int(counts[i]) - 1
-        for k in range(time.shape[0]):
-            t = time[k, i]
-            low, high = 0, last
-            while high - low > 1:
-                middle = (low + high) // 2
-                if knots[middle, 0, i] <= t:
-                    low = middle
-                else:
-                    high = middle
-            span = knots[high, 0, i] - knots[low, 0, i]
-            part = max(0.0, min(1.0, (t - knots[low, 0, i]) / span)) if span > 0.0 else 1.0
-            forces[k, 0, i] = knots[low, 1, i] + part * (knots[high, 1, i] - knots[low, 1, i])
-            forces[k, 1, i] = knots[low, 2, i] + part * (knots[high, 2, i] - knots[low, 2, i])
+class Knot(Rows):
+    """A force, between which it is linear in time."""
+
+    time = row("s", "since the episode began")
+    force = rows("x y", "N", "of the hand")
 
 
 @helper
-def force_block(world: int, n: int) -> Array:
-    """The hand's force in a block of the world, one instant: (1, 2, n)."""
-    return carray(pointer(world + FORCE * BLOCK * 8, np.float64), (1, 2, BLOCK))[:, :, :n]
+def _interpolate(time: Array, knots: Array, counts: Array, force: Array, n: int) -> None:
+    """``knots`` (M, 3, N), each a ``Knot``; the first ``counts`` (N,) of them count; constant before and after."""
+    for i in range(n):
+        low, high = 0, int(counts[i]) - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if Knot(knots[middle]).time[i] <= time[i]:
+                low = middle
+            else:
+                high = middle
+        before, after = Knot(knots[low]), Knot(knots[high])
+        span = after.time[i] - before.time[i]
+        part = max(0.0, min(1.0, (time[i] - before.time[i]) / span)) if span > 0.0 else 1.0
+        for axis in range(2):
+            force[axis, i] = before.force[axis, i] + part * (after.force[axis, i] - before.force[axis, i])
 
 
 @kernel
-def _knots_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s = block(seen, SEEN)
+def _knots_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     knots, counts = table3(tables, 0)[:, :, lane : lane + n], table1(tables, 1)[lane : lane + n]
-    _interpolate(s[TIME : TIME + 1, :n], knots, counts, force_block(world, n))
+    _interpolate(seen.time, knots, counts, world.force, n)
     return 0
 
 
@@ -151,13 +150,14 @@ class ForceProfile(UserForce):
             missing = len(columns) - len(self._knots)
             if missing > 0:
                 self._knots = np.concatenate([self._knots, np.zeros((missing, 3, self._knots.shape[2]))])
-            for rows, values in zip(self._knots, columns, strict=False):
-                put(rows, lanes, values)
+            for knot, values in zip(self._knots, columns, strict=False):
+                put(knot, lanes, values)
             self._counts[one] = len(columns)
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((time.shape[0], 2, time.shape[1]))
-        _interpolate(time, self._knots, self._counts, forces)
+        for now, force in zip(time, forces, strict=True):
+            _interpolate(now, self._knots, self._counts, force, len(now))
         return forces
 
     def stage(self) -> Stage:

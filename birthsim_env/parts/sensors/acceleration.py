@@ -8,11 +8,16 @@ from __future__ import annotations
 
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
 
-TICK, ROWS = 4, 5
-"""Velocity a period ago, m/s, and low-passed acceleration, m/s2, of both axes; in row ``TICK`` the control period of the last
-look."""
+
+class Felt(Rows):
+    """What the sensor remembers."""
+
+    velocity = rows("x y", "m/s", "of the end effector a period ago")
+    low_passed = rows("x y", "m/s2", "acceleration behind the low-pass")
+    tick = row("1", "control period of the last look")
+
 
 NOISE = 11
 """First of the two channels of random numbers, in all sensor models."""
@@ -24,27 +29,28 @@ def passed(bandwidth: float, period: float) -> float:
 
 
 @helper
-def looked(memory: Array, i: int, tick: int) -> bool:
-    """Whether lane ``i`` of ``memory`` (ROWS, N) has been measured in this period before: it is where others begin anew."""
-    before = tick > 0 and memory[TICK, i] == tick
-    memory[TICK, i] = tick
+def looked(felt: Felt, i: int, tick: int) -> bool:
+    """Whether lane ``i`` has been measured in this period before: it is where others begin anew."""
+    before = tick > 0 and felt.tick[i] == tick
+    felt.tick[i] = tick
     return before
 
 
 @helper
 def feel(
-    memory: Array, i: int, axis: int, tick: int, velocity: float, gain: float, bias: float, period: float, share: float,
+    felt: Felt, i: int, axis: int, tick: int, velocity: float, gain: float, bias: float, period: float, share: float,
     again: bool,
 ) -> float:  # fmt: skip
-    """Carries ``memory`` (ROWS, N) of lane ``i`` on by one ``period``, s; returns the acceleration without noise, m/s2.
+    """Carries what is ``felt`` in lane ``i`` on by one ``period``, s; returns the acceleration without noise, m/s2.
 
     ``share`` is that of ``passed``. ``again`` is what ``looked`` says; the memory stays as it is then. Where an episode begins
     nothing is known of the motion before it, and the acceleration is taken for zero.
     """
     if not again:
-        before = velocity if tick == 0 else memory[axis, i]
-        felt = (1.0 + gain) * ((velocity - before) / period) + bias
-        memory[axis, i] = velocity
-        memory[2 + axis, i] = felt if tick == 0 else memory[2 + axis, i] + share * (felt - memory[2 + axis, i])
-    low_passed: float = memory[2 + axis, i]
+        before = velocity if tick == 0 else felt.velocity[axis, i]
+        now = (1.0 + gain) * ((velocity - before) / period) + bias
+        felt.velocity[axis, i] = velocity
+        last = felt.low_passed[axis, i]
+        felt.low_passed[axis, i] = now if tick == 0 else last + share * (now - last)
+    low_passed: float = felt.low_passed[axis, i]
     return low_passed

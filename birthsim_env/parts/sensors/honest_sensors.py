@@ -8,43 +8,54 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.rows import (
-    ACCELERATION,
-    FORCE,
-    MOTION,
-    OPENING,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
-    SEEN,
-    STATE,
-    TICK,
-    TIME,
-    USER_FORCE,
-    VELOCITY,
-    WORLD,
-)
+from birthsim_env.loop.rows import Seen, Signals, World, measurement_of
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
+from birthsim_env.loop.stage import Stage, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
-from birthsim_env.parts.sensors import sensor_errors as at
+from birthsim_env.parts.sensors.looking import looked_at
 from birthsim_env.parts.sensors.noise import happens, normal, uniform
+from birthsim_env.parts.sensors.sensor_errors import FIGURES, Errors, Figures, Shared, Unit, field, shared, shift, work_out
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
 from birthsim_env.physics.electronics import Electronics
 
 TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
 """Channels of random numbers; the pressures have the first four, all as the sensor model ``lab``."""
 
-SHOWN = 13
-"""What is shown: x, y and their time, velocity, four pressures, force, acceleration."""
+
+class Shown(Rows):
+    """What the sensors say, which stays as it is in a missed period."""
+
+    position = rows("x y", "m", "of the end effector")
+    position_time = row("s", "when the position was measured")
+    velocity = rows("vx vy", "m/s", "of the end effector")
+    pressure = rows("P1 N1 P2 N2", "Pa", "of the chambers")
+    force = rows("x y", "N", "of the hand")
+    acceleration = rows("x y", "m/s2", "of the end effector")
+
+
+class Kept(NamedTuple):
+    """What the sensors remember of N lanes."""
+
+    keys: NDArray[np.uint64]
+    errors: Errors
+    queue: Array
+    """Samples on their way (Q, 3, N)."""
+    arrived: tracker.Arrived
+    passed: Array
+    """Forces behind the low-pass, N, (2, N)."""
+    late: Array
+    """The last forces converted, N, (Q, 2, N)."""
+    shown: Shown
+    felt: acceleration.Felt
 
 
 @helper
@@ -54,124 +65,124 @@ def _converted(value: float, step: float, least: float, most: float) -> float:
 
 
 @helper
-def _sample(e: Array, c: Array, i: int, axis: int, x: float, y: float, grown: float, chance: float) -> float:
-    """One axis of what the tracker tells where it is at (``x``, ``y``); noise ``grown`` by distance, ``chance`` is normal."""
+def _sample(e: Errors, shared: Shared, i: int, axis: int, x: float, y: float, noise: float) -> float:
+    """What the tracker measures along one axis where it is at (``x``, ``y``), with a ``noise`` in m."""
     true = x if axis == 0 else y
-    scaled = true + e[at.SCALED, i] * (true - c[at.AT_X + axis])
-    distorted = scaled + (at.field(e, i, axis, x, y) - e[at.REGISTERED + axis, i])
-    told: float = distorted + e[at.POSITION_NOISE, i] * grown * chance
-    return told
+    scaled = true + e.scaled[i] * (true - shared.registration[axis])
+    measured: float = scaled + (field(e, i, axis, x, y) - e.registered[axis, i]) + noise
+    return measured
 
 
 @helper
-def _growth(e: Array, c: Array, i: int, x: float, y: float) -> float:
+def _growth(e: Errors, shared: Shared, i: int, x: float, y: float) -> float:
     """Factor by which the tracker's noise at (``x``, ``y``) is larger than where it was registered."""
-    dx, dy, ax, ay = x - c[at.FROM_X], y - c[at.FROM_Y], c[at.AT_X] - c[at.FROM_X], c[at.AT_Y] - c[at.FROM_Y]
+    place, origin, power = shared.registration, shared.transmitter, e.figures.position_noise_growth[i]
+    dx, dy, ax, ay = x - origin[0], y - origin[1], place[0] - origin[0], place[1] - origin[1]
     nearer = (dx * dx + dy * dy) / (ax * ax + ay * ay)
-    return exact.exp(0.5 * e[at.GROWTH, i] * exact.log(max(nearer, 1e-12))) if e[at.GROWTH, i] > 0.0 else 1.0
+    return exact.exp(0.5 * power * exact.log(max(nearer, 1e-12))) if power > 0.0 else 1.0
 
 
 @helper
-def _honest(
-    ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, force: Array, keys: NDArray[np.uint64], c: Array,
-    e: Array, queue: Array, arrived: Array, velocity: Array, passed: Array, late: Array, shown: Array, sensed: Array,
-) -> None:  # fmt: skip
-    """One control instant. ``c`` constants and ``e`` (ROWS, N) errors of ``sensor_errors``; ``queue``, ``arrived`` and
-    ``velocity`` of ``tracker``; ``passed`` (2, N): forces behind the low-pass; ``late`` (Q, 2, N): the last forces converted;
-    ``shown`` (SHOWN, N): what is told, which stays as it is in a missed period; ``sensed`` of ``acceleration``."""
-    for i in range(time.shape[0]):
-        tick, key = int(ticks[i]), keys[i]
-        due = tracker.sample_due(tick, time[i], c[at.PERIOD], c[at.RATE])
-        if due and (tick == 0 or not happens(key, tick, LOST, e[at.DROPOUT, i])):
-            grown = _growth(e, c, i, motion[0, i], motion[1, i])
-            x = _sample(e, c, i, 0, motion[0, i], motion[1, i], grown, normal(key, tick, TRACKED))
-            y = _sample(e, c, i, 1, motion[0, i], motion[1, i], grown, normal(key, tick, TRACKED + 1))
-            tracker.take(queue, i, time[i], c[at.RATE], x, y)
-            if tick == 0:
-                tracker.start(queue, arrived, velocity, i, x, y, motion[2, i], motion[3, i])
-        tracker.arrive(queue, arrived, velocity, i, time[i], e[at.POSITION_LATENCY, i])
-        slots = late.shape[0]
-        whole = math.floor(e[at.DELAY, i] + 1e-9)
-        rest = max(0.0, e[at.DELAY, i] - whole)
-        again = acceleration.looked(sensed, i, tick)
-        read = tick == 0 or not happens(key, tick, MISSED, e[at.MISSED, i])
+def _track(world: World, seen: Signals, shared: Shared, kept: Kept, i: int, tick: int) -> None:
+    """Take a sample where it is due, and let arrive what is under way."""
+    e, key, time, latency = kept.errors, kept.keys[i], seen.time[i], kept.errors.figures.position_latency[i]
+    due = tracker.sample_due(tick, time, shared.period, shared.rate)
+    if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
+        x, y = world.motion[0, i], world.motion[1, i]
+        noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
+        at_x = _sample(e, shared, i, 0, x, y, noise * normal(key, tick, TRACKED))
+        at_y = _sample(e, shared, i, 1, x, y, noise * normal(key, tick, TRACKED + 1))
+        tracker.take(kept.queue, i, time, shared.rate, at_x, at_y)
+        if tick == 0:
+            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, world.motion[2, i], world.motion[3, i])
+    tracker.arrive(kept.queue, kept.arrived, i, time, latency)
+
+
+@helper
+def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> None:
+    """One control instant."""
+    e, shown, late, passed, slots = kept.errors, kept.shown, kept.late, kept.passed, kept.late.shape[0]
+    for i in range(n):
+        tick, key = int(world.tick[i]), kept.keys[i]
+        _track(world, seen, shared, kept, i, tick)
+        whole = math.floor(e.delay[i] + 1e-9)
+        rest = max(0.0, e.delay[i] - whole)
+        again = acceleration.looked(kept.felt, i, tick)
+        read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
         for axis in range(2):
-            felt = force[axis, i] + (e[at.GAIN + axis, i] * force[axis, i] + e[at.CROSSTALK + axis, i] * force[1 - axis, i])
-            felt += e[at.BIAS + axis, i]
-            share = 1.0 if tick == 0 else e[at.PASSED, i]
+            force = world.force[axis, i]
+            felt = force + (e.gain[axis, i] * force + e.crosstalk[axis, i] * world.force[1 - axis, i]) + e.bias[axis, i]
+            share = 1.0 if tick == 0 else e.passed[i]
             if not again:
                 passed[axis, i] = passed[axis, i] + share * (felt - passed[axis, i]) if share < 1.0 else felt
-            told = passed[axis, i] + e[at.FORCE_NOISE, i] * normal(key, tick, NOISE_OF_FORCE + axis)
-            told = _converted(told, e[at.FORCE_STEP, i], -c[at.FORCE_RANGE], c[at.FORCE_RANGE])
+            told = passed[axis, i] + e.figures.force_noise[i] * normal(key, tick, NOISE_OF_FORCE + axis)
+            told = _converted(told, e.force_step[i], -shared.force_range, shared.force_range)
             for k in range(slots if tick == 0 else 1):
                 late[(tick + k) % slots, axis, i] = told
             if read:
                 newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
-                shown[9 + axis, i] = newer + rest * (older - newer)
-            if c[at.FEELS] > 0.0:
-                gain, bias = e[at.ACCELERATION_GAIN + axis, i], e[at.ACCELERATION_BIAS + axis, i]
+                shown.force[axis, i] = newer + rest * (older - newer)
+            if shared.share > 0.0:
+                gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
                 told = acceleration.feel(
-                    sensed, i, axis, tick, motion[2 + axis, i], gain, bias, c[at.PERIOD], c[at.FEELS], again
+                    kept.felt, i, axis, tick, world.motion[2 + axis, i], gain, bias, shared.period, shared.share, again
                 )
                 if read:
-                    shown[11 + axis, i] = told + c[at.ACCELERATION_NOISE] * normal(key, tick, acceleration.NOISE + axis)
+                    noise = shared.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
+                    shown.acceleration[axis, i] = told + noise
         if read:
-            shown[0, i], shown[1, i] = arrived[0, i], arrived[1, i]
-            stamp = arrived[2, i] + (e[at.POSITION_LATENCY, i] - c[at.STAMPED])
-            shown[2, i] = max(0.0, min(time[i], stamp))
-            shown[3, i], shown[4, i] = velocity[0, i], velocity[1, i]
+            arrived = kept.arrived
+            stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
+            shown.position_time[i] = max(0.0, min(seen.time[i], stamp))
+            for axis in range(2):
+                shown.position[axis, i], shown.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             for chamber in range(4):
-                told = pressures[chamber, i] + e[at.CELLS + chamber, i] + e[at.PRESSURE_NOISE, i] * normal(key, tick, chamber)
-                shown[5 + chamber, i] = _converted(told, e[at.PRESSURE_STEP, i], 0.0, c[at.PRESSURE_RANGE])
+                noise = e.figures.pressure_noise[i] * normal(key, tick, chamber)
+                told = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
+                shown.pressure[chamber, i] = _converted(told, e.pressure_step[i], 0.0, shared.pressure_range)
+        seen.position_time[i] = shown.position_time[i]
+        for axis in range(2):
+            seen.position[axis, i], seen.velocity[axis, i] = shown.position[axis, i], shown.velocity[axis, i]
+            seen.user_force[axis, i], seen.acceleration[axis, i] = shown.force[axis, i], shown.acceleration[axis, i]
+        for chamber in range(4):
+            seen.pressure[chamber, i] = shown.pressure[chamber, i]
 
 
 @kernel
-def _honest_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s, c = block(world, WORLD), block(seen, SEEN), numbers(constants, at.CONSTANTS)
-    keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
-    shown, pressures = table2(tables, 7)[:, mine], scratch(4)
-    for chamber in range(4):
-        for i in range(n):
-            pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]
-    _honest(
-        w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, w[FORCE : FORCE + 2, :n], keys, c,
-        table2(tables, 1)[:, mine], table3(tables, 2)[:, :, mine], table2(tables, 3)[:, mine], table2(tables, 4)[:, mine],
-        table2(tables, 5)[:, mine], table3(tables, 6)[:, :, mine], shown, table2(tables, 8)[:, mine],
+def _honest_stage(world: World, seen: Seen, memory: int, shared: Shared, tables: int, lane: int, n: int) -> int:
+    mine = slice(lane, lane + n)
+    kept = Kept(
+        table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine],
+        tracker.Arrived(table2(tables, 3)[:, mine]), table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine],
+        Shown(table2(tables, 6)[:, mine]), acceleration.Felt(table2(tables, 7)[:, mine]),
     )  # fmt: skip
-    for i in range(n):
-        s[POSITION_TIME, i] = shown[2, i]
-        for axis in range(2):
-            s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], shown[3 + axis, i]
-            s[USER_FORCE + axis, i], s[ACCELERATION + axis, i] = shown[9 + axis, i], shown[11 + axis, i]
-        for chamber in range(4):
-            s[PRESSURE + chamber, i] = shown[5 + chamber, i]
+    _honest(world, seen, shared, kept, n)
     return 0
 
 
 @helper
-def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Array, last: Array, openings: Array) -> None:
+def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Errors, last: Array, openings: Array) -> None:
     """Make ``openings`` (4, N) what the board puts out, which is ``last`` (4, N) in a missed period.
 
     A clock that jitters is late by a fraction of the period, drawn uniformly. What is put out is then the mean of both openings
     over the period: the spool, with a lag of ``tau``, misses what it would do by at most (T/tau)^2/8 of the change.
     """
     for i in range(ticks.shape[0]):
-        tick = int(ticks[i])
-        missed = tick > 0 and happens(keys[i], tick, MISSED, e[at.MISSED, i])
-        jitters = tick > 0 and e[at.JITTER, i] > 0.0
-        late = e[at.JITTER, i] * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if jitters else 0.0
+        tick, jitter = int(ticks[i]), e.figures.clock_jitter[i]
+        missed = tick > 0 and happens(keys[i], tick, MISSED, e.figures.missed_periods[i])
+        late = jitter * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if tick > 0 and jitter > 0.0 else 0.0
         for valve in range(4):
-            told = _converted(openings[valve, i], e[at.OPENING_STEP, i], -1.0, 1.0)
+            told = _converted(openings[valve, i], e.opening_step[i], -1.0, 1.0)
             told = last[valve, i] if missed else told
             openings[valve, i] = told + late * (last[valve, i] - told)
             last[valve, i] = told
 
 
 @kernel
-def _board_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s, mine = block(world, WORLD), block(seen, SEEN), slice(lane, lane + n)
-    keys, e, last = table1(tables, 0).view(np.uint64)[mine], table2(tables, 1)[:, mine], table2(tables, 2)[:, mine]
-    _put_out(w[TICK, :n], keys, e, last, s[OPENING : OPENING + 4, :n])
+def _board_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    mine = slice(lane, lane + n)
+    keys, e, last = table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table2(tables, 2)[:, mine]
+    _put_out(world.tick[:n], keys, e, last, seen.opening[:, :n])
     return 0
 
 
@@ -187,21 +198,19 @@ class HonestSensors:
     """
 
     sampled = True
-    drawn = tuple(f"electronics.{name}" for name in at.FIGURES)
+    drawn = tuple(f"electronics.{name}" for name in FIGURES)
 
     def __init__(self, electronics: Electronics, num_envs: int) -> None:
         self._electronics, self._ranges = electronics, {}  # type: tuple[Electronics, dict[str, tuple[float, float]]]
         # A tracker faster than the control board is read once a period.
-        rate = min(electronics.position_rate, 1 / electronics.control_period)
-        self._constants = at.shared(electronics, rate)
+        self._shared = shared(electronics, min(electronics.position_rate, 1 / electronics.control_period))
         self._keys = np.zeros(num_envs, dtype=np.uint64)
-        self._errors: Array = np.zeros((at.ROWS, num_envs))
-        self._arrived: Array = np.zeros((3, num_envs))
-        self._velocity: Array = np.zeros((2, num_envs))
+        self._errors: Array = np.zeros((Errors.size, num_envs))
+        self._arrived: Array = np.zeros((tracker.Arrived.size, num_envs))
         self._passed: Array = np.zeros((2, num_envs))
-        self._shown: Array = np.zeros((SHOWN, num_envs))
+        self._shown: Array = np.zeros((Shown.size, num_envs))
         self._last: Array = np.zeros((4, num_envs))
-        self._sensed: Array = np.zeros((acceleration.ROWS, num_envs))
+        self._felt: Array = np.zeros((acceleration.Felt.size, num_envs))
         self._make_room()
 
     def _make_room(self) -> None:
@@ -210,7 +219,7 @@ class HonestSensors:
             name: max(getattr(board, name), self._ranges.get(name, (0.0, 0.0))[1])
             for name in ("position_latency", "force_latency")
         }
-        slots = tracker.slots(self._constants[at.RATE], latest["position_latency"])
+        slots = tracker.slots(Shared(self._shared).rate, latest["position_latency"])
         self._queue: Array = np.zeros((slots, 3, lanes))
         self._late: Array = np.zeros((int(latest["force_latency"] / board.control_period + 1e-9) + 2, 2, lanes))
 
@@ -224,56 +233,52 @@ class HonestSensors:
         """Start a new episode in one lane."""
         lanes: NDArray[Any] = np.atleast_1d(lane)
         self._keys[lane] = rng.integers(2**64, dtype=np.uint64)
-        unit = np.asarray(rng.uniform(-1.0, 1.0, at.UNIT)).reshape(at.UNIT, -1)
-        figures = np.empty((len(at.FIGURES), len(lanes)))
-        for row, name in zip(figures, at.FIGURES, strict=True):
-            row[:] = getattr(self._electronics, name)
+        unit = np.asarray(rng.uniform(-1.0, 1.0, Unit.size)).reshape(Unit.size, -1)
+        figures = Figures(np.empty((Figures.size, len(lanes))))
+        for name in FIGURES:
+            getattr(figures, name)[:] = getattr(self._electronics, name)
         for name, (low, high) in self._ranges.items():
-            figures[at.FIGURES.index(name)] = rng.uniform(low, high)
-        errors = np.empty((at.ROWS, len(lanes)))
-        at.work_out(figures, unit, self._constants, errors)
+            getattr(figures, name)[:] = rng.uniform(low, high)
+        errors = Errors(np.empty((Errors.size, len(lanes))))
+        work_out(figures, Unit(unit), Shared(self._shared), errors)
         # Drawn last, so that all else is drawn as on a rig without such a sensor.
         most = np.repeat([self._electronics.acceleration_bias, self._electronics.acceleration_gain_error], 2)
-        errors[at.ACCELERATION_BIAS :] = most[:, None] * np.asarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
-        self._errors[:, lanes] = errors
+        drawn = most[:, None] * np.asarray(rng.uniform(-1.0, 1.0, 4)).reshape(4, -1)
+        errors.acceleration_bias[:], errors.acceleration_gain[:] = drawn[:2], drawn[2:]
+        self._errors[:, lanes] = errors.rows
 
     @property
     def figures(self) -> dict[str, Array]:
         """Figure -> what the episode of each lane has, (N,)."""
-        return dict(zip(at.FIGURES, self._errors, strict=False))
+        return dict(zip(FIGURES, Errors(self._errors).figures.rows, strict=True))
 
     @property
     def errors(self) -> Array:
-        """Rows of ``sensor_errors`` that the episode of each lane has, (ROWS, N)."""
+        """``sensor_errors.Errors`` that the episode of each lane has, (M, N)."""
         return self._errors
 
     def shift(self, place: Array) -> Array:
         """By how much scale and distortion move what the tracker shows of true places, both (2, N), m."""
-        return at.shift(self._errors, self._constants, place)
+        return shift(Errors(self._errors), Shared(self._shared), place)
 
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
-        _honest(
-            ticks, time, motion, pressures, force, self._keys, self._constants, self._errors, self._queue, self._arrived,
-            self._velocity, self._passed, self._late, self._shown, self._sensed,
-        )  # fmt: skip
-        told = self._shown.copy()
-        felt = told[11:] if self._constants[at.FEELS] > 0.0 else None
-        return Measurement(time, told[:2], told[2], told[3:5], told[5:9], told[9:11], True, felt)
+        (world, seen), constants = looked_at(ticks, time, motion, pressures, force), Shared(self._shared)
+        arrived, shown, felt = tracker.Arrived(self._arrived), Shown(self._shown), acceleration.Felt(self._felt)
+        kept = Kept(self._keys, Errors(self._errors), self._queue, arrived, self._passed, self._late, shown, felt)
+        _honest(world, seen, constants, kept, len(time))
+        return measurement_of(seen.rows, True, constants.share > 0.0)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
-        keys = self._keys.view(np.float64)
-        tables = (
-            keys, self._errors, self._queue, self._arrived, self._velocity, self._passed, self._late, self._shown, self._sensed,
-        )  # fmt: skip
-        return Stage(_honest_stage, self._constants, tables=tables)
+        tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
+        return Stage(_honest_stage, self._shared, tables=(*tables, self._shown, self._felt))
 
     def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
         """What reaches the valves of ``openings`` (4, N): converted, late by the clock's jitter, and not at all in a missed
         period."""
         out = np.array(openings, dtype=np.float64)
-        _put_out(ticks, self._keys, self._errors, self._last, out)
+        _put_out(ticks, self._keys, Errors(self._errors), self._last, out)
         return out
 
     def board_stage(self) -> Stage:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
@@ -15,60 +16,81 @@ from birthsim_env.parts.sensors import acceleration
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.electronics import Electronics
 
-FIGURES = tuple(
-    field.name for field in dataclasses.fields(Electronics) if field.metadata["randomized"] or field.metadata["worth"]
-)
+_DRAWN = [field for field in dataclasses.fields(Electronics) if field.metadata["randomized"] or field.metadata["worth"]]
+FIGURES = tuple(field.name for field in _DRAWN)
 """Figures in which lanes may differ, in the order of their fields."""
-(
-    POSITION_NOISE, POSITION_LATENCY, PRESSURE_NOISE, FORCE_NOISE, FORCE_BIAS, FORCE_GAIN, FORCE_CROSSTALK, FORCE_BANDWIDTH,
-    FORCE_LATENCY, GROWTH, DISTORTION, LENGTH, SCALE, DROPOUT, PRESSURE_BIAS, ADC_BITS, DAC_BITS, MISSED, JITTER,
-) = range(len(FIGURES))  # fmt: skip
+
+Figures: Any = type("Figures", (Rows,), {field.name: row(field.metadata["unit"], field.name) for field in _DRAWN})
+"""``FIGURES`` as rows."""
 
 WAVES = 3
 
-UNIT = 11 + 4 * WAVES
-"""Numbers in [-1, 1) that an episode draws: gain, crosstalk and bias of the force per axis, pressure bias per chamber, scale,
-direction and phase of every wave."""
 
-GAIN = len(FIGURES)
-"""First of the rows that are worked out from figures and draws; those before it are the figures themselves."""
-CROSSTALK = GAIN + 2
-BIAS = CROSSTALK + 2
-CELLS = BIAS + 2
-"""Bias of each pressure cell, Pa."""
-SCALED = CELLS + 4
-PASSED = SCALED + 1
-"""Fraction of a force's change that passes the low-pass in a control period."""
-DELAY = PASSED + 1
-"""Control periods by which the force is late."""
-FORCE_STEP, PRESSURE_STEP, OPENING_STEP = DELAY + 1, DELAY + 2, DELAY + 3
-"""Least steps of the converters, N, Pa and of openings; 0 where there is none."""
-WAVE = DELAY + 4
-"""Wave numbers along x and y, 1/m, and phase, rad, of each wave of each axis."""
-HEIGHT = WAVE + 6 * WAVES
-"""Amplitude of a wave, m."""
-REGISTERED = HEIGHT + 1
-"""The field where the tracker was registered, m."""
-ACCELERATION_BIAS = REGISTERED + 2
-"""Of each axis, m/s2, and then its error of gain. ``work_out`` leaves them."""
-ACCELERATION_GAIN = ACCELERATION_BIAS + 2
-ROWS = ACCELERATION_GAIN + 2
+class Wave(Rows):
+    """A plane wave of the tracker's distortion."""
 
-PERIOD, RATE, AT_X, AT_Y, FROM_X, FROM_Y, FORCE_RANGE, PRESSURE_RANGE, STAMPED, FEELS, ACCELERATION_NOISE = range(11)
-"""Constants that all lanes share: control period, rate of the tracker, places of registration and transmitter, full scales,
-the latency of the tracker that its samples are stamped with, what passes the low-pass of an acceleration sensor in a period
-(0: there is none), and its noise."""
-CONSTANTS = 11
+    number = rows("x y", "1/m", "wave numbers")
+    phase = row("rad", "at the origin")
+
+
+class Unit(Rows):
+    """Numbers in [-1, 1) that an episode draws."""
+
+    gain = rows("x y", "1", "of the force")
+    crosstalk = rows("x y", "1", "of the force")
+    bias = rows("x y", "1", "of the force")
+    cells = rows("P1 N1 P2 N2", "1", "bias of each pressure cell")
+    scale = row("1", "of the tracker")
+    waves = rows(4 * WAVES, "1", "direction and phase of every wave of both axes")
+
+
+class Errors(Rows):
+    """What is wrong with the sensors of a lane: the figures, and what is worked out from them and from what was drawn."""
+
+    figures = part(Figures, "of the sensors")
+    gain = rows("x y", "1", "error of the force's gain")
+    crosstalk = rows("x y", "1", "of the other axis of the force")
+    bias = rows("x y", "N", "of the force")
+    cells = rows("P1 N1 P2 N2", "Pa", "bias of each pressure cell")
+    scaled = row("1", "error of the tracker's scale")
+    passed = row("1", "fraction of a force's change that passes the low-pass in a control period")
+    delay = row("1", "control periods by which the force is late")
+    force_step = row("N", "least step of the converter; 0 where there is none")
+    pressure_step = row("Pa", "likewise")
+    opening_step = row("1", "likewise, of openings")
+    waves = rows(2 * WAVES * Wave.size, "SI", "each wave of the x axis, then of the y axis")
+    height = row("m", "amplitude of a wave")
+    registered = rows("x y", "m", "the field where the tracker was registered")
+    acceleration_bias = rows("x y", "m/s2", "of an acceleration sensor; ``work_out`` leaves it")
+    acceleration_gain = rows("x y", "1", "error of its gain; ``work_out`` leaves it")
+
+
+class Shared(Numbers):
+    """Constants that all lanes share."""
+
+    period = number("s", "control period")
+    rate = number("Hz", "of the tracker")
+    registration = rows("x y", "m", "where the tracker is registered")
+    transmitter = rows("x y", "m", "where its transmitter stands")
+    force_range = number("N", "full scale")
+    pressure_range = number("Pa", "full scale")
+    stamped = number("s", "the latency of the tracker that its samples are stamped with")
+    share = number("1", "what passes the low-pass of an acceleration sensor in a period; 0: there is none")
+    acceleration_noise = number("m/s2", "of that sensor")
 
 
 def shared(electronics: Electronics, rate: float) -> Array:
-    """The constants (CONSTANTS,), SI units; ``rate`` is the tracker's, Hz."""
+    """``Shared``; ``rate`` is the tracker's, Hz."""
     e = electronics
-    places = (e.registration_x, e.registration_y, e.transmitter_x, e.transmitter_y)
-    felt = acceleration.passed(e.acceleration_bandwidth, e.control_period), e.acceleration_noise
-    return np.array((e.control_period, rate, *places, e.force_range, e.pressure_range, e.position_latency, *felt))
+    return Shared.numbers(
+        period=e.control_period, rate=rate, registration=(e.registration_x, e.registration_y),
+        transmitter=(e.transmitter_x, e.transmitter_y), force_range=e.force_range, pressure_range=e.pressure_range,
+        stamped=e.position_latency, share=acceleration.passed(e.acceleration_bandwidth, e.control_period),
+        acceleration_noise=e.acceleration_noise,
+    )  # fmt: skip
 
 
 @helper
@@ -78,51 +100,50 @@ def _step(span: float, bits: float) -> float:
 
 
 @helper
-def field(errors: Array, i: int, axis: int, x: float, y: float) -> float:
+def field(errors: Errors, i: int, axis: int, x: float, y: float) -> float:
     """The distortion of one axis of lane ``i`` at a place, m, before that at the registration is taken off."""
     total = 0.0
-    for wave in range(WAVES):
-        row = WAVE + 3 * (axis * WAVES + wave)
-        total += exact.sine(errors[row, i] * x + errors[row + 1, i] * y + errors[row + 2, i])
-    distortion: float = errors[HEIGHT, i] * total
+    for k in range(WAVES):
+        first = (axis * WAVES + k) * Wave.size
+        wave = Wave(errors.waves[first : first + Wave.size])
+        total += exact.sine(wave.number[0, i] * x + wave.number[1, i] * y + wave.phase[i])
+    distortion: float = errors.height[i] * total
     return distortion
 
 
 @kernel
-def work_out(figures: Array, unit: Array, constants: Array, errors: Array) -> None:
-    """Fill ``errors`` (ROWS, L) from ``figures`` (FIGURES, L) and what an episode has drawn, ``unit`` (UNIT, L) in [-1, 1)."""
-    period = constants[PERIOD]
-    for i in range(figures.shape[1]):
-        for k in range(GAIN):
-            errors[k, i] = figures[k, i]
+def work_out(figures: Any, unit: Unit, shared: Shared, errors: Errors) -> None:
+    """Fill the ``errors`` of L lanes from ``figures`` and what an episode has drawn, ``unit`` in [-1, 1)."""
+    for i in range(figures.rows.shape[1]):
+        for k in range(figures.rows.shape[0]):
+            errors.figures.rows[k, i] = figures.rows[k, i]
         for axis in range(2):
-            errors[GAIN + axis, i] = figures[FORCE_GAIN, i] * unit[axis, i]
-            errors[CROSSTALK + axis, i] = figures[FORCE_CROSSTALK, i] * unit[2 + axis, i]
-            errors[BIAS + axis, i] = figures[FORCE_BIAS, i] * unit[4 + axis, i]
+            errors.gain[axis, i] = figures.force_gain_error[i] * unit.gain[axis, i]
+            errors.crosstalk[axis, i] = figures.force_crosstalk[i] * unit.crosstalk[axis, i]
+            errors.bias[axis, i] = figures.force_bias[i] * unit.bias[axis, i]
         for chamber in range(4):
-            errors[CELLS + chamber, i] = figures[PRESSURE_BIAS, i] * unit[6 + chamber, i]
-        errors[SCALED, i] = figures[SCALE, i] * unit[10, i]
-        turns = -2.0 * math.pi * figures[FORCE_BANDWIDTH, i] * period
-        errors[PASSED, i] = 1.0 - exact.exp(turns) if turns < 0.0 else 1.0
-        errors[DELAY, i] = figures[FORCE_LATENCY, i] / period
-        errors[FORCE_STEP, i] = _step(2.0 * constants[FORCE_RANGE], figures[ADC_BITS, i])
-        errors[PRESSURE_STEP, i] = _step(constants[PRESSURE_RANGE], figures[ADC_BITS, i])
-        errors[OPENING_STEP, i] = _step(2.0, figures[DAC_BITS, i])
-        number = 2.0 * math.pi / figures[LENGTH, i]
-        for wave in range(2 * WAVES):
-            direction, row = math.pi * unit[11 + 2 * wave, i], WAVE + 3 * wave
-            errors[row, i], errors[row + 1, i] = number * exact.cosine(direction), number * exact.sine(direction)
-            errors[row + 2, i] = math.pi * unit[12 + 2 * wave, i]
+            errors.cells[chamber, i] = figures.pressure_bias[i] * unit.cells[chamber, i]
+        errors.scaled[i] = figures.position_scale_error[i] * unit.scale[i]
+        turns = -2.0 * math.pi * figures.force_bandwidth[i] * shared.period
+        errors.passed[i] = 1.0 - exact.exp(turns) if turns < 0.0 else 1.0
+        errors.delay[i] = figures.force_latency[i] / shared.period
+        errors.force_step[i] = _step(2.0 * shared.force_range, figures.adc_bits[i])
+        errors.pressure_step[i] = _step(shared.pressure_range, figures.adc_bits[i])
+        errors.opening_step[i] = _step(2.0, figures.dac_bits[i])
+        number = 2.0 * math.pi / figures.distortion_length[i]
+        for k in range(2 * WAVES):
+            direction, wave = math.pi * unit.waves[2 * k, i], Wave(errors.waves[k * Wave.size : (k + 1) * Wave.size])
+            wave.number[0, i], wave.number[1, i] = number * exact.cosine(direction), number * exact.sine(direction)
+            wave.phase[i] = math.pi * unit.waves[2 * k + 1, i]
         # Each sine has a mean square of a half.
-        errors[HEIGHT, i] = figures[DISTORTION, i] * math.sqrt(2.0 / WAVES)
+        errors.height[i] = figures.position_distortion[i] * math.sqrt(2.0 / WAVES)
         for axis in range(2):
-            errors[REGISTERED + axis, i] = field(errors, i, axis, constants[AT_X], constants[AT_Y])
+            errors.registered[axis, i] = field(errors, i, axis, shared.registration[0], shared.registration[1])
 
 
-def shift(errors: Array, constants: Array, place: Array) -> Array:
+def shift(errors: Errors, shared: Shared, place: Array) -> Array:
     """By how much scale and distortion move what the tracker shows of the true ``place``, both (2, N), m."""
-    waves = errors[WAVE:HEIGHT].reshape(2, WAVES, 3, -1)
+    waves = errors.waves.reshape(2, WAVES, Wave.size, -1)
     total = np.sin(waves[:, :, 0] * place[0] + waves[:, :, 1] * place[1] + waves[:, :, 2]).sum(axis=1)
-    scaled = errors[SCALED] * (place - constants[AT_X : AT_Y + 1, None])
-    moved: Array = errors[HEIGHT] * total - errors[REGISTERED : REGISTERED + 2] + scaled
-    return moved
+    scaled = errors.scaled * (place - shared.registration[:, None])
+    return np.asarray(errors.height * total - errors.registered + scaled)

@@ -9,48 +9,35 @@ every policy period.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.loop.rows import (
-    ACCELERATION,
-    FORCE,
-    MOTION,
-    POSITION,
-    POSITION_TIME,
-    PRESSURE,
-    SEEN,
-    STATE,
-    TICK,
-    TIME,
-    USER_FORCE,
-    VELOCITY,
-    WORLD,
-)
+from birthsim_env.loop.rows import Seen, Signals, World, measurement_of
 from birthsim_env.loop.signals import Measurement
-from birthsim_env.loop.stage import Stage, block, numbers, scratch, table1, table2, table3
+from birthsim_env.loop.stage import Stage, table1, table2, table3
 from birthsim_env.parts.drawn.seeding import vectorised
 from birthsim_env.parts.sensors import acceleration, tracker
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
+from birthsim_env.parts.sensors.looking import looked_at
 from birthsim_env.parts.sensors.noise import normal
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PRESSURES, Array
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.electronics import Electronics
 
 
 @kernel
-def ideal_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+def ideal_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Shows position, velocity, pressures and the hand's force as they are."""
-    w, s = block(world, WORLD), block(seen, SEEN)
     for i in range(n):
-        s[POSITION_TIME, i] = s[TIME, i]
+        seen.position_time[i] = seen.time[i]
         for axis in range(2):
-            s[POSITION + axis, i], s[VELOCITY + axis, i] = w[MOTION + axis, i], w[MOTION + 2 + axis, i]
-            s[USER_FORCE + axis, i] = w[FORCE + axis, i]
+            seen.position[axis, i], seen.velocity[axis, i] = world.motion[axis, i], world.motion[2 + axis, i]
+            seen.user_force[axis, i] = world.force[axis, i]
         for chamber in range(4):
-            s[PRESSURE + chamber, i] = w[STATE + PRESSURES[chamber], i]
+            seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i]
     return 0
 
 
@@ -75,53 +62,62 @@ class IdealSensors:
         return Stage(ideal_stage)
 
 
+class Board(Numbers):
+    """What all lanes share."""
+
+    period = number("s", "control period")
+    rate = number("Hz", "of the tracker")
+    latency = number("s", "of the tracker")
+    position_noise = number("m", "of the tracker")
+    pressure_noise = number("Pa", "of a pressure cell")
+    share = number("1", "what passes the low-pass of an acceleration sensor in a period; 0: there is none")
+    acceleration_noise = number("m/s2", "of that sensor")
+
+
+class Kept(NamedTuple):
+    """What the sensors remember of N lanes; ``queue`` (Q, 3, N) are samples on their way."""
+
+    keys: NDArray[np.uint64]
+    queue: Array
+    arrived: tracker.Arrived
+    felt: acceleration.Felt
+
+
 @helper
-def _lab(
-    ticks: NDArray[Any], time: Array, motion: Array, pressures: Array, keys: NDArray[np.uint64], period: float,
-    rate: float, latency: float, position_noise: float, pressure_noise: float, passed: float, acceleration_noise: float,
-    queue: Array, shown: Array, velocity: Array, sensed: Array, seen: Array,
-) -> None:  # fmt: skip
-    """One control instant; ``queue``, ``shown`` and ``velocity`` as in ``parts.tracker``, ``sensed`` in
-    ``parts.acceleration``, ``seen`` (6, N): noisy pressures and acceleration."""
-    for i in range(time.shape[0]):
-        tick, key = int(ticks[i]), keys[i]
-        if tracker.sample_due(tick, time[i], period, rate):
-            x = motion[0, i] + position_noise * normal(key, tick, 4)
-            y = motion[1, i] + position_noise * normal(key, tick, 5)
-            tracker.take(queue, i, time[i], rate, x, y)
+def _lab(world: World, seen: Signals, board: Board, kept: Kept, n: int) -> None:
+    """One control instant."""
+    arrived = kept.arrived
+    for i in range(n):
+        tick, key, time = int(world.tick[i]), kept.keys[i], seen.time[i]
+        if tracker.sample_due(tick, time, board.period, board.rate):
+            x = world.motion[0, i] + board.position_noise * normal(key, tick, 4)
+            y = world.motion[1, i] + board.position_noise * normal(key, tick, 5)
+            tracker.take(kept.queue, i, time, board.rate, x, y)
             if tick == 0:
-                tracker.start(queue, shown, velocity, i, x, y, motion[2, i], motion[3, i])
-        tracker.arrive(queue, shown, velocity, i, time[i], latency)
+                tracker.start(kept.queue, arrived, i, x, y, world.motion[2, i], world.motion[3, i])
+        tracker.arrive(kept.queue, arrived, i, time, board.latency)
+        seen.position_time[i] = arrived.time[i]
         for chamber in range(4):
-            seen[chamber, i] = pressures[chamber, i] + pressure_noise * normal(key, tick, chamber)
-        again = acceleration.looked(sensed, i, tick)
+            seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i] + board.pressure_noise * normal(key, tick, chamber)
+        again = acceleration.looked(kept.felt, i, tick)
         for axis in range(2):
-            seen[4 + axis, i] = 0.0
-            if passed > 0.0:
-                told = acceleration.feel(sensed, i, axis, tick, motion[2 + axis, i], 0.0, 0.0, period, passed, again)
-                seen[4 + axis, i] = told + acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
+            seen.position[axis, i], seen.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
+            seen.user_force[axis, i], seen.acceleration[axis, i] = world.force[axis, i], 0.0
+            if board.share > 0.0:
+                speed = world.motion[2 + axis, i]
+                felt = acceleration.feel(kept.felt, i, axis, tick, speed, 0.0, 0.0, board.period, board.share, again)
+                noise = board.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
+                seen.acceleration[axis, i] = felt + noise
 
 
 @kernel
-def _lab_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    w, s, about = block(world, WORLD), block(seen, SEEN), numbers(constants, 7)
-    keys, mine = table1(tables, 0).view(np.uint64)[lane : lane + n], slice(lane, lane + n)
-    queue, shown, velocity = table3(tables, 1)[:, :, mine], table2(tables, 2)[:, mine], table2(tables, 3)[:, mine]
-    pressures, told = scratch(4), scratch(6)
-    for chamber in range(4):
-        for i in range(n):
-            pressures[chamber, i] = w[STATE + PRESSURES[chamber], i]
-    _lab(
-        w[TICK, :n], s[TIME, :n], w[MOTION : MOTION + 4, :n], pressures, keys, about[0], about[1], about[2], about[3], about[4],
-        about[5], about[6], queue, shown, velocity, table2(tables, 4)[:, mine], told,
+def _lab_stage(world: World, seen: Seen, memory: int, board: Board, tables: int, lane: int, n: int) -> int:
+    mine = slice(lane, lane + n)
+    kept = Kept(
+        table1(tables, 0).view(np.uint64)[mine], table3(tables, 1)[:, :, mine], tracker.Arrived(table2(tables, 2)[:, mine]),
+        acceleration.Felt(table2(tables, 3)[:, mine]),
     )  # fmt: skip
-    for i in range(n):
-        s[POSITION_TIME, i] = shown[2, i]
-        for axis in range(2):
-            s[POSITION + axis, i], s[VELOCITY + axis, i] = shown[axis, i], velocity[axis, i]
-            s[USER_FORCE + axis, i], s[ACCELERATION + axis, i] = w[FORCE + axis, i], told[4 + axis, i]
-        for chamber in range(4):
-            s[PRESSURE + chamber, i] = told[chamber, i]
+    _lab(world, seen, board, kept, n)
     return 0
 
 
@@ -139,15 +135,15 @@ class LabSensors:
         board = electronics
         # A tracker faster than the control board is read once a period; the queue's slots count samples, one a period at most.
         rate = min(board.position_rate, 1 / board.control_period)
-        self._numbers = (
-            board.control_period, rate, board.position_latency, board.position_noise, board.pressure_noise,
-            acceleration.passed(board.acceleration_bandwidth, board.control_period), board.acceleration_noise,
+        self._board = Board.numbers(
+            period=board.control_period, rate=rate, latency=board.position_latency, position_noise=board.position_noise,
+            pressure_noise=board.pressure_noise, acceleration_noise=board.acceleration_noise,
+            share=acceleration.passed(board.acceleration_bandwidth, board.control_period),
         )  # fmt: skip
-        self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), 3, num_envs))
-        self._shown: Array = np.zeros((3, num_envs))
+        self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), tracker.Sample.size, num_envs))
+        self._arrived: Array = np.zeros((tracker.Arrived.size, num_envs))
         self._keys = np.zeros(num_envs, dtype=np.uint64)
-        self._velocity: Array = np.zeros((2, num_envs))
-        self._sensed: Array = np.zeros((acceleration.ROWS, num_envs))
+        self._felt: Array = np.zeros((acceleration.Felt.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -156,16 +152,15 @@ class LabSensors:
 
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
-        seen, kept = np.empty((6, len(time))), (self._queue, self._shown, self._velocity, self._sensed)
-        _lab(ticks, time, motion, pressures, self._keys, *self._numbers, *kept, seen)
-        shown = self._shown.copy()
-        felt = seen[4:] if self._numbers[5] > 0.0 else None
-        return Measurement(time, shown[:2], shown[2], self._velocity.copy(), seen[:4], force, True, felt)
+        (world, seen), board = looked_at(ticks, time, motion, pressures, force), Board(self._board)
+        kept = Kept(self._keys, self._queue, tracker.Arrived(self._arrived), acceleration.Felt(self._felt))
+        _lab(world, seen, board, kept, len(time))
+        return measurement_of(seen.rows, True, board.share > 0.0)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
         keys = self._keys.view(np.float64)
-        return Stage(_lab_stage, np.array(self._numbers), tables=(keys, self._queue, self._shown, self._velocity, self._sensed))
+        return Stage(_lab_stage, self._board, tables=(keys, self._queue, self._arrived, self._felt))
 
 
 class SensorModel(Protocol):

@@ -1,7 +1,6 @@
 """A tracker's clock: when it takes samples, when they arrive, and the velocity that is worked out from them.
 
-``queue`` (Q, 3, N) holds x, y and time of the last samples taken; ``shown`` (3, N) the newest that has arrived; ``velocity``
-(2, N) the low-passed differences of those.
+``queue`` (Q, 3, N) holds the last samples taken, each a ``Sample``.
 """
 
 from __future__ import annotations
@@ -10,6 +9,21 @@ import math
 
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
+
+
+class Sample(Rows):
+    """Where the tracker was."""
+
+    position = rows("x y", "m", "of the end effector")
+    time = row("s", "when the sample was taken")
+
+
+class Arrived(Sample):
+    """The newest sample that has arrived."""
+
+    velocity = rows("vx vy", "m/s", "low-passed differences of the samples")
+
 
 RATE_TIME = 0.02
 """s; assumed: time constant of the low-pass on the position differences that are shown as velocity."""
@@ -29,28 +43,30 @@ def sample_due(tick: int, time: float, period: float, rate: float) -> bool:
 @helper
 def take(queue: Array, i: int, time: float, rate: float, x: float, y: float) -> None:
     """Put a sample into the queue of lane ``i``."""
-    slot = math.floor(time * rate + 1e-9) % queue.shape[0]
-    queue[slot, 0, i], queue[slot, 1, i], queue[slot, 2, i] = x, y, time
+    sample = Sample(queue[math.floor(time * rate + 1e-9) % queue.shape[0]])
+    sample.position[0, i], sample.position[1, i], sample.time[i] = x, y, time
 
 
 @helper
-def start(queue: Array, shown: Array, velocity: Array, i: int, x: float, y: float, vx: float, vy: float) -> None:
+def start(queue: Array, arrived: Arrived, i: int, x: float, y: float, vx: float, vy: float) -> None:
     """The tracker has run before the episode: its first sample, (``x``, ``y``), is there at once."""
     for k in range(queue.shape[0]):
-        queue[k, 2, i] = 0.0
-        queue[k, 0, i], queue[k, 1, i] = x, y
-    shown[0, i], shown[1, i], shown[2, i] = x, y, 0.0
-    velocity[0, i], velocity[1, i] = vx, vy
+        sample = Sample(queue[k])
+        sample.position[0, i], sample.position[1, i], sample.time[i] = x, y, 0.0
+    arrived.position[0, i], arrived.position[1, i], arrived.time[i] = x, y, 0.0
+    arrived.velocity[0, i], arrived.velocity[1, i] = vx, vy
 
 
 @helper
-def arrive(queue: Array, shown: Array, velocity: Array, i: int, time: float, latency: float) -> None:
-    """Show what has been under way for ``latency`` s."""
+def arrive(queue: Array, arrived: Arrived, i: int, time: float, latency: float) -> None:
+    """Let arrive what has been under way for ``latency`` s."""
     for k in range(queue.shape[0]):
-        if queue[k, 2, i] > shown[2, i] and queue[k, 2, i] + latency <= time + 1e-9:
-            step = queue[k, 2, i] - shown[2, i]
+        sample = Sample(queue[k])
+        if sample.time[i] > arrived.time[i] and sample.time[i] + latency <= time + 1e-9:
+            step = sample.time[i] - arrived.time[i]
             fraction = step / (RATE_TIME + step)
             for axis in range(2):
-                velocity[axis, i] += fraction * ((queue[k, axis, i] - shown[axis, i]) / step - velocity[axis, i])
-                shown[axis, i] = queue[k, axis, i]
-            shown[2, i] = queue[k, 2, i]
+                moved = sample.position[axis, i] - arrived.position[axis, i]
+                arrived.velocity[axis, i] += fraction * (moved / step - arrived.velocity[axis, i])
+                arrived.position[axis, i] = sample.position[axis, i]
+            arrived.time[i] = sample.time[i]

@@ -12,6 +12,7 @@ constant shape. ``Numbers`` are the same for all lanes, and ``number`` is one of
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
@@ -85,7 +86,7 @@ def part(layout: type[L], about: str) -> Group[L]:
 class Rows(Named):
     """A layout, and with an array its rows by name. ``ValueError`` for an array that has not ``size`` rows.
 
-    A layout that derives from another one has that one's groups first. ``open_ended`` is True where its last one takes what is
+    A layout that derives from others has their groups first. ``open_ended`` is True where its last one takes what is
     left of an array.
     """
 
@@ -97,16 +98,18 @@ class Rows(Named):
     per_lane: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
-        cls.groups = {**cls.groups}
-        for name, group in list(vars(cls).items()):
-            if isinstance(group, Group):
-                if name in dir(Rows):
-                    raise TypeError(f"{cls.__name__}.{name}; allowed: other names than those of ``Rows`` itself")
-                if cls.open_ended:
-                    raise TypeError(f"{cls.__name__}.{name} follows a group without a size; allowed: that group is the last")
-                group.first, cls.groups[name] = cls.size, group
-                cls.size += group.count
-                cls.open_ended = group.place.stop is None
+        bases = {name: copy.copy(group) for base in cls.__bases__ for name, group in getattr(base, "groups", {}).items()}
+        own = {name: group for name, group in vars(cls).items() if isinstance(group, Group)}
+        cls.groups, cls.size, cls.open_ended = {**bases, **own}, 0, False
+        for name, group in cls.groups.items():
+            if name in dir(Rows):
+                raise TypeError(f"{cls.__name__}.{name}; allowed: other names than those of ``Rows`` itself")
+            if cls.open_ended:
+                raise TypeError(f"{cls.__name__}.{name} follows a group without a size; allowed: that group is the last")
+            group.first = cls.size
+            cls.size += group.count
+            cls.open_ended = group.place.stop is None
+            setattr(cls, name, group)
 
     def __init__(self, rows: Array) -> None:
         found, size = rows.shape[0], type(self).size
@@ -131,10 +134,12 @@ class Rows(Named):
     @classmethod
     def lane(cls, **values: Any) -> Array:
         """The rows (M,) of one lane: what is named has these values, all else is zero."""
-        array = np.zeros(cls.size)
-        for name, value in values.items():
-            array[cls.groups[name].place] = value
-        return array
+        unknown = values.keys() - cls.groups.keys()
+        if unknown:
+            raise TypeError(f"{cls.__name__} of {', '.join(unknown)}; allowed: {', '.join(cls.groups)}")
+        given = [(values.get(name, 0.0), group) for name, group in cls.groups.items()]
+        rows = [value if group.place.stop is None else np.broadcast_to(value, group.count) for value, group in given]
+        return np.concatenate(rows, dtype=np.float64)
 
 
 class Numbers(Rows):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from baselines.admittance.informed import Informed
+from baselines.admittance.knowledge import BELIEVED_LIMIT
 from baselines.estimation.admittance import MOVING_SPEED
-from baselines.estimation.state_estimator import BELIEVED_LIMIT, Estimate, StateEstimator
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
@@ -28,8 +30,24 @@ PISTON = np.array([[0.02, -0.04], [-0.05, 0.08]])
 either = pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
 
 
-def aware(sampled: bool, rig: Parameters = RIG, **gains: float) -> StateEstimator:
-    return StateEstimator(rig, sampled, {**GAINS, **gains})
+class Aware(Informed):
+    """``known`` and ``memory`` by their names, which are good until the next ``update``."""
+
+    def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
+        self.update(measurement, reference)
+        given, memory = self.known.given, self.memory
+        return SimpleNamespace(
+            motion=self.known.motion.rows, moving=given.moving, force=given.force, believed=given.believed,
+            unseen=self.known.unseen, joints=memory.joints.rows, spools=memory.chambers.spool,
+            pressures=memory.chambers.pressure, disturbance=memory.pistons.disturbance, rest=memory.pistons.rest,
+        )  # fmt: skip
+
+    def commanded(self, openings: Array) -> None:
+        self.memory.chambers.opening[:] = openings
+
+
+def aware(rig: Parameters = RIG, **gains: float) -> Aware:
+    return Aware(rig, {sensors: {**GAINS, **gains} for sensors in ("ideal", "lab")})
 
 
 def balanced(piston: Array, rig: Parameters = RIG) -> Array:
@@ -52,9 +70,9 @@ def end_effector(piston: Array) -> Array:
 def test_at_rest_nothing_is_wanted_but_the_target(sampled: bool) -> None:
     """On the target, in balance, without friction to be felt: the motion is the target, nothing acts unseen, nothing moves."""
     wanted = closed_loop.holding(end_effector(PISTON), 2000.0)
-    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware(sampled)
+    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware()
     for tick in range(50):
-        now = part.update(seen(tick, PISTON, pressures, nothing, sampled), wanted)
+        now = part.now(seen(tick, PISTON, pressures, nothing, sampled), wanted)
     assert np.array_equal(now.motion, np.concatenate([wanted.position, np.zeros((6, 2))]))
     np.testing.assert_allclose(now.joints, np.concatenate([PISTON, nothing]), rtol=0, atol=1e-9)
     np.testing.assert_allclose(now.pressures, pressures, rtol=1e-9)
@@ -69,9 +87,9 @@ def test_a_held_push_moves_the_target_as_the_spring_says(sampled: bool) -> None:
     """A coupled spring under 20 N: after a second the motion stands K^-1 F beside the target; it moved meanwhile."""
     wanted = closed_loop.holding(end_effector(PISTON), np.array([[1500.0, 3000.0], [2500.0, 1200.0]]))
     wanted.rows[14], push = [600.0, -400.0], np.array([[20.0, -12.0], [5.0, 16.0]])
-    pressures, part, moved = balanced(PISTON), aware(sampled), []
+    pressures, part, moved = balanced(PISTON), aware(), []
     for tick in range(1000):
-        now = part.update(seen(tick, PISTON, pressures, push, sampled), wanted)
+        now = part.now(seen(tick, PISTON, pressures, push, sampled), wanted)
         moved.append(now.moving.copy())
     springs = [[[1500.0, 600.0], [600.0, 2500.0]], [[3000.0, -400.0], [-400.0, 1200.0]]]
     way = np.stack([np.linalg.solve(spring, force) for spring, force in zip(springs, push.T, strict=True)], axis=1)
@@ -91,9 +109,9 @@ def test_the_disturbance_is_what_holds_the_pistons_unseen(sampled: bool) -> None
     user = np.array([[8.0, 0.0], [-6.0, 0.0]])
     pressures = balanced(PISTON)
     pressures[[0, 2]] += extra / areas
-    wanted, part = closed_loop.holding(end_effector(PISTON), 2000.0), aware(sampled)
+    wanted, part = closed_loop.holding(end_effector(PISTON), 2000.0), aware()
     for tick in range(1500):
-        now = part.update(seen(tick, PISTON, pressures, user, sampled), wanted)
+        now = part.now(seen(tick, PISTON, pressures, user, sampled), wanted)
     assert np.array_equal(now.believed.any(axis=0), [True, False])
     jacobians = rigid_body.jacobians(PISTON, RIG)
     mass = RIG.mechanics.mass * np.stack([(jacobians[:, :, 0] ** 2).sum(axis=1), np.ones(2)])
@@ -114,9 +132,9 @@ def gliding(tick: int, speed: Array) -> Reference:
 def test_a_fraction_of_the_friction_is_believed_against_the_motion(sampled: bool, fraction: float) -> None:
     """Of a steady glide: Fc + (Fs - Fc)/(1 + (v/vs)^2) of each piston, against its speed, whatever the rig itself does."""
     speed = np.array([[0.1, -0.006], [0.05, 0.01]])
-    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware(sampled, friction_fraction=fraction)
+    pressures, nothing, part = balanced(PISTON), np.zeros((2, 2)), aware(friction_fraction=fraction)
     for tick in range(501):
-        now = part.update(seen(tick, PISTON, pressures, nothing, sampled), gliding(tick, speed))
+        now = part.now(seen(tick, PISTON, pressures, nothing, sampled), gliding(tick, speed))
     v = np.linalg.solve(rigid_body.jacobians(PISTON, RIG), speed.T[..., None])[..., 0].T
     assert np.abs(v).max() > 3 * RIG.friction.stribeck_speed
     assert np.abs(v).min() < RIG.friction.stribeck_speed
@@ -132,19 +150,19 @@ def test_what_is_slower_than_the_moving_speed_may_rest(sampled: bool) -> None:
     piston, nothing = np.repeat(PISTON[:, :1], 5, axis=1), np.zeros((2, 5))
     wanted = closed_loop.holding(end_effector(piston), 2000.0)
     wanted.rows[2:4] = speed
-    now = aware(sampled).update(seen(0, piston, balanced(piston), nothing, sampled), wanted)
+    now = aware().now(seen(0, piston, balanced(piston), nothing, sampled), wanted)
     assert now.moving.tolist() == [0, 1, 0, 1, 1]
 
 
 @either
 def test_spools_are_those_of_the_plant(sampled: bool) -> None:
     """``commanded`` is all that is known of them; before the first command they are shut."""
-    plant, part, rng = Plant(RIG, 2), aware(sampled), np.random.default_rng(3)
+    plant, part, rng = Plant(RIG, 2), aware(), np.random.default_rng(3)
     plant.state = balanced_state(plant.lane_parameters, PISTON)
     wanted, nothing = closed_loop.holding(end_effector(PISTON), 2000.0), np.zeros((2, 2))
     for tick in range(40):
         exact = closed_loop.ideal(plant, tick * PERIOD, nothing)
-        now = part.update(dataclasses.replace(exact, sampled=sampled), wanted)
+        now = part.now(dataclasses.replace(exact, sampled=sampled), wanted)
         np.testing.assert_allclose(now.spools, plant.state[list(SPOOLS)], rtol=0, atol=2e-6)
         openings = rng.uniform(-1, 1, (4, 2))
         part.commanded(openings)
@@ -158,12 +176,12 @@ def test_noise_is_averaged_where_cells_are_noisy_and_nowhere_else() -> None:
     lanes, noise, rng = 400, 500.0, np.random.default_rng(2)
     piston, nothing = np.repeat(PISTON[:, :1], lanes, axis=1), np.zeros((2, lanes))
     pressures, wanted = balanced(piston), closed_loop.holding(end_effector(piston), 2000.0)
-    exact, averaging = aware(False), aware(True)
+    exact, averaging = aware(), aware()
     for tick in range(80):
         cells = pressures + noise * rng.normal(size=pressures.shape)
-        known = exact.update(seen(tick, piston, cells, nothing, False), wanted)
+        known = exact.now(seen(tick, piston, cells, nothing, False), wanted)
         assert np.array_equal(known.pressures, cells)
-        now = averaging.update(seen(tick, piston, cells, nothing, True), wanted)
+        now = averaging.now(seen(tick, piston, cells, nothing, True), wanted)
     fraction = 1 - np.exp(-GAINS["pressure_bandwidth"] * PERIOD)
     assert np.std(now.pressures - pressures) == pytest.approx(noise * np.sqrt(fraction / (2 - fraction)), rel=0.1)
 
@@ -175,16 +193,16 @@ def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() ->
     noise = 500.0 * rng.normal(size=(100, *pressures.shape))
     for bandwidth in (1e-9, 150.0):
         for scale in (0.0, 1.0):
-            part = aware(True, pressure_bandwidth=bandwidth)
+            part = aware(pressure_bandwidth=bandwidth)
             for tick, own in enumerate(noise):
                 cells = pressures + scale * min(tick, 1) * own
-                now = part.update(seen(tick, PISTON, cells, nothing, True), wanted)
+                now = part.now(seen(tick, PISTON, cells, nothing, True), wanted)
             found[bandwidth, scale] = now.disturbance.copy()
     np.testing.assert_allclose(found[1e-9, 1.0], found[1e-9, 0.0], rtol=0, atol=1e-6)
     assert np.abs(found[150.0, 1.0] - found[150.0, 0.0]).min() > 1e-4
 
 
-def copied(now: Estimate) -> dict[str, Array]:
+def copied(now: SimpleNamespace) -> dict[str, Array]:
     return {name: np.array(value) for name, value in vars(now).items()}
 
 
@@ -201,7 +219,7 @@ def test_lanes_and_a_new_start(sampled: bool) -> None:
     """Lanes do not know of each other; a reset one knows what a new one does, the others go on as if nothing were."""
     rng, fresh, one = np.random.default_rng(4), np.array([False, True, False]), slice(1, 2)
     piston = np.concatenate([PISTON, PISTON[:, :1]], axis=1)
-    kept, reset, single, late = (aware(sampled) for _ in range(4))
+    kept, reset, single, late = (aware() for _ in range(4))
     for tick in range(60):
         cells, user = balanced(piston) + 2000 * rng.normal(size=(4, 3)), rng.normal(0, 10, (2, 3))
         wanted = closed_loop.holding(end_effector(piston) + 1e-3 * rng.normal(size=(2, 3)), 2000.0)
@@ -210,9 +228,9 @@ def test_lanes_and_a_new_start(sampled: bool) -> None:
         pair, openings = (seen(tick, now, cells, user, sampled), wanted), rng.uniform(-1, 1, (4, 3))
         if tick == 30:
             reset.reset(fresh)
-        expected, got = copied(kept.update(*pair)), copied(reset.update(*pair))
-        alone = copied(single.update(*of_lanes(pair, one)))
-        new = copied(late.update(*of_lanes(pair, one))) if tick >= 30 else None
+        expected, got = copied(kept.now(*pair)), copied(reset.now(*pair))
+        alone = copied(single.now(*of_lanes(pair, one)))
+        new = copied(late.now(*of_lanes(pair, one))) if tick >= 30 else None
         for name, value in expected.items():
             assert np.array_equal(got[name][..., ~fresh], value[..., ~fresh]), name
             assert np.array_equal(alone[name], value[..., one]), name
@@ -225,7 +243,7 @@ def test_lanes_and_a_new_start(sampled: bool) -> None:
             if part is not late or tick >= 30:
                 part.commanded(own)
     reset.reset()
-    again, first = copied(reset.update(*pair)), copied(aware(sampled).update(*pair))
+    again, first = copied(reset.now(*pair)), copied(aware().now(*pair))
     assert all(np.array_equal(again[name], value) for name, value in first.items())
 
 
@@ -237,27 +255,27 @@ def test_signals_that_do_not_fit_are_refused(sampled: bool) -> None:
     for name in ("velocity", "pressures", "user_force"):
         wrong = dataclasses.replace(measured, **{name: getattr(measured, name)[:, :1]})
         with pytest.raises(ValueError, match=rf"measurement.{name} has shape \(\d, 1\); allowed: \(\d, 2\)"):
-            aware(sampled).update(wrong, wanted)
+            aware().update(wrong, wanted)
     with pytest.raises(ValueError, match=r"reference.rows has shape \(15, 1\); allowed: \(15, 2\)"):
-        aware(sampled).update(measured, Reference(wanted.rows[:, :1]))
+        aware().update(measured, Reference(wanted.rows[:, :1]))
     for stiffness, coupling in ((2000.0, 2000.0), (2000.0, -2500.0), (-1.0, 0.0), (0.0, 0.0)):
         wanted.rows[8:10, 1], wanted.rows[14, 1] = stiffness, coupling
         with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 1; allowed: more than 0 N/m in every direction"):
-            aware(sampled).update(measured, wanted)
+            aware().update(measured, wanted)
 
 
 def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> None:
     """m kappa^2 d along cylinder 1 and m d along cylinder 2, by the Jacobian of the rig of points; 5000 N are not believed."""
-    wanted, part, user = closed_loop.holding(end_effector(PISTON), 2000.0), aware(False), np.zeros((2, 2))
+    wanted, part, user = closed_loop.holding(end_effector(PISTON), 2000.0), aware(), np.zeros((2, 2))
     pressures, force = balanced(PISTON), np.array([[2.0, 5000.0], [-3.0, -5000.0]])
     kappa = np.linalg.norm(rigid_body.jacobians(PISTON, RIG)[:, :, 0], axis=1)
     mass = RIG.mechanics.mass * np.stack([kappa**2, np.ones(2)])
-    part.update(seen(0, PISTON, pressures, user, False), wanted)
-    part._pistons._estimate[2:4] = force / mass
-    now = part.update(seen(1, PISTON, pressures, user, False), wanted)
-    np.testing.assert_allclose(now.disturbance_force[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
-    np.testing.assert_allclose(now.disturbance_force[:, 0], force[:, 0], rtol=0.05)
-    np.testing.assert_array_equal(now.disturbance_force[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
+    part.now(seen(0, PISTON, pressures, user, False), wanted)
+    part.memory.pistons.disturbance[:] = force / mass
+    now = part.now(seen(1, PISTON, pressures, user, False), wanted)
+    np.testing.assert_allclose(now.unseen[:, 0], (now.believed + mass * now.disturbance)[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(now.unseen[:, 0], force[:, 0], rtol=0.05)
+    np.testing.assert_array_equal(now.unseen[:, 1] - now.believed[:, 1], [BELIEVED_LIMIT, -BELIEVED_LIMIT])
 
 
 def turning(tick: int, push: Array) -> tuple[Measurement, Reference]:
@@ -285,27 +303,27 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
 
     Targets turn round on the way, and friction with them. Asking changes nothing.
     """
-    part, kept = aware(sampled, friction_fraction=fraction), aware(sampled, friction_fraction=fraction)
+    part, kept = aware(friction_fraction=fraction), aware(friction_fraction=fraction)
     push, ticks = (
         np.array([[9.0, -4.0], [-6.0, 7.0]]),
         np.arange(1, 26),
     )
 
-    def both(tick: int) -> tuple[Estimate, Estimate]:
+    def both(tick: int) -> tuple[SimpleNamespace, SimpleNamespace]:
         measured, wanted = turning(tick, push)
         measured = dataclasses.replace(measured, sampled=sampled)
-        return part.update(measured, wanted), kept.update(measured, wanted)
+        return part.now(measured, wanted), kept.now(measured, wanted)
 
     for tick in range(401):
         now, _ = both(tick)
-    observed, believed = now.disturbance_force - now.believed, now.believed.copy()
+    observed, believed = now.unseen - now.believed, now.believed.copy()
     assert np.abs(observed).min() > 1
-    ahead, disturbance_force = part.forecast(now, turning(400, push)[1], ticks)
+    ahead, unseen = part.forecast(turning(400, push)[1], ticks)
     later = []
     for k, tick in enumerate(ticks):
         now, other = both(400 + tick)
         np.testing.assert_allclose(ahead[k], now.motion[:4], rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(disturbance_force[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(unseen[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
         assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
         later.append(now.believed - believed)
     assert np.all(np.abs(later).max(axis=0) >= 10 * fraction)

@@ -1,0 +1,97 @@
+"""Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
+
+from __future__ import annotations
+
+from baselines.estimation.admittance import Compliance, Offset
+from baselines.estimation.chamber_observer import Chambers
+from baselines.estimation.force_observer import Hand
+from baselines.estimation.friction_level import Friction
+from baselines.estimation.rows import Belief, Given, Joints, Motion, Pistons
+from baselines.estimation.tracker_noise import Tracker
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+
+
+class HalfWave(Rows):
+    """The half wave of a speed error that is under way, and the one before."""
+
+    extreme = row("m/s", "largest error of this half wave")
+    since = row("s", "since it began")
+    peak = row("m/s", "largest error of the last one")
+
+
+class Watch(HalfWave):
+    """Oscillation in one direction."""
+
+    fraction = row("1", "fraction of the gain that oscillations have left; 1 at a new start")
+
+
+class Follower(Rows):
+    """What the loop that follows the motion remembers."""
+
+    across = part(Watch, "across cylinder 2")
+    along = part(Watch, "along cylinder 2")
+    moved = row("1", "how far the motion was moving of late, 0 to 1")
+
+
+class Memory(Rows):
+    """What the law remembers."""
+
+    fresh = row("1", "1 at a new start")
+    offset = part(Offset, "motion from the target")
+    bristle = rows("z1 z2", "m", "deflection along the motion")
+    chambers = part(Chambers, "valves and chambers")
+    joints = part(Joints, "pistons a period ago")
+    tracker = part(Tracker, "noise of the tracker")
+    bias = rows("bias_x bias_y", "N", "bias of the force sensor")
+    friction = part(Friction, "level of friction")
+    hand = part(Hand, "force of the hand without a sensor")
+    follower = part(Follower, "loop")
+    pistons = part(Pistons, "observer")
+
+
+class Known(Rows):
+    """What the law knows at one instant, besides what it remembers."""
+
+    motion = part(Motion, "motion that the hand should find")
+    given = part(Given, "to the observer of the pistons")
+    unseen = rows("U1 U2", "N", "all that is unseen along the pistons: friction as believed and what is observed besides")
+    drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
+    unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
+    hand = rows("Fx Fy", "N", "force of the hand, measured or found")
+
+
+class Beliefs(Numbers):
+    """What the law believes of rig and sensors, and what it is to learn of them."""
+
+    belief = part(Belief, "of the observer of the pistons")
+    compliance = part(Compliance, "what gives way")
+    sampled = number("1", "1 where positions are samples")
+    force_sensor = number("1", "1 with a force sensor")
+    learns_noise = number("1", "1 where the tracker's noise is learned")
+    place = number("1", "row of what is seen at which a ``Point`` stands")
+    rows_of_memory = number("1", "rows of the memory")
+    trust = number("1", "trust in a pressure cell, 0 to 1")
+    friction_fraction = number("1", "fraction of the believed friction that is fed forward")
+    friction_rate = number("1/s", "rate at which the level of friction is learned; 0 learns nothing")
+    most_bias = number("N", "largest bias of the force sensor that is taken off; 0 takes nothing")
+
+
+class Gains(Numbers):
+    """Gains of the loop that follows the motion."""
+
+    pneumatic_gain = number("1/s", "c4")
+    gain = number("1/s", "c while the motion moves")
+    rest_gain = number("1/s", "c while it rests")
+    rest_push = number("1", "weight of a resting piston's position error")
+    dead_zone = number("m", "of a resting piston's position error")
+    quickness = number("1", "fraction of the way that a spool is taken in a period")
+    oscillation = number("m/s", "speed error beyond which sustained half waves lower c")
+    yielding = number("1", "what such a half wave leaves of c")
+    least_fraction = number("1", "what is left of c at least")
+    most_falls = number("1", "times that a half wave lowers c at most: one n times ``oscillation`` lowers it n times")
+
+
+class Constants(Beliefs):
+    """Constants of the stage."""
+
+    gains = part(Gains, "of the loop")

@@ -1,0 +1,58 @@
+"""Rows that the parts of an estimate share."""
+
+from __future__ import annotations
+
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
+
+
+class Point(Rows):
+    """Where the end effector is."""
+
+    position = rows("x y", "m", "position")
+    velocity = rows("vx vy", "m/s", "velocity")
+
+
+class Motion(Point):
+    """The motion that the hand should find."""
+
+    acceleration = rows("ax ay", "m/s2", "acceleration")
+    jerk = rows("jx jy", "m/s3", "jerk, without the rate of the force")
+
+
+class Joints(Rows):
+    """Where the pistons are, measured or estimated."""
+
+    position = rows("y1 y2", "m", "position")
+    speed = rows("v1 v2", "m/s", "speed")
+
+
+class Pistons(Joints):
+    """What an observer of the pistons remembers."""
+
+    disturbance = rows("d1 d2", "m/s2", "acceleration that is not explained")
+    rest = rows("rest1 rest2", "1", "how far a piston rests, 0 to 1")
+    innovation = rows("innovation1 innovation2", "m", "low-passed innovation")
+    reluctance = rows("reluctance1 reluctance2", "1", "factor of the time in which a piston comes to rest")
+    fresh = row("1", "1 at a new start")
+    newest = row("s", "time of the newest sample")
+    slot = row("1", "where in the past the present stands")
+    past = rows(0, "m", "y1, y2 of the last periods in turns, a ring; none where speeds are measured")
+
+
+class Given(Rows):
+    """What an observer of the pistons is given besides samples and pressures."""
+
+    force = rows("Fx Fy", "N", "force of the hand, as far as it is known")
+    believed = rows("F1 F2", "N", "other forces that are believed to act along the pistons")
+    moving = row("1", "1 where no piston may rest")
+    noise = row("m", "standard deviation of a position sample")
+
+
+class Belief(Numbers):
+    """What an observer of the pistons believes of the rig."""
+
+    period = number("s", "control period")
+    bandwidth = number("1/s", "bandwidth of the observer")
+    noise = number("m", "standard deviation of a position sample")
+    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
