@@ -1,27 +1,37 @@
-"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop."""
+"""What every compiled law shares: lanes, their memory, one rig without lanes, and the stages of a closed loop.
+
+``driving`` puts any controller, compiled or not, into a loop.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import TOLD, feedforward_rows, lanes_of
+from baselines.controller import TOLD, Controller, checked_command, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import (
-    ACTION,
-    ASKED,
-    OPENING,
-    REFERENCE,
-    fill_measurement,
-)
+from birthsim_env.loop.rows import ACTION, ASKED, OPENING, REFERENCE, Feedforward, Seen, fill_measurement
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.actuation import Forgetful
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.records import Rows, part, row
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.simulation import Simulation
+
+NO_ACTION = np.zeros(0, dtype=np.float32)
+"""What a single environment's ``step`` takes where a controller drives it."""
+
+TIMED = 10
+"""Control periods, and repetitions of them, over which a compiled law is timed."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,9 @@ class StagedController:
     TOLD: ClassVar[tuple[str, ...]] = TOLD
     """What ``command`` takes besides the signals."""
 
+    asks: ClassVar[bool] = False
+    """Whether the stages themselves say what the law is asked for and told."""
+
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
         self._p = parameter_column(self.parameters)
@@ -55,6 +68,10 @@ class StagedController:
     def __getstate__(self) -> dict[str, object]:
         """Without the loop, which knows addresses."""
         return {**self.__dict__, "_loop": None}
+
+    def is_compiled(self) -> bool:
+        """Whether ``stages`` are all that ``command`` does: not where a derived class has changed it."""
+        return getattr(self.command, "__func__", None) is StagedController.command
 
     def law_stages(self, sampled: bool) -> Sequence[LawStage]:
         """The law for one kind of sensors: ``sampled`` where positions are samples, see ``Measurement``."""
@@ -74,6 +91,14 @@ class StagedController:
         """The law as stages of a closed loop, with what it remembers."""
         pairs = zip(self._made, self._memories, strict=True)
         return [Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs]
+
+    def require_acceleration(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` without an acceleration where the law, once prepared, needs one."""
+        if measurement.acceleration is None and any(one.feels for one in self._made):
+            raise ValueError(
+                f"measurement.acceleration = None; allowed: (2, {self._lanes}) m/s2, since this controller believes in a "
+                f"sensor: electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
+            )
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
@@ -112,11 +137,7 @@ class StagedController:
         """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve."""
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
-        if measurement.acceleration is None and any(one.feels for one in self._made):
-            raise ValueError(
-                f"measurement.acceleration = None; allowed: (2, {lanes}) m/s2, since this controller believes in a sensor: "
-                f"electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
-            )
+        self.require_acceleration(measurement)
         if self._loop is None:
             self._seen, self._asked = np.zeros((ASKED, lanes)), np.zeros((ACTION - ASKED, lanes))
             self._openings: Array = np.zeros((4, lanes))
@@ -130,5 +151,95 @@ class StagedController:
         return self._loop.run()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Arrays of a derived class that its stages read or write besides, with their rows of what is seen."""
+        """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of what is seen."""
         return []
+
+
+class Told(Rows):
+    """What a law is told besides."""
+
+    feedforward = part(Feedforward, "what it is to believe acts on the pistons")
+    damping_factor = row("1", "damping in units of the least, where the law has one to vary; 0: the law's own")
+
+
+@kernel
+def _ask(world: int, seen: Seen, told: Told, constants: int, tables: int, lane: int, n: int) -> int:
+    """A law is asked for the reference, and told what its memory holds."""
+    for i in range(n):
+        for k in range(Reference.size):
+            seen.asked.rows[k, i] = seen.reference.rows[k, i]
+        for k in range(Feedforward.size):
+            seen.feedforward.rows[k, i] = told.feedforward.rows[k, i]
+        seen.damping_factor[i] = told.damping_factor[i]
+    return 0
+
+
+class Driving(Forgetful):
+    """A controller as an actuation, called back once per control period. A policy step has no action.
+
+    With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``told`` are options of
+    ``command``.
+    """
+
+    size, every_period = 0, True
+    names: tuple[str, ...] = ()
+
+    def __init__(self, controller: Controller, name: str | None, told: dict[str, Array]) -> None:
+        self.controller, self._name, self._told, self._spent = controller, name, told, list[float]()
+
+    def begin(self, lanes: Mask) -> None:
+        self.controller.reset(None if lanes.all() else lanes)
+
+    def accept(self, actions: Array) -> None:
+        pass
+
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        started = time.perf_counter()
+        command = self.controller.command(measurement, reference, **self._told)
+        self._spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
+        return command if self._name is None else checked_command(self._name, command, plant.num_envs)
+
+    def cost(self, simulation: Simulation) -> list[float]:
+        """us per lane and call."""
+        return self._spent
+
+
+class CompiledDriving(Driving):
+    """A ``StagedController`` as an actuation: its stages are part of the loop."""
+
+    controller: StagedController
+
+    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
+        """The law, compiled into the closed loop."""
+        self.controller.prepare(lanes, sampled)
+        force, rate, factor = map(self._told.get, TOLD)
+        told = feedforward_rows(lanes, force, rate, factor, self.controller.TOLD)
+        before = [] if self.controller.asks else [Stage(_ask, memory=told, sees_world=False)]
+        return [*before, *self.controller.stages()]
+
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        """Arrays that the loop places in rows of what is seen."""
+        return self.controller.more_rows(lanes)
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the law."""
+        self.controller.explain(measurement, reference)
+
+    def check(self, measurement: Measurement) -> None:
+        """Raise ``ValueError`` where episodes begin with less than the law has to measure."""
+        self.controller.require_acceleration(measurement)
+
+    def cost(self, simulation: Simulation) -> list[float]:
+        """us per lane and call, on a copy of a ``simulation`` that this drives."""
+        acting, spent = deepcopy(simulation).loops_of_parts()[1], []
+        for _ in range(TIMED):
+            started = time.perf_counter()
+            acting.run(TIMED)
+            spent.append((time.perf_counter() - started) * 1e6 / TIMED / simulation.plant.num_envs)
+        return spent
+
+
+def driving(controller: Controller, name: str | None, told: dict[str, Array] | None = None) -> Driving:
+    """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
+    compiled = isinstance(controller, StagedController) and controller.is_compiled()
+    return (CompiledDriving if compiled else Driving)(controller, name, told or {})

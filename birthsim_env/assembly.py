@@ -193,7 +193,7 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
         raise ValueError(f"action has shape {given}; allowed: {shape}, in [-1, 1]")
     # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
     columns = np.array(array.T, order="C")
-    extreme = np.abs(columns).max()
+    extreme = np.abs(columns).max(initial=0.0)
     if extreme <= 1.0:
         return columns
     if not extreme <= 1.0 + ROUNDING:

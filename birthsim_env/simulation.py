@@ -70,8 +70,8 @@ class Simulation:
     - ``impacts`` (2, N), m/s, the fastest collision of each piston with an end stop during the last step.
 
     ``period`` is the control period, s, and ``periods`` of them make a policy step. ``beginning`` stages run where episodes
-    begin, ``closing`` stages at the end of a policy step. ``threads`` share the lanes. Without a ``force_sensor`` the measured
-    force of the hand is zero.
+    begin, ``closing`` stages at the end of a policy step. ``watch`` adds stages that look on in every control period.
+    ``threads`` share the lanes. Without a ``force_sensor`` the measured force of the hand is zero.
     """
 
     def __init__(
@@ -104,6 +104,7 @@ class Simulation:
         self.periods, self.threads = periods, threads
         self.beginning: list[Stage] = []
         self.closing: list[Stage] = []
+        self._watching: tuple[list[Stage], list[Stage]] = [], []
         self.action: Array = np.zeros((actuation.size, num_envs))
         self._tick, self._since = np.zeros((1, num_envs)), np.zeros((1, num_envs))
         self._motion, self._force, self._jumps = np.zeros((4, num_envs)), np.zeros((2, num_envs)), np.zeros((5, num_envs))
@@ -217,6 +218,8 @@ class Simulation:
                 f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
         felt[untold] = 0.0
+        if hasattr(self.actuation, "check"):
+            self.actuation.check(self.measurement)
 
     def step(self, actions: Array) -> None:
         """Integrate over one policy step with ``actions`` (size, N), contiguous float64 in [-1, 1]."""
@@ -224,8 +227,21 @@ class Simulation:
             self._assemble()
         self.action[:] = actions
         self.actuation.accept(actions)
+        self.run(self.periods)
+
+    def watch(self, commanded: list[Stage], moved: list[Stage]) -> bool:
+        """Add stages to every control period, in place of those that close a policy step: ``commanded`` run when the actuation
+        has opened the valves, ``moved`` when target, hand and rig are at the new instant, before the sensors look.
+
+        Returns whether the loop stops in every period for something that a user has written in Python."""
+        self._watching, self.closing, self._made = (commanded, moved), [], ()
+        self._assemble()
+        return self._loop is not None and self._loop.stops
+
+    def run(self, periods: int) -> None:
+        """Go on by some control periods under the action that was accepted last."""
         self.impacts[:] = 0.0
-        self._run(self._loop, self.periods)
+        self._run(self._loop, periods)
 
     def _run(self, loop: MixedLoop | None, periods: int) -> None:
         if loop is not None and loop.run(periods, self.threads):
@@ -247,7 +263,8 @@ class Simulation:
             if own is None:
                 self._shown[:] = actuation.memory()
             seen.append((self._shown, SHOWN))
-        return world, seen
+        more = actuation.more_rows(lanes) if hasattr(actuation, "more_rows") else []
+        return world, [*seen, *more]
 
     def _acts(self) -> list[Part]:
         stages = getattr(self.actuation, "stages", None)
@@ -284,8 +301,10 @@ class Simulation:
 
     def _assemble(self) -> None:
         """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
-        lanes, places, parts = self.plant.num_envs, self._places(), self.parts()
-        every = [part for group in parts.values() for part in group]
+        lanes, parts, places = self.plant.num_envs, self.parts(), self._places()
+        commanded, moved = self._watching
+        order = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
+        every = [part for group in order.values() for part in group]
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
         made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.policy.files import load_policy
+from agents.policy.network import PolicyNetwork
 from agents.policy.seeds import best_policy
-from agents.residual.law import ResidualLaw, observation_names
+from agents.policy.stage import policy_stage
+from agents.residual.law import ResidualLaw, memory_names, observation_names
 from agents.residual.settings import ResidualSettings
-from baselines.impedance import Impedance
-from birthsim_env import observation
 from birthsim_env.assembly import policy_periods
-from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.world import no_force_stage
+from birthsim_env.observation import observe
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
@@ -30,13 +34,15 @@ def observation_size(settings: ResidualSettings) -> int:
     return len(observation_names(settings))
 
 
-class ResidualController:
+class ResidualController(ResidualLaw):
     """The law with a policy on top: the policy is asked every policy period, the law at every call.
 
     ``policy`` is a folder that ``birthsim-train`` wrote, or the name of a policy that comes with the package. Of several
     training seeds the one that did best in validation runs. Raises ``ValueError`` for a damaged or foreign one. ``policy`` may
     also be any ``PolicyFunction``. Then ``settings`` say what it may do; a folder has its own settings.
     """
+
+    TOLD: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,
@@ -45,61 +51,75 @@ class ResidualController:
         settings: ResidualSettings | None = None,
     ) -> None:
         rig = load_parameters(parameters)
+        self._function: PolicyFunction | None = None
+        self._network: PolicyNetwork | None = None
         if callable(policy):
-            self._policy, settings = policy, settings or ResidualSettings()
+            self._function, settings = policy, settings or ResidualSettings()
         elif settings is None:
-            self._policy, settings = _stored(policy)
+            self._network, settings = _stored(policy)
         else:
             raise ValueError(f"settings = {settings!r} beside policy = {str(policy)!r}; allowed: beside a function")
-        self._nominal = parameter_column(rig)
+        super().__init__(rig, settings)
         self._periods = policy_periods(settings.policy_period, rig)
-        self._law, self._size = ResidualLaw(rig, settings), settings.size
-        self._force_sensor = settings.force_sensor
-        self.reset()
+        self._calls = 0
+        self._before: list[Stage] = []
+        self._cells: Array = np.zeros((0, 0))
+
+    def is_compiled(self) -> bool:
+        """Whether the policy is a network, which runs in the loop, and no function."""
+        return self._function is None
 
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        if hasattr(self._policy, "reset"):
-            self._policy.reset(lanes)
+        super().reset(lanes)
         if lanes is None:
             self._calls = 0
-            self._action: Array = np.zeros((self._size, 0))
-        elif self._action.shape[1]:
-            self._action[:, lanes] = 0.0
-            self._law.reset(lanes)
+        elif self._lanes:
+            self._cells[:, lanes] = 0.0
+        forget = getattr(self._function, "reset", None)
+        if forget is not None:
+            forget(lanes)
 
-    def declared_impedance(self, reference: Reference) -> Impedance | None:
-        """What the law underneath means to render, over N lanes; None without a law."""
-        return self._law.declared_impedance(reference)
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
+        if (lanes, sampled) != (self._lanes, self._sampled):
+            self._cells, self._before = np.zeros((0, lanes)), [] if self.settings.force_sensor else [no_force_stage()]
+            if self._network is not None:
+                shown = len(memory_names(self.settings))
+                told = policy_stage(self._network, self._periods, self.settings.size, shown, self._p, lanes)
+                assert told.memory is not None
+                self._before, self._cells = [*self._before, told], told.memory[1:]
+        super().prepare(lanes, sampled)
 
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
+    def stages(self) -> list[Stage]:
+        """Policy and law as stages of a closed loop, with what they remember."""
+        return [*self._before, *super().stages()]
+
+    def command(self, measurement: Measurement, reference: Reference, *told: Any) -> Array:
         """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
-        if measurement.position.ndim == 1:
-            return self.command(*one_lane(measurement, reference))[:, 0]
-        if not self._force_sensor:
+        if self._function is not None and measurement.position.ndim > 1:
+            self.prepare(measurement.position.shape[1], measurement.sampled)
+            if self._calls % self._periods == 0:
+                self._ask(self._function, measurement, reference)
+            self._calls += 1
+        return super().command(measurement, reference, *told)
+
+    def _ask(self, function: PolicyFunction, measurement: Measurement, reference: Reference) -> None:
+        if not self.settings.force_sensor:
             measurement = replace(measurement, user_force=np.zeros_like(measurement.user_force))
-        lanes = measurement.position.shape[1]
-        if self._action.shape[1] != lanes:
-            self._action = np.zeros((len(self._action), lanes))
-            self._law.reset(np.ones(lanes, dtype=np.bool_))
-        if self._calls % self._periods == 0:
-            beside = np.concatenate([self._action, self._law.memory()])
-            seen = observation.observe(measurement, reference, beside, self._nominal)
-            actions = self._policy(seen)
-            if np.shape(actions) != (lanes, self._size):
-                raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {(lanes, self._size)}")
-            self._action = np.ascontiguousarray(actions.T, dtype=np.float64)
-            self._law.accept(self._action)
-        self._calls += 1
-        return self._law.command(measurement, reference)
+        seen = observe(measurement, reference, np.concatenate([self.action, self.shown]), self._p)
+        actions, expected = function(seen), (self.action.shape[1], self.settings.size)
+        if np.shape(actions) != expected:
+            raise ValueError(f"policy gives actions {np.shape(actions)}; allowed: {expected}")
+        self.accept(np.asarray(actions, dtype=np.float64).T)
 
 
-def _stored(place: str | Path) -> tuple[PolicyFunction, ResidualSettings]:
-    """The policy of a folder and its settings."""
+def _stored(place: str | Path) -> tuple[PolicyNetwork, ResidualSettings]:
+    """The network of a folder and its settings."""
     stored = load_policy(best_policy(place))
     network, seen, said = stored.network, observation_size(stored.settings), stored.settings.size
     if (network.inputs, network.outputs) != (seen, said):
         raise ValueError(
             f"policy = {str(place)!r} maps {network.inputs} to {network.outputs} numbers; allowed: {seen} to {said}"
         )
-    return network.acting(), stored.settings
+    return network, stored.settings

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Mask
+from birthsim_env.loop.stage import described, singles, table1
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
 Weights = NDArray[np.float32]
@@ -101,20 +103,28 @@ class PolicyNetwork:
         x = (observations - self.mean) / np.sqrt(self.variance + EPSILON)
         return np.minimum(np.maximum(x, -CLIP), CLIP)
 
+    @cached_property
+    def tables(self) -> tuple[NDArray[Any], ...]:
+        """What ``answer`` reads: means and standard deviations (D,), then weight (in, out) and bias (1, out) of each layer,
+        those of the memory last."""
+        layers = (array for weight, bias in self.transposed for array in (weight, bias[None].copy()))
+        return self.mean, np.sqrt(self.variance + EPSILON), *layers
+
+    def room(self, lanes: int) -> Array:
+        """Room for the activations of ``lanes`` lanes, (2, N, W), with a memory (4, N, W)."""
+        widest = max(self.inputs, *(max(weight.shape) for weight, _ in self.transposed))
+        return np.zeros((4 if self.memory else 2, lanes, widest))
+
     def actions(self, observations: NDArray[np.float32], memory: Array | None = None) -> NDArray[np.float32]:
         """Actions (N, outputs) in [-1, 1] for observations (N, inputs); equal bits whatever N and the processor.
 
         ``memory`` (N, cells) goes on in its place; without it every lane acts as at the beginning of an episode.
         """
-        x, count = self.normalized(observations), len(self.layers)
-        for weight, bias in self.transposed[: count - 1]:
-            x = _through(x, weight, bias, True)
-        if self.memory:
-            memory = np.zeros((len(x), self.cells)) if memory is None else memory
-            enters, own = (_through(y, *one, False) for y, one in zip((x, memory), self.transposed[count:], strict=True))
-            remember(enters, own, memory)
-            x = np.concatenate([x, memory], axis=1)
-        return np.clip(_through(x, *self.transposed[count - 1], self.squashed), -1.0, 1.0).astype(np.float32)
+        lanes, about = len(observations), described(self.tables)
+        memory = np.zeros((lanes, self.cells)) if memory is None else memory
+        actions = np.empty((lanes, self.outputs), dtype=np.float32)
+        _answer(about.ctypes.data, len(self.layers), self.squashed, observations, self.room(lanes), memory, actions)
+        return actions
 
     def acting(self) -> Acting:
         """The network at the beginning of an episode in every lane."""
@@ -150,13 +160,6 @@ def _outputs(name: str, one: Layer, width: int) -> int:
     return int(weight.shape[0])
 
 
-def _through(x: Array, weight: Weights, bias: Weights, squashed: bool) -> Array:
-    """``layer`` of inputs (N, m), with a weight (m, n): (N, n)."""
-    y = np.empty((len(x), len(bias)))
-    layer(x, weight, bias, squashed, y)
-    return y
-
-
 @helper
 def layer(x: Array, weight: Weights, bias: Weights, squashed: bool, y: Array) -> None:
     """Writes x W + b, or its tanh where ``squashed``, for inputs (N, m), W (m, n) and b (n,), into ``y`` (N, n).
@@ -185,3 +188,44 @@ def remember(enters: Array, own: Array, memory: Array) -> None:
             kept = 0.5 + 0.5 * exact.tanh(0.5 * (enters[i, cells + j] + own[i, cells + j]))
             new = exact.tanh(enters[i, 2 * cells + j] + reset * own[i, 2 * cells + j])
             memory[i, j] = (1.0 - kept) * new + kept * memory[i, j]
+
+
+@helper
+def answer(
+    tables: int, layers: int, squashed: bool, observed: NDArray[np.float32], space: Array, own: Array, actions: Any
+) -> None:  # fmt: skip
+    """Writes ``actions`` (N, outputs) for observations (N, inputs); ``space`` is ``PolicyNetwork.room``, and the memory ``own``
+    (N, cells) goes on. ``tables`` is the address of the description of ``PolicyNetwork.tables``."""
+    mean, deviation, last, cells = table1(tables, 0), table1(tables, 1), layers - 1, own.shape[1]
+    for i in range(observed.shape[0]):
+        for k in range(mean.shape[0]):
+            space[0, i, k] = min(max((observed[i, k] - mean[k]) / deviation[k], -CLIP), CLIP)
+    for k in range(last):
+        _through(tables, k, True, space[k % 2], space[(k + 1) % 2])
+    if cells > 0:
+        enters = space[last % 2]
+        _through(tables, layers, False, enters, space[2])
+        _through(tables, layers + 1, False, own, space[3])
+        remember(space[2], space[3], own)
+        width = singles(tables, 2 + 2 * layers).shape[0]
+        for i in range(own.shape[0]):
+            for k in range(cells):
+                enters[i, width + k] = own[i, k]
+    _through(tables, last, squashed, space[last % 2], space[layers % 2])
+    for i in range(actions.shape[0]):
+        for k in range(actions.shape[1]):
+            actions[i, k] = np.float32(min(max(space[layers % 2, i, k], -1.0), 1.0))
+
+
+@helper
+def _through(tables: int, k: int, squashed: bool, x: Array, y: Array) -> None:
+    """The first numbers of ``x`` (N, W), through the ``k``-th layer of the tables, become the first of ``y`` (N, W)."""
+    weight, bias = singles(tables, 2 + 2 * k), singles(tables, 3 + 2 * k)[0]
+    layer(x[:, : weight.shape[0]], weight, bias, squashed, y[:, : weight.shape[1]])
+
+
+@kernel
+def _answer(
+    tables: int, layers: int, squashed: bool, observed: NDArray[np.float32], space: Array, own: Array, actions: Any
+) -> None:  # fmt: skip
+    answer(tables, layers, squashed, observed, space, own, actions)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.bench.comparison_tables import markdown
-from baselines.bench.evaluation import DISCOUNTS
+from baselines.bench.measures import DISCOUNTS
 from baselines.bench.statistics import number
 from birthsim_env.scores import BEST, ROLES, SHUT
 

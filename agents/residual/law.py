@@ -20,7 +20,7 @@ from baselines.estimation import disturbance_observer, observers
 from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
-from baselines.staged import LawStage, StagedController
+from baselines.staged import CompiledDriving, LawStage, StagedController
 from birthsim_env.loop.rows import (
     ACTION,
     ASKED,
@@ -34,12 +34,11 @@ from birthsim_env.loop.rows import (
     Seen,
 )
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage, block, numbers, scratch
+from birthsim_env.loop.stage import block, numbers, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFEST = 4000.0
@@ -193,6 +192,8 @@ def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane
 class ResidualLaw(StagedController):
     """A law with a residual over N lanes: ``accept`` takes the actions (size, N) of a policy step."""
 
+    asks = True
+
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         super().__init__(parameters)
         self.settings = settings
@@ -227,11 +228,19 @@ class ResidualLaw(StagedController):
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         super().reset(lanes)
-        if lanes is not None:
-            if self.action.shape[1] != len(lanes):
-                self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
-            self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
-            self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
+        self._begin(np.zeros(0, dtype=np.bool_) if lanes is None else lanes)
+
+    def _begin(self, lanes: Mask) -> None:
+        if self.action.shape[1] != len(lanes):
+            self.action, self.shown = (np.zeros((len(rows), len(lanes))) for rows in (self.action, self.shown))
+        self.action[:, lanes], self.shown[:, lanes] = 0.0, 0.0
+        self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
+
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
+        if self.action.shape[1] != lanes:
+            self._begin(np.ones(lanes, dtype=np.bool_))
+        super().prepare(lanes, sampled)
 
     def accept(self, actions: Array) -> None:
         """Take the actions (size, N) of a policy step."""
@@ -260,39 +269,28 @@ class ResidualLaw(StagedController):
         return self.shown.copy()
 
 
-class ResidualActuation:
+class ResidualActuation(CompiledDriving):
     """``ResidualLaw`` as an actuation of the environments: the law runs inside, at the control rate."""
 
-    every_period = True
+    controller: ResidualLaw
 
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
-        self._law = ResidualLaw(parameters, settings)
-        self.size = settings.size
-        self.names = action_names(settings)
-        self.memory_names = memory_names(settings)
+        super().__init__(ResidualLaw(parameters, settings), None, {})
+        self.size, self.names, self.memory_names = settings.size, action_names(settings), memory_names(settings)
 
     @property
     def shown(self) -> Array:
         """What a policy sees of the law's memory, (size + 8, N)."""
-        return self._law.shown
+        return self.controller.shown
 
     def begin(self, lanes: Mask) -> None:
-        self._law.reset(lanes)
+        self.controller.reset(lanes)
 
     def accept(self, actions: Array) -> None:
-        self._law.accept(actions)
+        self.controller.accept(actions)
 
-    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
-        return self._law.command(measurement, reference)
-
-    def stages(self, lanes: int, sampled: bool) -> list[Stage]:
-        """``openings``, compiled into the closed loop."""
-        self._law.prepare(lanes, sampled)
-        return self._law.stages()
-
-    def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the law."""
-        self._law.explain(measurement, reference)
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        return []
 
     def memory(self) -> Array:
-        return self._law.memory()
+        return self.controller.memory()

@@ -38,10 +38,13 @@ class CartesianBackstepping(StagedController):
             if not is_within(value, least=1e-6, most=1e6):
                 raise ValueError(f"{name} = {shown(value)}; allowed: a positive number{limits(least=1e-6, most=1e6)}")
         super().__init__(parameters)
-        rig, self._options = self.parameters, (pneumatic_gain, sign_width)
+        rig = self.parameters
         # With 3 C <= D/m the loop of ``cartesian_law`` has no positive stiffness of its own.
         least_gain = max(rig.cylinder1.viscous_friction, rig.cylinder2.viscous_friction) / (3 * rig.mechanics.mass)
         self._least_stiffness = rig.mechanics.mass * (least_gain**2 + 2) / 3
+        self._constants = cartesian_law.Constants.numbers(
+            pneumatic_gain=pneumatic_gain, sign_width=sign_width, least_stiffness=self._least_stiffness, rig=self._p
+        )
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """What the gain matrices render to slow pushes at the reference pose, over N lanes."""
@@ -49,7 +52,7 @@ class CartesianBackstepping(StagedController):
         return cartesian_impedance(reference, self.parameters)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        law = LawStage(cartesian_law.control, np.array([*self._options, self._least_stiffness, *self._p]), np.zeros(0))
+        law = LawStage(cartesian_law.control, self._constants, np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

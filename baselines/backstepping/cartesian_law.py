@@ -15,14 +15,15 @@ from __future__ import annotations
 
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
-from baselines.estimation.stages import JOINTS, OWN
+from baselines.estimation.rows import Joints
+from baselines.estimation.stages import Estimate
 from baselines.valve_inverse import force_first_openings
-from birthsim_env.loop.rows import ASKED, FEEDFORWARD, OPENING, PRESSURE, SEEN, SHOWN, USER_FORCE
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.records import Numbers, number, rows
 
 
 @helper
@@ -68,12 +69,22 @@ def pressure_openings(
     )  # fmt: skip
 
 
+class Constants(Numbers):
+    """Of the stage."""
+
+    pneumatic_gain = number("1/s", "c4")
+    sign_width = number("m/s", "width of the smoothed sign")
+    least_stiffness = number("N/m", "least stiffness setpoint")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+
+
 @helper
-def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, width: float, u: Array, n: int) -> None:
-    """Openings (4, n). ``joints`` (4, n): y1, y2, v1, v2; ``target`` (15, n): the reference."""
+def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
+    """Writes the openings of n lanes."""
+    p, c4, width, target, u = about.rig, about.pneumatic_gain, about.sign_width, seen.asked, seen.opening
     for i in range(n):
-        y1, y2, v1, v2 = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
-        pp1, pn1, pp2, pn2 = pressures[0, i], pressures[1, i], pressures[2, i], pressures[3, i]
+        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
+        pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
         m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
             y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
@@ -89,41 +100,39 @@ def law(joints: Array, pressures: Array, target: Array, p: Array, c4: float, wid
         ay -= gravity
         vx, vy = cartesian(-kappa * v1, v2, sine, cosine)
 
-        ex, ey = r2 * sine - target[0, i], -r2 * cosine - target[1, i]
-        dx, dy = vx - target[2, i], vy - target[3, i]
-        kxx, kyy, kxy = target[8, i] / m, target[9, i] / m, target[14, i] / m
+        ex, ey = r2 * sine - target.position[0, i], -r2 * cosine - target.position[1, i]
+        dx, dy = vx - target.velocity[0, i], vy - target.velocity[1, i]
+        kxx, kyy, kxy = target.stiffness[0, i] / m, target.stiffness[1, i] / m, target.stiffness_coupling[i] / m
         springx, springy = kxx * ex + kxy * ey, kxy * ex + kyy * ey
         cxx, cyy, cxy = square_root(3.0 * kxx - 2.0, 3.0 * kyy - 2.0, 3.0 * kxy)
-        fx, fy = ax - target[4, i] + springx, ay - target[5, i] + springy
+        fx, fy = ax - target.acceleration[0, i] + springx, ay - target.acceleration[1, i] + springy
         drag_t = p[at.FV1] / (kappa * kappa * m) * across(springx, springy, sine, cosine)
         drag_n = p[at.FV2] / m * along(springx, springy, sine, cosine)
-        jx = target[6, i] - 3.0 * (cxx * fx + cxy * fy) - (9.0 * kxx - 4.0) * dx - 9.0 * kxy * dy
-        jy = target[7, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
+        jx = target.jerk[0, i] - 3.0 * (cxx * fx + cxy * fy) - (9.0 * kxx - 4.0) * dx - 9.0 * kxy * dy
+        jy = target.jerk[1, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
         jerk_t, jerk_n = across(jx, jy, sine, cosine) + drag_t, along(jx, jy, sine, cosine) + drag_n
 
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
         # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
         rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
         rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
+        stiffness, stiffness_rate = target.pneumatic_stiffness, target.pneumatic_stiffness_rate
         pressure_openings(
-            u, i, 0, rate1, target[10, i], target[12, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.HALF_L1], y1, v1, p
-        )
+            u, i, 0, rate1, stiffness[0, i], stiffness_rate[0, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1],
+            p[at.HALF_L1], y1, v1, p,
+        )  # fmt: skip
         pressure_openings(
-            u, i, 2, rate2, target[11, i], target[13, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.HALF_L2], y2, v2, p
-        )
-
-
-PNEUMATIC_GAIN, SIGN_WIDTH, LEAST_STIFFNESS, RIG = range(4)
-"""Constants of the stage: c4, 1/s; width, m/s, of the smoothed sign; least stiffness setpoint, N/m. The rig follows."""
+            u, i, 2, rate2, stiffness[1, i], stiffness_rate[1, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2],
+            p[at.HALF_L2], y2, v2, p,
+        )  # fmt: skip
 
 
 @kernel
-def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
     """One control period of a block; returns how many stiffness setpoints are too soft."""
-    s, about, missed = block(seen, SEEN), numbers(constants, RIG + PARAMETERS), 0
-    target = s[ASKED:FEEDFORWARD]
+    missed, asked = 0, seen.asked
     for i in range(n):
-        missed += 0 if is_stiffer(target[8, i], target[9, i], target[14, i], about[LEAST_STIFFNESS]) else 1
-    joints, pressures, openings = s[JOINTS:OWN], s[PRESSURE:USER_FORCE], s[OPENING:SHOWN]
-    law(joints, pressures, target, about[RIG:], about[PNEUMATIC_GAIN], about[SIGN_WIDTH], openings, n)
+        kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
+        missed += 0 if is_stiffer(kx, ky, kxy, about.least_stiffness) else 1
+    law(seen, Estimate(seen.handed[: Estimate.size]).joints, about, n)
     return missed

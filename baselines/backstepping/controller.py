@@ -14,24 +14,16 @@ from baselines.backstepping.impedance import paper_impedance
 from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import check_flags
 from baselines.estimation.observers import measured_joints
-from baselines.estimation.stages import JOINTS, OWN, pistons
+from baselines.estimation.rows import Joints
+from baselines.estimation.stages import JOINTS, Estimate, pistons
 from baselines.impedance import Impedance
 from baselines.staged import LawStage, StagedController
-from birthsim_env.loop.rows import (
-    ACTION,
-    ASKED,
-    FEEDFORWARD,
-    OPENING,
-    PRESSURE,
-    SEEN,
-    SHOWN,
-    USER_FORCE,
-)
-from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import ACTION, ASKED, Seen
+from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.records import Numbers, part, rows
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, shown
@@ -63,15 +55,16 @@ class LawTerms:
     pneumatic_stiffness_rate: Array
 
 
+class Constants(Numbers):
+    """Of the stage."""
+
+    options = part(backstepping_law.Options, "of the law")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+
+
 @kernel
-def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constants: options of the law; the rig."""
-    s, about = block(seen, SEEN), numbers(constants, backstepping_law.OPTIONS + PARAMETERS)
-    options, p = about[: backstepping_law.OPTIONS], about[backstepping_law.OPTIONS :]
-    return backstepping_law.command(
-        s[JOINTS:OWN, :n], s[PRESSURE:USER_FORCE, :n], s[ASKED:FEEDFORWARD, :n], s[FEEDFORWARD:ACTION, :n], p, options,
-        s[OPENING:SHOWN, :n],
-    )  # fmt: skip
+def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    return backstepping_law.command(seen, Estimate(seen.handed[: Estimate.size]).joints, about.rig, about.options, n)
 
 
 class BacksteppingController(StagedController):
@@ -128,25 +121,22 @@ class BacksteppingController(StagedController):
         self.damping_ratio, self.frozen_friction, self.valves = damping_ratio, bool(frozen_friction), valves
         self.force_first = bool(force_first)
         self.weight_compensation, self.pneumatic_gain = bool(weight_compensation), float(pneumatic_gain)
-        self._options: Array = np.empty(backstepping_law.OPTIONS)
-        self._options[backstepping_law.PNEUMATIC_GAIN] = pneumatic_gain
-        self._options[backstepping_law.SIGN_WIDTH] = sign_width
-        self._options[backstepping_law.WEIGHT] = self.weight_compensation
-        self._options[backstepping_law.COULOMB_RATE] = not frozen_friction
-        self._options[backstepping_law.DAMPING_RATIO] = damping_ratio or 0.0
-        self._options[backstepping_law.ONE_VALVE] = valves == "one_valve"
-        self._options[backstepping_law.FORCE_FIRST] = self.force_first
+        self._options = backstepping_law.Options.numbers(
+            pneumatic_gain=pneumatic_gain, sign_width=sign_width, weight=self.weight_compensation,
+            coulomb_rate=not frozen_friction, damping_ratio=damping_ratio or 0.0, one_valve=valves == "one_valve",
+            force_first=self.force_first,
+        )  # fmt: skip
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """What the gains render to slow pushes at the reference pose, over N lanes; ``ValueError`` where there are no gains."""
         return paper_impedance(reference, self.parameters, self.damping_ratio)
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        law = LawStage(_stage, np.array([*self._options, *self._p]), np.zeros(0))
+        law = LawStage(_stage, Constants.numbers(options=self._options, rig=self._p), np.zeros(0))
         return [stiffness_range(self.parameters, sampled), pistons(self.parameters, sampled, informed=False), law]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        self._joints: Array = np.zeros((OWN - JOINTS, lanes))
+        self._joints: Array = np.zeros((Joints.size, lanes))
         return [(self._joints, JOINTS)]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
@@ -182,10 +172,13 @@ class BacksteppingController(StagedController):
         Like ``command`` it lets the observer take a sampled measurement: call one of them per control period.
         """
         self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor))
-        lanes, joints, believed = self._joints.shape[1], self._joints.copy(), self._asked[REFERENCES:].copy()
-        wanted, intent = np.empty((8, lanes)), np.empty((backstepping_law.INTENTS, lanes))
-        gains, rates = np.empty((2, 3, lanes)), np.empty((2, 3, lanes))
-        flat = gains.reshape(backstepping_law.GAINS, lanes), rates.reshape(backstepping_law.GAINS, lanes)
-        pressures = np.ascontiguousarray(measurement.pressures)  # whatever the caller's layout, one kernel is compiled
-        backstepping_law.inspect(joints, pressures, reference.rows, believed, self._p, self._options, wanted, *flat, intent)
-        return LawTerms(joints, wanted, gains.swapaxes(0, 1), rates.swapaxes(0, 1), intent[4:6], intent[0:2], intent[2:4])
+        lanes = self._joints.shape[1]
+        seen, joints = Seen(np.zeros((Seen.size, lanes))), Joints(self._joints.copy())
+        seen.rows[:ASKED], seen.rows[ASKED:ACTION] = self._seen, self._asked
+        terms = backstepping_law.Terms(np.zeros((backstepping_law.Terms.size, lanes)))
+        backstepping_law.inspect(seen, joints, self._p, backstepping_law.Options(self._options), terms)
+        gains, rates = (one.rows.reshape(3, 2, lanes) for one in (terms.gains, terms.gain_rates))
+        intent = terms.intent
+        return LawTerms(
+            joints.rows, terms.wanted.rows, gains, rates, intent.force, intent.force_rate, intent.stiffness_rate
+        )  # fmt: skip

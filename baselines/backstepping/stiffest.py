@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from baselines.staged import LawStage
-from birthsim_env.loop.rows import ASKED, FEEDFORWARD, SEEN
+from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Reference
-from birthsim_env.loop.stage import block, numbers
 from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.rig.parameters import Parameters
 
 RATE = 12.0
@@ -39,19 +39,25 @@ def stiffest_direction(kx: float, ky: float, kxy: float) -> float:
     return 0.5 * (kx + ky) + math.sqrt(half * half + kxy * kxy)
 
 
+class Limit(Numbers):
+    """Constants of the stage."""
+
+    stiffest = number("N/m", "stiffest setpoint")
+
+
 @kernel
-def _stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """How many lanes ask for more than the constant, N/m."""
-    asked, beyond = block(seen, SEEN)[ASKED:FEEDFORWARD], 0
-    most = numbers(constants, 1)[0]
+def _stage(world: int, seen: Seen, memory: int, limit: Limit, tables: int, lane: int, n: int) -> int:
+    """How many lanes ask for more than the limit."""
+    beyond, asked = 0, seen.asked
     for i in range(n):
-        beyond += 1 if stiffest_direction(asked[8, i], asked[9, i], asked[14, i]) > most else 0
+        stiffness = stiffest_direction(asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i])
+        beyond += 1 if stiffness > limit.stiffest else 0
     return beyond
 
 
 def stiffness_range(rig: Parameters, sampled: bool) -> LawStage:
     """The stage that refuses stiffer setpoints."""
-    return LawStage(_stage, np.array([stiffest(rig, sampled)]), np.zeros(0))
+    return LawStage(_stage, Limit.numbers(stiffest=stiffest(rig, sampled)), np.zeros(0))
 
 
 def require_softer(reference: Reference, rig: Parameters, sampled: bool) -> None:

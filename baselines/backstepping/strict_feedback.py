@@ -13,15 +13,38 @@ from birthsim_env.physics import control_model, friction, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.records import Rows, row
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 
 
+class State(Rows):
+    """X of (12)."""
+
+    y2 = row("m", "position")
+    v2 = row("m/s", "speed")
+    f2 = row("N", "pneumatic force")
+    k2 = row("N/m", "pneumatic stiffness")
+    y1 = row("m", "position")
+    v1 = row("m/s", "speed")
+    f1 = row("N", "pneumatic force")
+    k1 = row("N/m", "pneumatic stiffness")
+
+
+class Flows(Rows):
+    """U of (12)."""
+
+    active2 = row("kg/s", "qA2")
+    pressurization2 = row("kg/s", "qT2")
+    active1 = row("kg/s", "qA1")
+    pressurization1 = row("kg/s", "qT1")
+
+
 @kernel
-def _rates(x: Array, u: Array, p: Array, neglected_fraction: float, rates: Array, neglected: Array) -> None:
+def _rates(x: State, u: Flows, p: Array, neglected_fraction: float, rates: State, neglected: Array) -> None:
     gas_t, index = p[at.GAS] * p[at.TEMPERATURE], p[at.INDEX]
-    for i in range(x.shape[1]):
-        y2, v2, f2, k2, y1, v1, f1, k1 = x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
+    for i in range(x.rows.shape[1]):
+        y2, v2, f2, k2, y1, v1, f1, k1 = x.y2[i], x.v2[i], x.f2[i], x.k2[i], x.y1[i], x.v1[i], x.f1[i], x.k1[i]
         r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
             y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
         )
@@ -31,21 +54,21 @@ def _rates(x: Array, u: Array, p: Array, neglected_fraction: float, rates: Array
         net2 = f2 - outside2 - friction.coulomb_force(v2, p[at.FC2], p[at.FV2], p[at.SIGN_SLOPE])
         neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY])
         lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
-        rates[0, i] = v2
-        rates[1, i] = net2 / p[at.MASS] + neglected_fraction * neglected[i]
-        rates[2, i] = control_model.force_rate(u[0, i], k2, v2, lp2 + ln2, index, gas_t)
-        rates[3, i] = control_model.stiffness_rate(f2, k2, v2, u[0, i], u[1, i], lp2, ln2, index, gas_t)
-        rates[4, i] = v1
-        rates[5, i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
-        rates[6, i] = control_model.force_rate(u[2, i], k1, v1, lp1 + ln1, index, gas_t)
-        rates[7, i] = control_model.stiffness_rate(f1, k1, v1, u[2, i], u[3, i], lp1, ln1, index, gas_t)
+        rates.y2[i] = v2
+        rates.v2[i] = net2 / p[at.MASS] + neglected_fraction * neglected[i]
+        rates.f2[i] = control_model.force_rate(u.active2[i], k2, v2, lp2 + ln2, index, gas_t)
+        rates.k2[i] = control_model.stiffness_rate(f2, k2, v2, u.active2[i], u.pressurization2[i], lp2, ln2, index, gas_t)
+        rates.y1[i] = v1
+        rates.v1[i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
+        rates.f1[i] = control_model.force_rate(u.active1[i], k1, v1, lp1 + ln1, index, gas_t)
+        rates.k1[i] = control_model.stiffness_rate(f1, k1, v1, u.active1[i], u.pressurization1[i], lp1, ln1, index, gas_t)
 
 
 def _evaluate(state: ArrayLike, flows: ArrayLike, parameters: Parameters, fraction: float) -> tuple[Array, Array]:
     lanes = np.shape(state)[1] if np.ndim(state) == 2 else 1
     x, u = checked("state", state, (8, lanes), "SI"), checked("flows", flows, (4, lanes), "kg/s")
     rates, neglected = np.empty((8, lanes)), np.empty(lanes)
-    _rates(x, u, parameter_column(parameters), fraction, rates, neglected)
+    _rates(State(x), Flows(u), parameter_column(parameters), fraction, State(rates), neglected)
     return rates, neglected
 
 

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from baselines.bench.feasibility import required_strength_ratio
-from baselines.bench.metrics import UNITS, EpisodeMetrics
+from baselines.bench.measures import DISCOUNTS, Measures
+from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
-from baselines.controller import Controller, checked_command
+from baselines.controller import Controller
+from baselines.staged import driving
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 
-LANES = 128
+LANES = 256
 """Episodes that run side by side."""
 
-TRACE = 0.01
-"""s between the samples of the error kept for the figure."""
-
-DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
-"""Per 10 ms, the default policy period: returns are summed with each of them."""
+AT_ONCE = 250
+"""Control periods between two looks at what is lost, where nothing stops the loop."""
 
 
 @dataclass
@@ -78,7 +74,7 @@ def evaluate(
     progress: bool = True,
     **arguments: Any,
 ) -> Evaluation:
-    """Run ``episodes`` episodes of a registered id under a controller, which is asked at every control period.
+    """Run ``episodes`` episodes of a registered id under a controller, which commands at every control period.
 
     The episodes have the seeds seed, seed + 1, and so on. ``arguments`` go to the environment. An episode that terminates is
     lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
@@ -118,61 +114,38 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
 
 
 def _run_batch(
-    environment: str,
-    controller: Controller,
-    seeds: list[int],
-    arguments: dict[str, Any],
-    result: Evaluation,
-    spent: list[float],
-    progress: bool,
-) -> None:
+    environment: str, controller: Controller, seeds: list[int], arguments: dict[str, Any], result: Evaluation,
+    spent: list[float], progress: bool,
+) -> None:  # fmt: skip
     period = load_parameters(arguments.get("parameters")).electronics.control_period
-    env: Any = gymnasium.make_vec(
-        environment, num_envs=len(seeds), policy_period=period, autoreset_mode=AutoresetMode.SAME_STEP, **arguments
-    )
-    _, info = env.reset(seed=list(seeds))
-    controller.reset()
-    asked = required_strength_ratio(env)
-    metrics = EpisodeMetrics(len(seeds), period)
-    alive: NDArray[np.bool_] = np.ones(len(seeds), dtype=np.bool_)
-    lost, success = np.zeros_like(alive), np.zeros_like(alive)
-    discounts = np.power(DISCOUNTS, period / 0.01)[:, None]
-    returns, weights = np.zeros((len(DISCOUNTS), len(seeds))), np.ones((len(DISCOUNTS), 1))
-    every = max(1, round(TRACE / period))
-    trace: Array = np.full((-(-env.steps // every), len(seeds), 2), np.nan)
+    driver = driving(controller, result.controller)
+    env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
+    env.reset(seed=list(seeds))
+    asked, simulation = required_strength_ratio(env), env.simulation
+    measures = Measures(simulation, env.steps)
+    at_once = 1 if measures.stops else AT_ONCE
     bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
-    for step in range(env.steps):
-        started = time.perf_counter()
-        command = controller.command(env.measurement, env.reference)
-        spent.append((time.perf_counter() - started) * 1e6 / len(seeds))
-        command = checked_command(result.controller, command, len(seeds))
-        metrics.add(info, command, alive)
-        if step % every == 0:
-            trace[step // every, alive] = info["tracking_error"][alive]
-        _, rewards, terminated, truncated, info = env.step(command.T)
-        returns += weights * np.where(alive, rewards, 0.0)
-        weights = weights * discounts
-        if truncated.any():
-            success |= alive & truncated & info["final_info"]["is_success"]
-        lost |= alive & terminated
-        alive &= ~terminated
-        if not alive.any():
+    for step in range(0, env.steps, at_once):
+        simulation.run(min(at_once, env.steps - step))
+        fallen = measures.fallen()
+        if fallen.any():
+            controller.reset(fallen)
+        if not measures.alive.any():
             break
-        if terminated.any():
-            controller.reset(terminated)
-        if step % 250 == 249:
-            bar.update(250)
+        if step % AT_ONCE == 0:
+            bar.update(AT_ONCE)
     bar.close()
+    spent += driver.cost(simulation)
     env.close()
-    for name, values in metrics.result().items():
-        result.metrics[name] += [float(value) for value in values]
+    for name, values in measures.metrics().items():
+        result.metrics[name] += values.tolist()
     result.seeds += seeds
-    result.required_strength_ratio += [float(value) for value in asked]
-    result.lost += [bool(value) for value in lost]
-    result.success += [bool(value) for value in success]
-    for discount, sums in zip(DISCOUNTS, returns, strict=True):
-        result.returns[discount] += [float(value) for value in sums]
-    result.traces.append(trace)
+    result.required_strength_ratio += asked.tolist()
+    result.lost += (~measures.alive).tolist()
+    result.success += measures.success.tolist()
+    for discount, sums in zip(DISCOUNTS, measures.returns, strict=True):
+        result.returns[discount] += sums.tolist()
+    result.traces.append(measures.error.transpose(0, 2, 1))
 
 
 def overview(evaluations: list[Evaluation]) -> str:

@@ -1,4 +1,4 @@
-"""The figures of design section 6, accumulated while lanes run: one call of ``add`` per control period."""
+"""What an evaluation measures, accumulated while lanes run (docs/controllers.md): tracking, stiffness, hunting, air."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.info import Info
+from birthsim_env.loop.stage import scratch
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, part, row, rows
 from birthsim_env.success import SETTLED
 
 QUIET = 1.0
@@ -53,175 +56,224 @@ along the push, less one; ``cross_motion`` the displacement across the push beyo
 target. ``unrest`` is the motion, peak to peak, in the ``WINDOW`` before the push. All three say something only where the
 reference stands still all along and the episode ends in a held push."""
 
-(
-    COUNT, SETTLED_COUNT, EX, EY, SX, SY, K1, K2, PEAK_EX, PEAK_EY, PEAK_SX, PEAK_SY, SUPPLIED, SATURATED,
-    QUIET_NOW, QUIET_TIME, LOW_X, LOW_Y, HIGH_X, HIGH_Y, HUNTING_X, HUNTING_Y, RESTARTS, IS_STUCK,
-    IS_STILL, KEPT, SUM_X, SUM_Y, REST_X, REST_Y, SPAN_X, SPAN_Y, IS_HELD, MOVED_X, MOVED_Y, ASKED_X, ASKED_Y, PUSH_X, PUSH_Y,
-) = range(39)  # fmt: skip
-"""Rows of the tally: samples, and settled ones; sums of squares of errors (m2), settled errors and relative errors of the
-pneumatic stiffness; their peaks; kg of air; samples with a valve at its limit; s of constant setpoints now, and those that
-counted; extremes of this window and the worst span; restarts; flags; the window's samples and their sum; means at rest,
-spans of the same window, means held; displacement asked for; force held."""
 
-TARGET, COMPLIANT, FORCE, SETPOINT, PNEUMATIC = range(0, 10, 2)
-"""First rows of what is asked for: target, compliant target, force, closed-loop and pneumatic stiffness; x and y each."""
+class Asked(Rows):
+    """What an instant asks for."""
+
+    target = rows(2, "m", "x, y")
+    stiffness = rows(2, "N/m", "setpoint of the closed-loop stiffness")
+    compliant_target = rows(2, "m", "(19)")
+    force = rows(2, "N", "of the hand")
+    pneumatic_stiffness = rows(2, "N/m", "setpoint of the cylinders")
 
 
-@kernel
-def _add_errors(
-    error: Array, since: Array, stiffness: Array, asked: Array, flow: Array, command: Array, alive: NDArray[np.bool_],
-    period: float, tally: Array,
-) -> None:  # fmt: skip
-    for i in range(alive.shape[0]):
-        if not alive[i]:
-            continue
-        settled = 1.0 if since[i] >= SETTLED else 0.0
-        tally[COUNT, i] += 1.0
-        tally[SETTLED_COUNT, i] += settled
-        for k in range(2):
-            size = abs(error[k, i])
-            tally[EX + k, i] += size * size
-            tally[SX + k, i] += settled * size * size
-            tally[PEAK_EX + k, i] = max(tally[PEAK_EX + k, i], size)
-            tally[PEAK_SX + k, i] = max(tally[PEAK_SX + k, i], settled * size)
-            tally[K1 + k, i] += (stiffness[k, i] / asked[PNEUMATIC + k, i] - 1.0) ** 2
-        tally[SUPPLIED, i] += flow[i] * period
-        largest = 0.0
-        for k in range(command.shape[0]):
-            largest = max(largest, abs(command[k, i]))
-        tally[SATURATED, i] += 1.0 if largest >= 1.0 else 0.0
+STILL = Asked.compliant_target.first
+"""So many of the first rows stay as they are in a stiffness test."""
+
+
+class Tally(Rows):
+    """What is carried from sample to sample."""
+
+    count = row("1", "samples")
+    settled_count = row("1", "those that are settled")
+    squares = rows(2, "m2", "sum of squared errors")
+    settled_squares = rows(2, "m2", "the same, settled")
+    stiffness_squares = rows(2, "1", "sum of squared relative errors of the pneumatic stiffness")
+    peak = rows(2, "m", "largest error")
+    settled_peak = rows(2, "m", "the same, settled")
+    supplied = row("kg", "air")
+    saturated = row("1", "samples with a valve at its limit")
+    quiet_now = row("s", "for which all that is asked for has been constant")
+    quiet_time = row("s", "of quiet that counted")
+    low = rows(2, "m", "least position of this quiet window")
+    high = rows(2, "m", "greatest position of it")
+    hunting = rows(2, "m", "greatest span of a window so far")
+    restarts = row("1", "from rest, in quiet windows")
+    is_stuck = row("1", "1 where the end effector is stuck")
+    is_still = row("1", "1 where target and setpoints have never changed")
+    kept = row("1", "samples since anything asked for changed")
+    sum = rows(2, "m", "of the positions of the last ``WINDOW`` s of them")
+    rest = rows(2, "m", "mean position before the push")
+    span = rows(2, "m", "peak to peak in that time")
+    is_held = row("1", "1 where a push has been held for ``HELD`` s")
+    moved = rows(2, "m", "mean position of the last ``WINDOW`` s")
+    wanted = rows(2, "m", "displacement asked for")
+    push = rows(2, "N", "the hand's force")
+    before = part(Asked, "at the last sample")
+    alive = row("1", "1 in lanes that are measured")
 
 
 @helper
-def _hunt(position: Array, velocity: Array, i: int, period: float, tally: Array) -> None:
+def _add_errors(now: Info, command: Array, period: float, tally: Tally, i: int) -> None:
+    settled = 1.0 if now.since_jump[i] >= SETTLED else 0.0
+    tally.count[i] += 1.0
+    tally.settled_count[i] += settled
+    for k in range(2):
+        size = abs(now.tracking_error[k, i])
+        tally.squares[k, i] += size * size
+        tally.settled_squares[k, i] += settled * size * size
+        tally.peak[k, i] = max(tally.peak[k, i], size)
+        tally.settled_peak[k, i] = max(tally.settled_peak[k, i], settled * size)
+        tally.stiffness_squares[k, i] += (now.pneumatic_stiffness[k, i] / now.pneumatic_stiffness_setpoint[k, i] - 1.0) ** 2
+    tally.supplied[i] += now.supply_flow[i] * period
+    largest = 0.0
+    for k in range(4):
+        largest = max(largest, abs(command[k, i]))
+    tally.saturated[i] += 1.0 if largest >= 1.0 else 0.0
+
+
+@helper
+def _hunt(now: Info, period: float, tally: Tally, i: int) -> None:
     """Spans and restarts of one lane where its setpoints have been constant for long enough."""
-    counts = tally[QUIET_NOW, i] >= QUIET
-    speed = math.sqrt(velocity[0, i] ** 2 + velocity[1, i] ** 2)
+    counts = tally.quiet_now[i] >= QUIET
+    speed = math.sqrt(now.velocity[0, i] ** 2 + now.velocity[1, i] ** 2)
     for k in range(2):
         # A window that ends gives its span to the worst one seen; a new one starts from nothing.
-        tally[LOW_X + k, i] = min(tally[LOW_X + k, i], position[k, i]) if counts else math.inf
-        tally[HIGH_X + k, i] = max(tally[HIGH_X + k, i], position[k, i]) if counts else -math.inf
-        tally[HUNTING_X + k, i] = max(tally[HUNTING_X + k, i], tally[HIGH_X + k, i] - tally[LOW_X + k, i])
+        tally.low[k, i] = min(tally.low[k, i], now.position[k, i]) if counts else math.inf
+        tally.high[k, i] = max(tally.high[k, i], now.position[k, i]) if counts else -math.inf
+        tally.hunting[k, i] = max(tally.hunting[k, i], tally.high[k, i] - tally.low[k, i])
     if counts:
-        tally[QUIET_TIME, i] += period
-        tally[RESTARTS, i] += 1.0 if tally[IS_STUCK, i] > 0.0 and speed > RUNNING else 0.0
-    tally[IS_STUCK, i] = 1.0 if speed < STUCK else (0.0 if speed > RUNNING else tally[IS_STUCK, i])
+        tally.quiet_time[i] += period
+        tally.restarts[i] += 1.0 if tally.is_stuck[i] > 0.0 and speed > RUNNING else 0.0
+    tally.is_stuck[i] = 1.0 if speed < STUCK else (0.0 if speed > RUNNING else tally.is_stuck[i])
+
+
+@helper
+def _add_rest(now: Info, asked: Asked, period: float, tally: Tally, kept: Array, i: int) -> None:
+    width, same, still, before = kept.shape[0], True, True, tally.before
+    for k in range(Asked.size):
+        changed = asked.rows[k, i] != before.rows[k, i]
+        same, still = same and not changed, still and not (changed and k < STILL)
+    if not (same or tally.count[i] <= 1.0):
+        if before.force[0, i] == 0.0 and before.force[1, i] == 0.0:
+            size = min(tally.kept[i], float(width))
+            for k in range(2):
+                low, high = math.inf, -math.inf
+                for j in range(int(size)):
+                    low, high = min(low, kept[j, k, i]), max(high, kept[j, k, i])
+                tally.rest[k, i], tally.span[k, i] = tally.sum[k, i] / size, high - low
+        tally.quiet_now[i], tally.kept[i], tally.sum[0, i], tally.sum[1, i] = 0.0, 0.0, 0.0, 0.0
+        if not still:
+            tally.is_still[i] = 0.0
+    else:
+        tally.quiet_now[i] += period
+    slot = int(tally.kept[i]) % width
+    for k in range(2):
+        old = kept[slot, k, i] if tally.kept[i] >= width else 0.0
+        tally.sum[k, i] += now.position[k, i] - old
+        kept[slot, k, i] = now.position[k, i]
+    tally.kept[i] += 1.0
+    _hunt(now, period, tally, i)
+    pushed = now.user_force[0, i] != 0.0 or now.user_force[1, i] != 0.0
+    tally.is_held[i] = 1.0 if pushed and tally.quiet_now[i] >= HELD else 0.0
+    for k in range(2):
+        tally.moved[k, i] = tally.sum[k, i] / min(tally.kept[i], float(width))
+        tally.wanted[k, i] = asked.compliant_target[k, i] - asked.target[k, i]
+        tally.push[k, i] = now.user_force[k, i]
+    for k in range(Asked.size):
+        before.rows[k, i] = asked.rows[k, i]
+
+
+@helper
+def sample(now: Info, command: Array, period: float, tally: Tally, kept: Array, n: int) -> None:
+    """Take one instant of n lanes: ``now``, and ``command`` (4, N), the openings.
+
+    ``kept`` (W, 2, N): the positions of the last W samples since anything asked for changed. A lane that is not alive is left
+    as it is.
+    """
+    asked = Asked(scratch(Asked.size))
+    for i in range(n):
+        for k in range(2):
+            asked.target[k, i], asked.compliant_target[k, i] = now.target[k, i], now.compliant_target[k, i]
+            asked.stiffness[k, i], asked.force[k, i] = now.stiffness_setpoint[k, i], now.user_force[k, i]
+            asked.pneumatic_stiffness[k, i] = now.pneumatic_stiffness_setpoint[k, i]
+        if tally.alive[i] > 0.0:
+            _add_errors(now, command, period, tally, i)
+            _add_rest(now, asked, period, tally, kept, i)
 
 
 @kernel
-def _add_rest(
-    position: Array, velocity: Array, asked: Array, before: Array, alive: NDArray[np.bool_], period: float, tally: Array,
-    kept: Array,
-) -> None:  # fmt: skip
-    """``kept`` (W, 2, N): the positions of the last W samples since anything asked for changed; ``before`` is brought up."""
-    width = kept.shape[0]
-    for i in range(alive.shape[0]):
-        if not alive[i]:
-            continue
-        same, still = True, True
-        for k in range(asked.shape[0]):
-            changed = asked[k, i] != before[k, i]
-            same = same and not changed
-            still = still and not (changed and (k < COMPLIANT or SETPOINT <= k < PNEUMATIC))
-        first = tally[COUNT, i] <= 1.0
-        if not (same or first):
-            if before[FORCE, i] == 0.0 and before[FORCE + 1, i] == 0.0:
-                size = min(tally[KEPT, i], float(width))
-                tally[REST_X, i], tally[REST_Y, i] = tally[SUM_X, i] / size, tally[SUM_Y, i] / size
-                for k in range(2):
-                    low, high = math.inf, -math.inf
-                    for j in range(int(size)):
-                        low, high = min(low, kept[j, k, i]), max(high, kept[j, k, i])
-                    tally[SPAN_X + k, i] = high - low
-            tally[QUIET_NOW, i] = 0.0
-            tally[KEPT, i] = tally[SUM_X, i] = tally[SUM_Y, i] = 0.0
-            if not still:
-                tally[IS_STILL, i] = 0.0
-        else:
-            tally[QUIET_NOW, i] += period
-        slot = int(tally[KEPT, i]) % width
-        for k in range(2):
-            old = kept[slot, k, i] if tally[KEPT, i] >= width else 0.0
-            tally[SUM_X + k, i] += position[k, i] - old
-            kept[slot, k, i] = position[k, i]
-        tally[KEPT, i] += 1.0
-        _hunt(position, velocity, i, period, tally)
-        pushed = asked[FORCE, i] != 0.0 or asked[FORCE + 1, i] != 0.0
-        tally[IS_HELD, i] = 1.0 if pushed and tally[QUIET_NOW, i] >= HELD else 0.0
-        for k in range(2):
-            tally[MOVED_X + k, i] = tally[SUM_X + k, i] / min(tally[KEPT, i], float(width))
-            tally[ASKED_X + k, i] = asked[COMPLIANT + k, i] - asked[TARGET + k, i]
-            tally[PUSH_X + k, i] = asked[FORCE + k, i]
-        for k in range(asked.shape[0]):
-            before[k, i] = asked[k, i]
+def _sample(now: Info, command: Array, period: float, tally: Tally, kept: Array) -> None:
+    for first in range(0, command.shape[1], BLOCK):
+        part = slice(first, min(first + BLOCK, command.shape[1]))
+        n = part.stop - first
+        sample(Info(now.rows[:, part]), command[:, part], period, Tally(tally.rows[:, part]), kept[:, :, part], n)
+
+
+def fresh_tally(lanes: int, more: int = 0) -> Array:
+    """The rows of a ``Tally``, and ``more`` behind them, of episodes that begin."""
+    rows: Array = np.zeros((Tally.size + more, lanes))
+    tally = Tally(rows[: Tally.size])
+    # No window has been quiet yet, none has been at rest before a push.
+    tally.hunting[:], tally.rest[:], tally.is_still[:], tally.alive[:] = -np.inf, np.nan, 1.0, 1.0
+    return rows
+
+
+def window(lanes: int, period: float) -> Array:
+    """Room for the positions of the last ``WINDOW`` s, (W, 2, N)."""
+    return np.zeros((max(1, round(WINDOW / period)), 2, lanes))
 
 
 class EpisodeMetrics:
-    """Metrics of one episode in each of N lanes, sampled every ``period`` s."""
+    """Metrics of one episode in each of N lanes, sampled every ``period`` s by ``add``."""
 
     def __init__(self, num_lanes: int, period: float) -> None:
-        self._period = period
-        self._tally: Array = np.zeros((PUSH_Y + 1, num_lanes))
-        # No window has been quiet yet, none has been at rest before a push.
-        self._tally[[HUNTING_X, HUNTING_Y]] = -np.inf
-        self._tally[[REST_X, REST_Y]] = np.nan
-        self._tally[IS_STILL] = 1.0
-        self._kept: Array = np.zeros((max(1, round(WINDOW / period)), 2, num_lanes))
-        self._asked: Array = np.zeros((PNEUMATIC + 2, num_lanes))
+        self._period, self._tally, self._kept = period, Tally(fresh_tally(num_lanes)), window(num_lanes, period)
+        self._now = Info(np.zeros((Info.size, num_lanes)))
 
     def add(self, info: dict[str, Any], command: Array, alive: NDArray[np.bool_]) -> None:
         """Take the ``info`` of a vector environment and the openings (4, N) commanded at the same instant.
 
         Lanes where ``alive`` (N,) is False are left as they are; a lane that was left once is not taken up again.
         """
-        error, position, velocity, stiffness = (
-            np.ascontiguousarray(info[name].T) for name in ("tracking_error", "position", "velocity", "pneumatic_stiffness")
-        )
-        names = ("target", "compliant_target", "user_force", "stiffness_setpoint", "pneumatic_stiffness_setpoint")
-        asked = np.concatenate([info[name].T for name in names])
-        openings = np.ascontiguousarray(command, dtype=np.float64)
-        since, flow = info["since_jump"], info["supply_flow"]
-        _add_errors(error, since, stiffness, asked, flow, openings, alive, self._period, self._tally)
-        _add_rest(position, velocity, asked, self._asked, alive, self._period, self._tally, self._kept)
+        for name, group in Info.groups.items():
+            if name in info:
+                self._now.rows[group.first if group.single else group.place] = info[name].T
+        self._tally.alive[:] = alive
+        _sample(self._now, np.ascontiguousarray(command, dtype=np.float64), self._period, self._tally, self._kept)
 
     def result(self) -> dict[str, Array]:
         """Every metric of ``UNITS`` per lane, (N,); NaN where an episode says nothing about it."""
-        t = self._tally
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rms = 1e3 * np.sqrt(t[EX : EY + 1] / t[COUNT])
-            settled = 1e3 * np.sqrt(t[SX : SY + 1] / t[SETTLED_COUNT])
-            pneumatic = 100 * np.sqrt(t[K1 : K2 + 1] / t[COUNT])
-            peaks = np.where(t[SETTLED_COUNT] > 0, 1e3 * t[PEAK_SX : PEAK_SY + 1], np.nan)
-            hunting = np.where(t[QUIET_TIME] > 0, 1e3 * t[HUNTING_X : HUNTING_Y + 1], np.nan)
-            values = {
-                "error_rms_x": rms[0],
-                "error_rms_y": rms[1],
-                "error_max_x": 1e3 * t[PEAK_EX],
-                "error_max_y": 1e3 * t[PEAK_EY],
-                "settled_rms_x": settled[0],
-                "settled_rms_y": settled[1],
-                "settled_rms": np.hypot(*settled),
-                "settled_max_x": peaks[0],
-                "settled_max_y": peaks[1],
-                "hunting_x": hunting[0],
-                "hunting_y": hunting[1],
-                "restarts": np.where(t[QUIET_TIME] > 0, t[RESTARTS] / t[QUIET_TIME], np.nan),
-                "pneumatic_rms_1": pneumatic[0],
-                "pneumatic_rms_2": pneumatic[1],
-                "air": 60e3 * t[SUPPLIED] / NORMAL_DENSITY / (t[COUNT] * self._period),
-                "saturation": 100 * t[SATURATED] / t[COUNT],
-            }
-            values["stiffness_error"], values["cross_motion"], values["unrest"] = self._rendered()
-        return {name: values[name] for name in UNITS}
+        return figures_of(self._tally, self._period)
 
-    def _rendered(self) -> tuple[Array, Array, Array]:
-        t = self._tally
-        push, asked = t[PUSH_X : PUSH_Y + 1], t[ASKED_X : ASKED_Y + 1]
-        moved = t[MOVED_X : MOVED_Y + 1] - t[REST_X : REST_Y + 1]
-        direction = push / np.hypot(*push)
-        along, wanted = (np.einsum("in,in->n", way, direction) for way in (moved, asked))
-        across = direction[0] * (moved - asked)[1] - direction[1] * (moved - asked)[0]
-        says = (t[IS_STILL] > 0) & (t[IS_HELD] > 0)
-        found = 100 * (wanted / along - 1), 1e3 * np.abs(across), 1e3 * np.hypot(*t[SPAN_X : SPAN_Y + 1])
-        stiffness, cross, unrest = (np.where(says, values, np.nan) for values in found)
-        return stiffness, cross, unrest
+
+def figures_of(tally: Tally, period: float) -> dict[str, Array]:
+    """Every metric of ``UNITS`` per lane, (N,), of a tally sampled every ``period`` s."""
+    count, settled_count, quiet = tally.count, tally.settled_count, tally.quiet_time
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = 1e3 * np.sqrt(tally.squares / count)
+        settled = 1e3 * np.sqrt(tally.settled_squares / settled_count)
+        pneumatic = 100 * np.sqrt(tally.stiffness_squares / count)
+        peaks = np.where(settled_count > 0, 1e3 * tally.settled_peak, np.nan)
+        hunting = np.where(quiet > 0, 1e3 * tally.hunting, np.nan)
+        values = {
+            "error_rms_x": rms[0],
+            "error_rms_y": rms[1],
+            "error_max_x": 1e3 * tally.peak[0],
+            "error_max_y": 1e3 * tally.peak[1],
+            "settled_rms_x": settled[0],
+            "settled_rms_y": settled[1],
+            "settled_rms": np.hypot(*settled),
+            "settled_max_x": peaks[0],
+            "settled_max_y": peaks[1],
+            "hunting_x": hunting[0],
+            "hunting_y": hunting[1],
+            "restarts": np.where(quiet > 0, tally.restarts / quiet, np.nan),
+            "pneumatic_rms_1": pneumatic[0],
+            "pneumatic_rms_2": pneumatic[1],
+            "air": 60e3 * tally.supplied / NORMAL_DENSITY / (count * period),
+            "saturation": 100 * tally.saturated / count,
+        }
+        values["stiffness_error"], values["cross_motion"], values["unrest"] = _rendered(tally)
+    return {name: values[name] for name in UNITS}
+
+
+def _rendered(tally: Tally) -> tuple[Array, Array, Array]:
+    push, asked, moved = tally.push, tally.wanted, tally.moved - tally.rest
+    direction = push / np.hypot(*push)
+    along, wanted = (np.einsum("in,in->n", way, direction) for way in (moved, asked))
+    across = direction[0] * (moved - asked)[1] - direction[1] * (moved - asked)[0]
+    says = (tally.is_still > 0) & (tally.is_held > 0)
+    found = 100 * (wanted / along - 1), 1e3 * np.abs(across), 1e3 * np.hypot(*tally.span)
+    stiffness, cross, unrest = (np.where(says, values, np.nan) for values in found)
+    return stiffness, cross, unrest

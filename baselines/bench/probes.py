@@ -1,24 +1,21 @@
 """The stiffness test: from rest ramp a force to its size, hold, and see how far the end effector has given way.
 
-Every lane is one case with a pose, a force, a stiffness and a rig of its own. Design section 6.
+Every lane is one case with a pose, a force, a stiffness and a rig of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from baselines.bench.resting import RestingRigs, recording
 from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
-from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.sensors import SENSORS, put_out
+from birthsim_env.loop.signals import REFERENCES, Mask, Reference
+from birthsim_env.parts.hands.user_forces import ForceProfile
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 REST, RISE, HOLD = 2.0, 1.0, 3.0
@@ -84,35 +81,22 @@ def run_stiffness_test(
     probes: StiffnessTest, controller: Controller, sensors: str = "ideal", seed: int = 0, force_sensor: bool = True
 ) -> StiffnessResult:
     """Push in every lane. ``force_sensor`` False shows the controller a force of zero."""
-    rigs, lanes = probes.rigs, probes.size
-    board = (rigs if isinstance(rigs, Parameters) else rigs[0]).electronics
-    reference, plant = probes.reference(), Plant(rigs, lanes)
-    piston = inverse_geometry(probes.position, rigs if isinstance(rigs, Parameters) else rigs[0])
-    plant.state = balanced_state(plant.lane_parameters, piston, np.zeros((2, lanes)), reference.pneumatic_stiffness)
-    model = SENSORS[sensors](board, lanes)
-    for lane in range(lanes):
-        model.begin(lane, stream(seed + lane, 0, "sensors"))
-    controller.reset()
-    period = board.control_period
-    impacts, rest, held = np.zeros(lanes), Window(lanes), Window(lanes)
-    for tick in range(round((REST + RISE + HOLD) / period)):
-        now = tick * period
-        clock, ticks = np.full(lanes, now), np.full(lanes, tick)
-        force = probes.force * min(max((now - REST) / RISE, 0.0), 1.0)
-        motion = plant.end_effector()
-        if REST - WINDOW < now <= REST:
-            rest.add(motion[:2])
-        if now > REST + RISE + HOLD - WINDOW:
-            held.add(motion[:2])
-        seen: Measurement = model.measure(ticks, clock, motion, plant.pressures, force)
-        if not force_sensor:
-            seen = replace(seen, user_force=np.zeros_like(force))
-        plant.advance_unchecked(put_out(model, ticks, controller.command(seen, reference)), force[None], period)
-        np.maximum(impacts, plant.impacts.max(axis=0), out=impacts)
-    displacement = held.mean() - rest.mean()
-    lost = ~np.isfinite(displacement).all(axis=0) | (impacts > board_limit(rigs))
-    expected, hunting = reference.compliant_target(probes.force) - probes.position, np.maximum(held.span(), rest.span())
-    return StiffnessResult(displacement, expected, hunting, lost, rest.mean() - probes.position)
+    rigs = [probes.rigs] * probes.size if isinstance(probes.rigs, Parameters) else probes.rigs
+    reference, end = probes.reference(), REST + RISE + HOLD
+    loop = RestingRigs(rigs, reference, controller, sensors, seed, force_sensor)
+    times = np.arange(round(end / loop.period)) * loop.period
+    spans = [np.flatnonzero((times > REST - WINDOW) & (times <= REST)), np.flatnonzero(times > end - WINDOW)]
+    paths = [np.zeros((len(span), 2, probes.size)) for span in spans]
+    watching = [recording(int(span[0]), path) for span, path in zip(spans, paths, strict=True)]
+    hand = RampedForces(probes.force)
+    loop.close([hand.stage()], watching)
+    loop.run(len(times))
+    rest, held = (path.mean(axis=0) for path in paths)
+    displacement = held - rest
+    lost = ~np.isfinite(displacement).all(axis=0) | (loop.impacts.max(axis=0) > board_limit(rigs))
+    expected = reference.compliant_target(probes.force) - probes.position
+    hunting = np.max([np.ptp(path, axis=0) for path in paths], axis=0)
+    return StiffnessResult(displacement, expected, hunting, lost, rest - probes.position)
 
 
 def board_limit(rigs: Parameters | Sequence[Parameters]) -> float:
@@ -120,23 +104,10 @@ def board_limit(rigs: Parameters | Sequence[Parameters]) -> float:
     return (rigs if isinstance(rigs, Parameters) else rigs[0]).mechanics.impact_speed
 
 
-class Window:
-    """Mean and span of positions (2, N) over a stretch of time."""
+class RampedForces(ForceProfile):
+    """From ``REST`` on forces (2, N), N, a lane each, rise over ``RISE`` s, and stay."""
 
-    def __init__(self, lanes: int) -> None:
-        self._sum, self._count = np.zeros((2, lanes)), 0
-        self._low, self._high = np.full((2, lanes), np.inf), np.full((2, lanes), -np.inf)
-
-    def add(self, position: Array) -> None:
-        """Take one instant."""
-        self._sum += position
-        self._count += 1
-        self._low, self._high = np.minimum(self._low, position), np.maximum(self._high, position)
-
-    def mean(self) -> Array:
-        """m, (2, N)."""
-        return np.asarray(self._sum / self._count)
-
-    def span(self) -> Array:
-        """Peak to peak, m, (2, N)."""
-        return np.asarray(self._high - self._low)
+    def __init__(self, force: Array) -> None:
+        super().__init__()
+        self._knots, self._counts = np.zeros((3, 3, force.shape[1])), np.full(force.shape[1], 3.0)
+        self._knots[1:, 0], self._knots[2, 1:] = np.transpose([[REST, REST + RISE]]), force

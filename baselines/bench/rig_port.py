@@ -9,20 +9,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from baselines.bench.resting import RestingRigs
 from baselines.controller import Controller
-from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.sensors import SENSORS, put_out
-from birthsim_env.physics.compiled.lanes import Array, parameter_array
+from birthsim_env.loop.signals import Reference
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 Hand = Callable[[float, Array, Array], Array]
@@ -65,26 +60,20 @@ class RigPort:
         self, rigs: Sequence[Parameters], reference: Reference, controller: Controller, sensors: str = "ideal", seed: int = 0,
         hand_mass: Array | None = None, damping_factor: Array | None = None, force_sensor: bool = True,
     ) -> None:  # fmt: skip
-        board, self.lanes = rigs[0].electronics, len(rigs)
+        self.lanes = len(rigs)
         self._hand_mass = np.zeros(self.lanes) if hand_mass is None else np.asarray(hand_mass, dtype=np.float64)
         pairs = zip(rigs, self._hand_mass, strict=True)
         heavy = [rig.replace({"mechanics.mass": rig.mechanics.mass + float(more)}) if more else rig for rig, more in pairs]
-        self._plant, self._reference, self._controller = Plant(heavy, self.lanes), reference, controller
-        piston = inverse_geometry(reference.position, rigs[0])
-        alone = parameter_array(list(rigs), self.lanes)
-        self._plant.state = balanced_state(alone, piston, np.zeros((2, self.lanes)), reference.pneumatic_stiffness)
-        self._model: Any = SENSORS[sensors](board, self.lanes)
-        for lane in range(self.lanes):
-            self._model.begin(lane, stream(seed + lane, 0, "sensors"))
-        controller.reset()
+        told = {} if damping_factor is None else {"damping_factor": damping_factor}
+        self._loop = RestingRigs(rigs, reference, controller, sensors, seed, force_sensor, heavy, None, told)
         self._weight = np.array([np.zeros(self.lanes), self._hand_mass * [rig.mechanics.gravity for rig in rigs]])
-        self._options = {} if damping_factor is None else {"damping_factor": damping_factor}
-        self._force_sensor, self._ticks = force_sensor, 0
-        self._motion, self._acceleration = self._plant.end_effector(), np.zeros((2, self.lanes))
-        self.period = board.control_period
+        self._motion, self._acceleration, self.force = self._loop.motion, np.zeros((2, self.lanes)), self._loop.pushed
+        self.period = self._loop.period
         self._answers = max(1, round(self.period / INTEGRATION_STEP))
-        self.force, self.energy, self.air = np.zeros((2, self.lanes)), np.zeros(self.lanes), np.zeros(self.lanes)
+        self.energy, self.air = np.zeros(self.lanes), np.zeros(self.lanes)
         self.saturated, self.impacts = np.zeros(self.lanes), np.zeros(self.lanes)
+        self._hand: Hand = no_hand
+        self._loop.close([self._push], carry=[self._answer])
 
     def motion(self) -> Array:
         """Position and velocity of the end effector now, (4, N): x, y (m), vx, vy (m/s)."""
@@ -92,16 +81,18 @@ class RigPort:
 
     def advance(self, hand: Hand) -> None:
         """Measure, command, and let the plant go on by one control period."""
-        plant, step, now = self._plant, self.period / self._answers, self._ticks * self.period
-        self.force = hand(now, self._motion[:2], self._motion[2:]) - self._hand_mass * self._acceleration
-        clock, ticks = np.full(self.lanes, now), np.full(self.lanes, self._ticks)
-        seen: Measurement = self._model.measure(ticks, clock, self._motion, plant.pressures, self.force)
-        if not self._force_sensor:
-            seen = replace(seen, user_force=np.zeros_like(self.force))
-        openings = put_out(self._model, ticks, self._controller.command(seen, self._reference, **self._options))
+        self._hand = hand
+        self._loop.run(1)
+
+    def _push(self, _: int) -> None:
+        force = self._hand(float(self._loop.time[0]), self._motion[:2], self._motion[2:])
+        self.force[:] = force - self._hand_mass * self._acceleration
+
+    def _answer(self, _: int) -> None:
+        plant, openings, step, now = self._loop.plant, self._loop.opened, self.period / self._answers, self._loop.time[0]
         for answer in range(self._answers):
             place, speed = self._motion[:2], self._motion[2:]
-            force = hand(now + (answer + 0.5) * step, place + 0.5 * step * speed, speed)
+            force = self._hand(float(now + (answer + 0.5) * step), place + 0.5 * step * speed, speed)
             plant.advance_unchecked(openings, np.ascontiguousarray((force + self._weight)[None]), step)
             self._motion = plant.end_effector()
             gained = self._motion[2:] ** 2 - speed**2
@@ -110,7 +101,12 @@ class RigPort:
             np.maximum(self.impacts, plant.impacts.max(axis=0), out=self.impacts)
         self.air += plant.mass_flows()[:4].sum(axis=0) * self.period
         self.saturated += np.abs(openings).max(axis=0) >= 1.0
-        self._ticks += 1
+        self._loop.moves()
+
+
+def no_hand(now: float, position: Array, velocity: Array) -> Array:
+    """Nobody holds the end effector."""
+    return np.zeros_like(position)
 
 
 def takes_damping_factor(controller: Controller) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.pieces import file_stem
-from baselines.bench.probes import Window, board_limit
+from baselines.bench.probes import board_limit
 from baselines.bench.rig_port import Port, RigPort
 from baselines.controller import Controller
 from baselines.registry import make_controller
@@ -144,6 +144,28 @@ class Verdict:
     lost: Mask
     force: Array
     energy: Array
+
+
+class Window:
+    """Mean and span of positions (2, N) over a stretch of time."""
+
+    def __init__(self, lanes: int) -> None:
+        self._sum, self._count = np.zeros((2, lanes)), 0
+        self._low, self._high = np.full((2, lanes), np.inf), np.full((2, lanes), -np.inf)
+
+    def add(self, position: Array) -> None:
+        """Take one instant."""
+        self._sum += position
+        self._count += 1
+        self._low, self._high = np.minimum(self._low, position), np.maximum(self._high, position)
+
+    def mean(self) -> Array:
+        """m, (2, N)."""
+        return np.asarray(self._sum / self._count)
+
+    def span(self) -> Array:
+        """Peak to peak, m, (2, N)."""
+        return np.asarray(self._high - self._low)
 
 
 def judge(

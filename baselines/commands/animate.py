@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tqdm import tqdm
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import RANDOMIZE, finite_number, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
+from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file
 from birthsim_env.drawing.rendering import PairRenderer, Scene
 from birthsim_env.parts.drawn.randomization import described
@@ -75,8 +77,8 @@ def main() -> None:
     run(parser, _animate)
 
 
-def take(env: Any, controller: Any, seed: int, span: Span, rate: int, progress: Callable[[int], Any]) -> Take:
-    """Run ``controller`` in the world of ``seed`` and look at it from ``span[0]`` to ``span[1]`` s.
+def take(env: Any, seed: int, span: Span, rate: int, progress: Callable[[int], Any]) -> Take:
+    """Run an environment that a controller drives in the world of ``seed`` and look at it from ``span[0]`` to ``span[1]`` s.
 
     A run that the environment ends early stands still from there on, with an infinite error.
     """
@@ -93,7 +95,7 @@ def take(env: Any, controller: Any, seed: int, span: Span, rate: int, progress: 
             if (k - begin) % frame == 0:
                 found.scenes.append(replace(scene, time=k * period))
         if not lost and k < end:
-            _, _, lost, _, info = env.step(controller.command(machine.measurement, machine.reference))
+            _, _, lost, _, info = env.step(NO_ACTION)
         if k % 100 == 0:
             progress(100)
     return found
@@ -142,21 +144,20 @@ def _animate(arguments: argparse.Namespace) -> None:
     known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
     if arguments.env not in known:
         raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(known)}")
-    env = gymnasium.make(
-        arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
+    make = partial(
+        gymnasium.make, arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
         policy_period=rig.electronics.control_period, **environment_parts(arguments),
     )  # fmt: skip
-    longest = env.get_wrapper_attr("duration")
+    longest = make().get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
     names = with_options(arguments.controller, arguments.set)
-    controllers = [
-        make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {})) for name in names
-    ]
+    options = [{"policy": policy_of(arguments.env)} if name == "residual" else {} for name in names]
+    laws = [driving(make_controller(name, rig, **own), name) for name, own in zip(names, options, strict=True)]
     print(described(rig, RANDOMIZE[arguments.randomize], arguments.sensors))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
-        takes = [take(env, controller, arguments.seed, span, arguments.rate, bar.update) for controller in controllers]
+        takes = [take(make(actuation=law), arguments.seed, span, arguments.rate, bar.update) for law in laws]
     title = f"{takes[0].scenes[0].title}, in real time"
     with tqdm(total=len(takes[0].scenes), desc="drawing", unit=" frames", leave=False) as bar:
         frames = draw(takes, rig, title, names, span, arguments.rate, bar.update)

@@ -24,6 +24,7 @@ from baselines.bench.speed.stopwatch import seconds_per_call
 from baselines.bench.speed.twin import Twin, has_compiler
 from baselines.commands.shared import finite_number, run
 from baselines.registry import make_controller
+from baselines.staged import driving
 from baselines.work.files import make_folder, write_json
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
@@ -146,13 +147,15 @@ def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
     """us per lane and call of a controller on what it met in the first ``PERIODS`` control periods of its own run."""
     rig = birthsim_env.Parameters()
     law = make_controller(name, rig)
-    period = rig.electronics.control_period
-    env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, policy_period=period, sensors=sensors)
+    env: Any = gymnasium.make_vec(
+        "BirthSIM/Circle-v1", num_envs=lanes, policy_period=rig.electronics.control_period, sensors=sensors,
+        actuation=driving(make_controller(name, rig), name),
+    )  # fmt: skip
     env.reset(seed=0)
     met = []
     for _ in range(PERIODS):
         met.append((env.measurement, env.reference))
-        env.step(law.command(*met[-1]).T)
+        env.step(np.zeros((lanes, 0)))
     signals = cycle(met)
     return seconds_per_call(lambda: law.command(*next(signals)), budget) / lanes * 1e6
 

@@ -15,6 +15,7 @@ import birthsim_env
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import run
 from baselines.registry import controller_names, make_controller
+from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file, whole_results, write_json
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
@@ -57,16 +58,16 @@ def record_run(
     """
     rig = load_parameters(parameters)
     period = rig.electronics.control_period
-    env = gymnasium.make("BirthSIM/Circle-v1", parameters=rig, sensors=sensors, policy_period=period, **PICTURE)
-    law = make_controller(controller, rig)
-    machine: Any = env.unwrapped
+    law = driving(make_controller(controller, rig), controller)
+    env = gymnasium.make(
+        "BirthSIM/Circle-v1", parameters=rig, sensors=sensors, policy_period=period, actuation=law, **PICTURE
+    )  # fmt: skip
     _, info = env.reset(seed=0)
     record: dict[str, list[Any]] = {**{name: [info[name]] for name in FIELDS}, "lost": [False]}
     ended = False
     with tqdm(desc="Fig. 4", unit=" steps", leave=False) as bar:
         while not ended:
-            command = law.command(machine.measurement, machine.reference)
-            _, _, terminated, truncated, info = env.step(command)
+            _, _, terminated, truncated, info = env.step(NO_ACTION)
             for name in FIELDS:
                 record[name].append(info[name])
             record["lost"].append(terminated)

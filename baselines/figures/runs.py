@@ -16,7 +16,8 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from baselines.bench.evaluation import TRACE, Evaluation
+from baselines.bench.evaluation import Evaluation
+from baselines.bench.measures import TRACE
 from baselines.work.files import whole_file
 from birthsim_env.physics.compiled.lanes import Array
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import SEEN, WORLD
-from birthsim_env.loop.stage import TABLE, Stage, address_of, carray, pointer
+from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -83,7 +83,7 @@ class Loop:
 
     ``world`` and ``seen`` place arrays of the caller, C-contiguous float64, which are read before and, where they are
     writeable, written after a run;
-    ``closing`` stages run once, after the last period. The arrays must outlive the loop.
+    ``closing`` stages run once, after the last period. Stages may share one memory. The arrays must outlive the loop.
     """
 
     def __init__(
@@ -95,17 +95,13 @@ class Loop:
         for array, row in placed:
             moves.append(self._move(array, row))
         self._tables: list[NDArray[np.int64]] = []
-        memories: dict[int, int] = {}  # stages may share one
+        memories: dict[int, int] = {}
         for stage, closes in [*((one, 0) for one in stages), *((one, 1) for one in closing)]:
-            memory = self._rows
-            if stage.memory is not None:
-                memory = memories.setdefault(stage.memory.ctypes.data, memory)
-                if memory == self._rows:
-                    moves.append(self._move(stage.memory, memory))
-                    self._rows += stage.memory.shape[0]
-            about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
-            for entry, table in zip(about, stage.tables, strict=False):
-                entry[: 1 + table.ndim] = table.ctypes.data, *table.shape
+            memory = self._rows if stage.memory is None else memories.setdefault(id(stage.memory), self._rows)
+            if stage.memory is not None and memory == self._rows:
+                moves.append(self._move(stage.memory, memory))
+                self._rows += stage.memory.shape[0]
+            about = described(stage.tables)
             self._tables.append(about)
             places = (0 if stage.sees_world else -1, WORLD, memory)
             entries.append((address_of(stage.function), *places, stage.constants.ctypes.data, about.ctypes.data, closes))
@@ -153,16 +149,17 @@ class MixedLoop:
         closing: Sequence[Stage] = (),
     ) -> None:
         groups = [(kind, list(group)) for kind, group in groupby(parts, lambda part: isinstance(part, Stage))]
-        self._stops = not all(kind for kind, _ in groups)
+        self.stops = not all(kind for kind, _ in groups)
+        """Whether a user's own Python is among the parts."""
         self._pieces: list[Loop | Callable[[int], None]] = []
         for kind, group in groups:
             stages = [part for part in group if isinstance(part, Stage)]
-            self._pieces += [Loop(lanes, world, seen, stages, () if self._stops else closing)] if kind else group  # type: ignore[arg-type]
+            self._pieces += [Loop(lanes, world, seen, stages, () if self.stops else closing)] if kind else group  # type: ignore[arg-type]
         self._closing = Loop(lanes, world, seen, (), closing)
 
     def run(self, periods: int = 1, threads: int = 1) -> int:
         """Run ``periods`` control periods; returns how many lanes and periods a stage could not serve."""
-        if not self._stops:
+        if not self.stops:
             return sum(piece.run(periods, threads) for piece in self._pieces if isinstance(piece, Loop))
         missed = 0
         for period in range(periods):

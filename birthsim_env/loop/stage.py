@@ -9,7 +9,7 @@ vectorises loops over it. A law is called with zero for the world.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -135,6 +135,14 @@ def table4(tables: int, k: int) -> Array:
     about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
     shape = (about[k * TABLE + 1], about[k * TABLE + 2], about[k * TABLE + 3], about[k * TABLE + 4])
     return carray(pointer(about[k * TABLE], np.float64), shape)
+
+
+def described(tables: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
+    """What ``table1`` to ``table4`` and ``singles`` need of tables: addresses and shapes, (T, TABLE)."""
+    about = np.zeros((max(1, len(tables)), TABLE), dtype=np.int64)
+    for entry, table in zip(about, tables, strict=False):
+        entry[: 1 + table.ndim] = table.ctypes.data, *table.shape
+    return about
 
 
 def layouts_of(stage: Any) -> list[type[Rows] | None]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.bench.evaluation import TRACE
+from baselines.bench.measures import TRACE
 from baselines.logs.log import Column, Event, Log, Series
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters

@@ -7,6 +7,7 @@ from PIL import Image
 
 import birthsim_env
 from baselines import make_controller
+from baselines.staged import NO_ACTION, driving
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
 SECONDS, EVERY = 8, 80
@@ -24,12 +25,12 @@ def pictures(folder: Path) -> None:
 
 
 def _frames(name: str) -> list[Image.Image]:
-    env = gymnasium.make(name, render_mode="rgb_array", picture_size=(480, 360), policy_period=1e-3)
-    law, world = make_controller("admittance-backstepping", birthsim_env.Parameters()), env.unwrapped
+    law = driving(make_controller("admittance-backstepping", birthsim_env.Parameters()), "admittance-backstepping")
+    env = gymnasium.make(name, render_mode="rgb_array", picture_size=(480, 360), policy_period=1e-3, actuation=law)
     env.reset(seed=0)
     frames = []
     for k in range(1000 * SECONDS):
-        _, _, terminated, truncated, _ = env.step(law.command(world.measurement, world.reference))
+        _, _, terminated, truncated, _ = env.step(NO_ACTION)
         if terminated or truncated:
             break
         if k % EVERY == 0:

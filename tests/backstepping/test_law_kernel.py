@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.backstepping import law
-from birthsim_env.loop.signals import REFERENCES
+from baselines.estimation.rows import Joints
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -15,16 +16,15 @@ from birthsim_env.physics.rig.parameters import Parameters
 def test_lanes_without_gains_are_counted_once_each(ratio: float) -> None:
     """Below the least stiffness of either cylinder or of both; the others have their gains."""
     stiffness = np.array([[2000.0, 20.0, 2000.0, 20.0, 3000.0], [2000.0, 2000.0, 1.0, 1.0, 3000.0]])
-    lanes, options = stiffness.shape[1], np.zeros(law.OPTIONS)
-    options[[law.PNEUMATIC_GAIN, law.SIGN_WIDTH, law.DAMPING_RATIO]] = 30.0, 0.01, ratio
-    reference, openings = np.zeros((REFERENCES, lanes)), np.empty((4, lanes))
-    reference[0], reference[8:10], reference[10], reference[11] = 0.5, stiffness, 4400.0, 2200.0
-    at_rest, told = np.zeros((4, lanes)), np.zeros((law.TOLD, lanes))
-    pressures = np.full((4, lanes), 3e5)
+    lanes = stiffness.shape[1]
+    options = law.Options(law.Options.lane(pneumatic_gain=30.0, sign_width=0.01, damping_ratio=ratio))
+    seen, at_rest = Seen(np.zeros((Seen.size, lanes))), Joints(np.zeros((Joints.size, lanes)))
+    seen.asked.position[0], seen.asked.stiffness[:], seen.pressure[:] = 0.5, stiffness, 3e5
+    seen.asked.pneumatic_stiffness[0], seen.asked.pneumatic_stiffness[1] = 4400.0, 2200.0
     served = parameter_column(Parameters())
-    few = law.command(at_rest, pressures, reference, told, served, options, openings)
+    few = law.command(seen, at_rest, served, options, lanes)
     alone = [
-        law.command(*(one[:, [k]].copy() for one in (at_rest, pressures, reference, told)), served, options, openings[:, [k]])
+        law.command(Seen(seen.rows[:, [k]].copy()), Joints(at_rest.rows[:, [k]].copy()), served, options, 1)
         for k in range(lanes)
     ]
     assert alone == [0, 1, 1, 1, 0]

@@ -48,22 +48,23 @@ def worlds(monkeypatch):
         env = make_vec(*args, max_episode_steps=400, **kwargs)
         world = {"plant": None, "reference": [], "force": []}
         made.append(world)
-        step, reset = env.step, env.reset
+        run, reset = env.simulation.run, env.reset
 
-        def recorded(actions):
+        def recorded(periods):
             world["reference"].append(env.reference.rows.copy())
             world["force"].append(env.measurement.user_force.copy())
-            return step(actions)
+            return run(periods)
 
         def begun(**options):
             result = reset(**options)
             world["plant"] = env.simulation.plant.lane_parameters.copy()
             return result
 
-        env.step, env.reset = recorded, begun
+        env.simulation.run, env.reset = recorded, begun
         return env
 
     monkeypatch.setattr(evaluation.gymnasium, "make_vec", spied)
+    monkeypatch.setattr(evaluation, "AT_ONCE", 4)
     return made
 
 
@@ -93,16 +94,19 @@ def test_the_scenario_is_the_same_with_every_plant(worlds):
 
 def test_a_cell_that_is_interrupted_is_none(monkeypatch, capsys):
     monkeypatch.setattr(evaluation, "LANES", 1)
-    calls = []
+    batches = []
 
-    class Stopped(evaluation.EpisodeMetrics):
-        def add(self, *args):
-            calls.append(1)
-            if len(calls) == 7200:
+    class Stopped(evaluation.Measures):
+        def __init__(self, *args):
+            batches.append(1)
+            super().__init__(*args)
+
+        def fallen(self):
+            if len(batches) == 2:
                 raise KeyboardInterrupt
-            super().add(*args)
+            return super().fallen()
 
-    monkeypatch.setattr(evaluation, "EpisodeMetrics", Stopped)
+    monkeypatch.setattr(evaluation, "Measures", Stopped)
     with pytest.raises(KeyboardInterrupt):
         cell("backstepping", episodes=2)
     assert "1 of 2 episodes" in capsys.readouterr().out

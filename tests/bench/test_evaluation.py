@@ -11,8 +11,10 @@ import pytest
 
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench import evaluation
-from baselines.bench.evaluation import TRACE, Evaluation, evaluate, overview, table
+from baselines.bench.evaluation import Evaluation, evaluate, overview, table
+from baselines.bench.measures import DISCOUNTS, TRACE
 from baselines.bench.metrics import UNITS, EpisodeMetrics
+from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.info import FIELDS
 
@@ -148,6 +150,45 @@ def test_figures_are_those_of_the_environment_step_by_step():
     np.testing.assert_allclose(result.metrics["saturation"], 100 * (np.abs(openings).max(axis=1) >= 1).mean(axis=0))
     np.testing.assert_array_equal(1e3 * result.traces[0], size[:: round(TRACE / 1e-3)])
     assert np.isnan(result.metrics["stiffness_error"]).all()
+
+
+@pytest.mark.parametrize(("name", "good"), [("pid", True), ("backstepping", False)])
+def test_returns_and_success_are_those_that_the_environment_pays_step_by_step(name, good):
+    result = run(make_controller(name, RIG), episodes=2, seed=3, duration=0.7, env=CIRCLE)
+    env = gymnasium.make_vec(CIRCLE, num_envs=2, policy_period=1e-3, duration=0.7, randomize=True)
+    env.reset(seed=3)
+    law, paid = make_controller(name, RIG), []
+    for _ in range(700):
+        _, rewards, _, _, info = env.step(law.command(env.measurement, env.reference).T)
+        paid.append(rewards)
+    for discount in DISCOUNTS:
+        weights = discount ** (0.1 * np.arange(700))
+        np.testing.assert_allclose(result.returns[discount], weights @ np.array(paid), rtol=1e-10)
+    assert result.success == info["is_success"].tolist() == [good, good]
+
+
+@pytest.mark.parametrize(
+    ("name", "seeds", "sensors"),
+    [("pid", (11, 12, 13), "honest"), ("admittance-adaptive", (5, 6), "lab"), ("lqr", (5, 6), "ideal")],
+)
+def test_a_law_in_the_loop_has_the_figures_of_one_that_is_called_back(name, seeds, sensors):
+    settings = {"seed": seeds[0], "episodes": len(seeds), "sensors": sensors, "duration": 4.0, "env": CIRCLE}
+    inside = run(make_controller(name, RIG), **settings)
+    called = run(spy := Spy(make_controller(name, RIG)), **settings)
+    same_figures(inside, called)
+    assert (inside.returns, inside.success) == (called.returns, called.success)
+    assert spy.calls == 4000
+    assert sum(inside.lost) == (name == "pid")
+
+
+def test_a_class_that_changes_command_is_called_back():
+    class Still(BacksteppingController):
+        def command(self, measurement, reference):
+            return np.zeros((4, measurement.position.shape[1]))
+
+    still, law = (run(one, duration=0.3).metrics for one in (Still(), BacksteppingController()))
+    assert max(still["saturation"]) == 0.0
+    assert still["error_rms_x"] != law["error_rms_x"]
 
 
 def test_the_stiffness_test_tells_a_stiffer_law_from_a_softer_one():

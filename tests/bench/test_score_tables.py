@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 
 from agents.reports.score_tables import Scored, data, overview
-from baselines.bench.evaluation import DISCOUNTS
+from baselines.bench.measures import DISCOUNTS
 from birthsim_env.scores import ROLES
 
 

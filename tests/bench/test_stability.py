@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 
 from baselines.bench import stability
 from baselines.bench.pieces import controller_settings
-from baselines.bench.probes import Window
 from baselines.bench.stability import (
     MAPS,
     MOST_FORCE,
@@ -24,6 +23,7 @@ from baselines.bench.stability import (
     Axis,
     Cases,
     Map,
+    Window,
     describe_map,
     judge,
     stability_tasks,

@@ -11,6 +11,7 @@ import birthsim_env
 from baselines.commands import animate
 from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
+from baselines.staged import driving
 from birthsim_env.drawing.rendering import PairRenderer, Scene
 from tests.console import call
 
@@ -61,9 +62,10 @@ def test_the_file_plays_both_runs_in_real_time(suffix, tmp_path, monkeypatch, ca
 
 
 def test_a_take_shows_the_run_of_the_environment():
-    env = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001)
-    found = take(env, make_controller("backstepping", RIG), 3, (0.5, 1.5), 25, lambda count: None)
     law = make_controller("backstepping", RIG)
+    driven = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001, actuation=driving(law, "it"))
+    found = take(driven, 3, (0.5, 1.5), 25, lambda count: None)
+    env, law = gymnasium.make("BirthSIM/Forceps-v1", randomize=True, policy_period=0.001), make_controller("backstepping", RIG)
     _, info = env.reset(seed=3)
     times, errors = [0.0], [np.hypot(*info["tracking_error"])]
     for _ in range(1500):
@@ -82,14 +84,17 @@ def test_a_lost_run_stands_still_with_an_infinite_error(monkeypatch):
             pass
 
         def command(self, measurement, reference):
-            return np.array([1.0, -1.0, 1.0, -1.0])
+            return np.array([[1.0], [-1.0], [1.0], [-1.0]])
 
-    env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001)
-    found = take(env, Slam(), 0, (0.0, 1.5), 10, lambda count: None)
+    def taken(controller):
+        env = gymnasium.make("BirthSIM/Forceps-v1", policy_period=0.001, actuation=driving(controller, "it"))
+        return take(env, 0, (0.0, 1.5), 10, lambda count: None)
+
+    found = taken(Slam())
     assert np.isinf(found.errors[-1])
     assert found.scenes[-1].piston == found.scenes[-2].piston
     assert found.scenes[-1].time == pytest.approx(1.5)
-    other = take(env, make_controller("pid", RIG), 0, (0.0, 1.5), 10, lambda count: None)
+    other = taken(make_controller("pid", RIG))
     frames = animate.draw([found, other], RIG, "lost", ["slam", "pid"], (0.0, 1.5), 10, lambda count: None)
     assert len(frames) == 16
 

@@ -113,6 +113,7 @@ def test_numbers_are_all_given_and_a_lane_is_zero_where_it_is_not_named():
     with pytest.raises(TypeError, match="Memory of damping; allowed: bristle, observer, since"):
         Memory.lane(damping=1.0)
     assert History.lane(slot=1.0, past=[2.0, 3.0]).tolist() == [1.0, 2.0, 3.0]
+    assert History.lane().tolist() == [0.0]
 
 
 def test_a_declaration_that_means_nothing_is_refused():

@@ -175,21 +175,27 @@ def test_a_policy_with_a_memory_forgets_the_lanes_that_are_reset(tmp_path):
     assert (one[-1, :, 1] != goes_on[-1, :, 1]).any()
 
 
-@pytest.fixture
-def asked(monkeypatch):
-    """Every observation (N, D) that a policy was asked with."""
-    seen, actions = [], PolicyNetwork.actions
-    monkeypatch.setattr(PolicyNetwork, "actions", lambda self, rows, *held: (seen.append(rows), actions(self, rows, *held))[1])
-    return seen
+class Asked:
+    """The policy of a folder as a function, and every observation (N, D) that it was asked with."""
+
+    def __init__(self, folder):
+        stored = load_policy(folder)
+        self.network, self.seen = stored.network, []
+        self.controller = ResidualController(None, self, stored.settings)
+
+    def __call__(self, observations):
+        self.seen.append(observations)
+        return self.network.actions(observations)
 
 
 LAST = slice(SIZE, SIZE + 2)
 SMOOTH, SHARE, MET = slice(SIZE + 2, SIZE + 4), slice(SIZE + 4, SIZE + 6), slice(SIZE + 6, SIZE + 12)
 
 
-def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
+def test_a_reset_of_one_lane_forgets_that_lane_alone(steering):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
-    controller = ResidualController(policy=steering)
+    policy = Asked(steering)
+    controller, asked = policy.controller, policy.seen
     env.reset(seed=2)
     for _ in range(45):
         env.step(controller.command(env.measurement, env.reference).T)
@@ -209,15 +215,16 @@ def test_a_reset_of_one_lane_forgets_that_lane_alone(steering, asked):
     assert np.abs(asked[-1][1, MET]).max() > 0
 
 
-def test_the_policy_is_asked_once_per_policy_period(steering, asked):
+def test_the_policy_is_asked_once_per_policy_period(steering):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=1e-3)
-    controller = ResidualController(policy=steering)
+    policy = Asked(steering)
+    controller, asked = policy.controller, policy.seen
     env.reset(seed=0)
     for _ in range(41):
         env.step(controller.command(env.measurement, env.reference).T)
     assert len(asked) == 3
     np.testing.assert_array_equal(asked[0][:, LAST], 0)
     np.testing.assert_array_equal(asked[0][:, SHARE], 1)
-    first = load_policy(steering).network.actions(asked[0])
+    first = policy.network.actions(asked[0])
     np.testing.assert_array_equal(asked[1][:, LAST], first)
     np.testing.assert_allclose(asked[1][:, SMOOTH], (1 - np.exp(-20 / 28)) * first, rtol=1e-6)

@@ -154,7 +154,7 @@ def told(monkeypatch):
         beliefs.append(self.told[:4])
         return openings
 
-    monkeypatch.delattr(ResidualActuation, "stages")
+    monkeypatch.setattr(ResidualActuation, "stages", None)
     monkeypatch.setattr(ResidualLaw, "command", spied)
     return beliefs
 

@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.probes import board_limit
-from baselines.bench.rig_port import RigPort, takes_damping_factor
+from baselines.bench.resting import RestingRigs
+from baselines.bench.rig_port import RigPort, no_hand, takes_damping_factor
 from baselines.bench.stability import PNEUMATIC
 from baselines.controller import Controller
 from baselines.registry import LIMITED, make_controller
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Mask, Reference
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 POSES = ((0.5, 0.0), (0.4, 0.05), (0.62, -0.1))
@@ -75,11 +73,6 @@ def condition_of(
     return Condition(controller, Parameters.from_dict(rig), sensors, seed, rigs, force_sensor)
 
 
-def no_hand(now: float, position: Array, velocity: Array) -> Array:
-    """Nobody holds the end effector."""
-    return np.zeros_like(position)
-
-
 def resting(poses: Sequence[Sequence[float]], stiffness: Sequence[float]) -> Reference:
     """Resting targets at poses (m) with the same stiffness along x and y (N/m), a lane each."""
     rows = np.zeros((REFERENCES, len(poses)))
@@ -104,16 +97,9 @@ def uses_force(condition: Condition) -> bool:
     """
     if not condition.force_sensor or condition.controller.startswith(LIMITED):
         return condition.force_sensor
-    law, reference = condition.law(), resting([POSES[0]] * 2, [2000.0] * 2)
-    law.reset()
-    plant, force, still = Plant(condition.rig, 2), np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2))
-    plant.state = balanced_state(
-        plant.lane_parameters, inverse_geometry(reference.position, condition.rig), still, reference.pneumatic_stiffness
-    )
-    differ = False
-    for k in range(20):
-        time = np.full(2, k * condition.rig.electronics.control_period)
-        seen = Measurement(time, reference.position.copy(), time, still, plant.pressures, force, False)
-        answer = law.command(seen, reference)
-        differ |= bool((answer[:, 0] != answer[:, 1]).any())
-    return differ
+    loop = RestingRigs([condition.rig] * 2, resting([POSES[0]] * 2, [2000.0] * 2), condition.law())
+    loop.pushed[0, 1] = 1.0
+    answers: list[Array] = []
+    loop.close([], [lambda _: answers.append(loop.openings)], [loop.moves])
+    loop.run(20)
+    return any((answer[:, 0] != answer[:, 1]).any() for answer in answers)

@@ -137,8 +137,12 @@ class Rows(Named):
         unknown = values.keys() - cls.groups.keys()
         if unknown:
             raise TypeError(f"{cls.__name__} of {', '.join(unknown)}; allowed: {', '.join(cls.groups)}")
-        given = [(values.get(name, 0.0), group) for name, group in cls.groups.items()]
-        rows = [value if group.place.stop is None else np.broadcast_to(value, group.count) for value, group in given]
+        rows = [
+            np.broadcast_to(values.get(name, 0.0), group.count)
+            if group.place.stop
+            else np.asarray(values.get(name, np.zeros(group.count)))
+            for name, group in cls.groups.items()
+        ]
         return np.concatenate(rows, dtype=np.float64)
 
 

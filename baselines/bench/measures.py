@@ -1,0 +1,147 @@
+"""What an evaluation measures as two stages of the closed loop: nothing of it stops the loop.
+
+``_see`` samples metrics and error once the controller has commanded. ``_pay`` rewards the period when the rig is at its end. A
+lane that leaves the physical range is lost: it is measured no further, and put back to where its episode began, where it
+harms nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.bench.metrics import Tally, figures_of, fresh_tally, sample, window
+from birthsim_env import reward, success
+from birthsim_env.info import Info, describe
+from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.signals import compliance
+from birthsim_env.loop.stage import Stage, scratch, table3
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
+from birthsim_env.simulation import Simulation
+
+DISCOUNTS = (0.9, 0.96, 0.99, 0.999, 1.0)
+"""Per 10 ms, the default policy period: returns are summed with each of them."""
+
+TRACE = 0.01
+"""s between the samples of the error kept for the figure."""
+
+
+class Memory(Tally):
+    """What is carried from period to period."""
+
+    command = rows(4, "1", "openings")
+    last = rows(4, "1", "those of the period before")
+    state = rows(STATES, "SI", "where the episode began")
+    motion = rows(4, "SI", "of the end effector there")
+    owed = part(reward.Owed, "for the reward")
+    calm = part(success.Tally, "for success")
+    success = row("1", "1 where the episode is successful so far")
+    fallen = row("1", "1 where the lane has left the physical range")
+    weight = rows(len(DISCOUNTS), "1", "of the next reward, for each of ``DISCOUNTS``")
+    returns = rows(len(DISCOUNTS), "1", "sums of the rewards so far")
+
+
+class About(Numbers):
+    """Constants of the stages."""
+
+    limits = part(reward.Limits, "of the environment")
+    every = number("1", "control periods between samples of the error")
+    discounts = rows(len(DISCOUNTS), "1", "of a control period")
+
+
+@kernel
+def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
+    """Tables: positions kept for the metrics (W, 2, N); error (T, 2, N), m."""
+    now, every, reference = Info(scratch(Info.size)), int(about.every), seen.reference
+    kept, errors = table3(tables, 0)[:, :, lane : lane + n], table3(tables, 1)[:, :, lane : lane + n]
+    describe(world, seen, now, n)
+    for i in range(n):
+        number = int(own.count[i])
+        if number == 0:
+            kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
+            given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
+            for axis in range(2):
+                own.owed.given[axis, i], own.owed.owed[axis, i] = given[axis], given[axis]
+            for k in range(STATES):
+                own.state[k, i] = world.state[k, i]
+            for k in range(4):
+                own.motion[k, i] = world.motion[k, i]
+        if own.alive[i] > 0.0 and number % every == 0:
+            for axis in range(2):
+                errors[number // every, axis, i] = now.tracking_error[axis, i]
+        world.impact[0, i], world.impact[1, i] = 0.0, 0.0
+        for k in range(4):
+            own.command[k, i] = seen.opening[k, i]
+    sample(now, own.command, about.limits.period, own, kept, n)
+    return 0
+
+
+@kernel
+def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
+    terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), scratch(2), seen.reference
+    failed, good = ends[0], ends[1]
+    reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
+    success.add(world, reference, failed, own.calm, good, n)
+    for i in range(n):
+        paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
+        for k in range(len(DISCOUNTS)):
+            own.returns[k, i] += own.weight[k, i] * paid
+            own.weight[k, i] *= about.discounts[k]
+        for k in range(4):
+            own.last[k, i] = own.command[k, i]
+        if failed[i] > 0.0:
+            own.alive[i], own.fallen[i] = 0.0, 1.0
+            for k in range(STATES):
+                world.state[k, i] = own.state[k, i]
+            for k in range(4):
+                world.motion[k, i] = own.motion[k, i]
+        own.success[i] = good[i] * own.alive[i]
+    return 0
+
+
+class Measures:
+    """Metrics, rewards, success and error of the episodes that have just begun in a ``simulation``, whose loop they join.
+
+    ``steps`` is the most control periods of an episode. ``error`` (T, 2, N), m, every ``TRACE`` s, is NaN where a lane is lost.
+    ``stops`` says whether the loop stops in every period for a user's Python.
+    """
+
+    def __init__(self, simulation: Simulation, steps: int) -> None:
+        period, lanes = simulation.period, simulation.plant.num_envs
+        every = max(1, round(TRACE / period))
+        self.error: Array = np.full((-(-steps // every), 2, lanes), np.nan)
+        self._period, self._own = period, Memory(fresh_tally(lanes, Memory.size - Tally.size))
+        self._own.weight[:] = 1.0
+        limits = reward.Limits.numbers(
+            period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
+        )
+        about = About.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
+        see = Stage(_see, about, self._own.rows, (window(lanes, period), self.error))
+        self.stops = simulation.watch([see], [Stage(_pay, about, self._own.rows)])
+
+    @property
+    def alive(self) -> NDArray[np.bool_]:
+        """Lanes (N,) that are not lost."""
+        return np.asarray(self._own.alive > 0.0)
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Lanes (N,) that are successful so far, see ``birthsim_env.success``."""
+        return np.asarray(self._own.success > 0.0)
+
+    @property
+    def returns(self) -> Array:
+        """Sums of discounted rewards, (D, N), for each of ``DISCOUNTS``."""
+        return self._own.returns.copy()
+
+    def fallen(self) -> NDArray[np.bool_]:
+        """Lanes (N,) that have left the physical range since the last call."""
+        fallen: NDArray[np.bool_] = self._own.fallen > 0.0
+        self._own.fallen[:] = 0.0
+        return fallen
+
+    def metrics(self) -> dict[str, Array]:
+        """Every metric of ``metrics.UNITS`` per lane, (N,)."""
+        return figures_of(self._own, self._period)

@@ -1,0 +1,90 @@
+"""Rigs that rest on their targets under a controller: what the stiffness test, haptics and the laboratory share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from baselines.controller import Controller
+from baselines.staged import driving
+from birthsim_env.loop.loop import MixedLoop, available_threads
+from birthsim_env.loop.rows import ASKED, REFERENCE, TIME, World
+from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.stage import Stage, table3
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.hands.user_forces import UserForce
+from birthsim_env.parts.references import Trajectory
+from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.lanes import Array, parameter_array
+from birthsim_env.physics.compiled.records import Numbers, number
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.simulation import Part, Simulation
+
+
+class Begins(Numbers):
+    """Constant of the stage that records."""
+
+    tick = number("1", "the first one that is recorded")
+
+
+@kernel
+def _record(world: World, seen: int, memory: int, begins: Begins, tables: int, lane: int, n: int) -> int:
+    """Table: positions (T, 2, N), m."""
+    path, k = table3(tables, 0)[:, :, lane : lane + n], int(world.tick[0] - begins.tick)
+    if 0 <= k < path.shape[0]:
+        for axis in range(2):
+            for i in range(n):
+                path[k, axis, i] = world.motion[axis, i]
+    return 0
+
+
+def recording(first: int, path: Array) -> Stage:
+    """Writes where the end effector is from the tick ``first`` on into ``path`` (T, 2, N), m."""
+    return Stage(_record, Begins.numbers(tick=first), tables=(path,))
+
+
+class RestingRigs(Simulation):
+    """N ``rigs``, one a lane, at rest on the targets of a ``reference``, which stays, under a controller; no episodes.
+
+    ``sensors`` is the name of a sensor model; lane i seeds it with ``seed`` + i. With ``force_sensor`` False the controller
+    sees a force of zero. ``moved`` are the rigs that move, where they are others than those that are balanced. With a ``name``
+    a controller's openings are checked; ``told`` is what it is told besides the signals. Raises ``ValueError`` for a target
+    outside the workspace. ``asked`` (15, N), ``pushed`` (2, N), N, and ``opened`` (4, N) may be written while the loop runs:
+    what is asked for, the hand's force, and the openings.
+    """
+
+    def __init__(
+        self, rigs: Sequence[Parameters], reference: Reference, controller: Controller, sensors: str = "ideal", seed: int = 0,
+        force_sensor: bool = True, moved: Sequence[Parameters] | None = None, name: str | None = None,
+        told: dict[str, Array] | None = None,
+    ) -> None:  # fmt: skip
+        lanes, still = len(rigs), (Trajectory(), UserForce(), StiffnessSchedule())
+        law = driving(controller, name, told)
+        super().__init__(lanes, rigs[0], {}, *still, sensors, law, 1, available_threads(), force_sensor)
+        self.plant = Plant(moved or rigs, lanes)
+        piston = inverse_geometry(reference.position, rigs[0])
+        balance = parameter_array(list(rigs), lanes), piston, np.zeros((2, lanes)), reference.pneumatic_stiffness
+        self.plant.state = balanced_state(*balance)
+        for lane in range(lanes):
+            self.sensors.begin(lane, stream(seed + lane, 0, "sensors"))
+        self.asked, self.pushed, self.opened = self._seen[REFERENCE:ASKED], self._force, self._openings
+        self.asked[:], self._motion[:] = reference.rows, self.plant.end_effector()
+        law.begin(np.ones(lanes, dtype=np.bool_))
+
+    def close(self, hand: Sequence[Part], commanded: Sequence[Part] = (), carry: Sequence[Part] | None = None) -> None:
+        """Close the loop: ``hand``, sensors, controller, ``commanded``, board, and the plant, or what ``carry`` makes of it."""
+        parts = self.parts()
+        order = [*hand, *parts["sensors"], *parts["actuation"], *commanded, *parts["board"], *(carry or parts["plant"])]
+        self._loop = MixedLoop(self.plant.num_envs, *self._places(), order)
+        if hasattr(self.actuation, "check"):
+            self.actuation.check(self.measurement)
+
+    def moves(self, _: int = 0) -> None:
+        """The clock goes on by a period; the end effector is where the plant has it."""
+        self._tick += 1
+        self._seen[TIME], self._motion[:] = self._tick[0] * self.period, self.plant.end_effector()
