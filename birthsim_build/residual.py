@@ -16,6 +16,12 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 def residual_part(rig: Parameters, sampled: bool, policy: str) -> Part:
     """A policy, a folder or a shipped name, with the law that it sits on."""
+    told, law = residual_parts(rig, sampled, policy)
+    return Part((*told.stages, *law.stages), told.rows)
+
+
+def residual_parts(rig: Parameters, sampled: bool, policy: str) -> tuple[Part, Part]:
+    """A policy, and the law that it sits on."""
     stored = load_policy(best_policy(policy))
     settings = stored.settings
     residual = ResidualLaw(rig, settings)
@@ -27,4 +33,4 @@ def residual_part(rig: Parameters, sampled: bool, policy: str) -> Part:
         **{WORLD + ACTION + k: 0.0 for k in range(settings.size)},
         **{WORLD + SHOWN + k: float(settings.size <= k < settings.size + 2) for k in range(shown)},
     }
-    return Part((*hidden, told, *residual.stages()), first)
+    return Part((*hidden, told), first), Part(tuple(residual.stages()), {})

@@ -10,16 +10,20 @@ const INFO = {
 
 /** The present instant: name -> numbers, in the order of FIELDS. */
 export function instant(session) {
-  const { show, seen, world, inputs, rows, pack, hands } = session;
-  show.run(seen, world);
+  const { pack, hands } = session;
+  const info = session.shown();
   const known = {
     time: [session.time],
     episode_time: [session.episodeTime],
-    scenario_force: inputs.some(rows.inputs.scenario_force, 2),
-    drag_force: inputs.some(rows.inputs.pointer_force, 2),
-    pointer: hands.pointer(world.some(rows.MOTION, 2), inputs.get(rows.inputs.pointer_stiffness)),
+    scenario_force: session.some("scenario_force_x", 2),
+    drag_force: session.some("pointer_force_x", 2),
+    pointer: hands.pointer(session.some("x", 2), session.loop.get("pointer_stiffness")),
   };
-  return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? show.memory.some(...pack.info[INFO[name]])]));
+  const of = (name) => {
+    const [first, count] = pack.info[INFO[name]];
+    return Array.from(info.subarray(first, first + count));
+  };
+  return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? of(name)]));
 }
 
 /** The present instant as a row of numbers. */
