@@ -7,7 +7,7 @@ import pytest
 
 from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
 from birthsim_build.check.running import ROW, library_loop, node_rows
-from birthsim_build.image import HEAD
+from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
 from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
 from birthsim_env import StiffnessSchedule, UserForce
@@ -134,6 +134,20 @@ def test_a_copy_goes_on_by_itself(loop):
     one[:] = 0
     advance(other, 500)
     assert (other[HEAD : HEAD + ROWS] == one_rows).all()
+
+
+def test_parts_are_left_out(loop):
+    advance, words = loop
+    rows = words[HEAD : HEAD + ROWS].view(np.float64)
+    advance(words, 50)
+    words[LEFT_OUT], before = ~1, rows.copy()  # all but the first, which is the law
+    assert advance(words, 1) == 0
+    changed = {name for name, number in ROW.items() if rows[number] != before[number]}
+    assert "opening_P1" in changed
+    assert not changed & {"time", "tick", "x", "Pp1", "measured_x", "reference_x"}
+    words[LEFT_OUT] = 0
+    advance(words, 1)
+    assert rows[ROW["time"]] == pytest.approx(0.051)
 
 
 def test_a_setpoint_that_cannot_be_served_is_counted(loop):
