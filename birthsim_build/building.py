@@ -23,14 +23,19 @@ STACK = 65536
 Report = dict[str, Any]
 
 
-def build_wasm(bundle: Bundle, folder: Path) -> Report:
-    """Write code, data and the JavaScript module; returns their sizes in bytes."""
+def write_wasm(functions: list[str], out: Path) -> None:
+    """Write the code of stages and of what runs them."""
     with tempfile.TemporaryDirectory() as place:
         built = Path(place) / "birthsim.o"
-        compile_object(bundle.functions, "wasm", built)
+        compile_object(functions, "wasm", built)
         exported = (f"--export={name}" for name in EXPORTS)
         options = ("--no-entry", "--stack-first", "-z", f"stack-size={STACK}", "--strip-all", *exported)
-        link("wasm-ld", *options, "-o", str(folder / "birthsim.wasm"), str(built))
+        link("wasm-ld", *options, "-o", str(out), str(built))
+
+
+def build_wasm(bundle: Bundle, folder: Path) -> Report:
+    """Write code, data and the JavaScript module; returns their sizes in bytes."""
+    write_wasm(bundle.functions, folder / "birthsim.wasm")
     write_javascript(bundle, folder)
     names = ("birthsim.wasm", "birthsim.bin", "birthsim.js", "layout.js")
     return {"target": "wasm", "bytes": {name: (folder / name).stat().st_size for name in names}}

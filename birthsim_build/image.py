@@ -27,6 +27,9 @@ HEAD, PART_HEAD, ENTRY = 8, 4, 4
 """Words of an image's head (magic, words in all, parts, rows), of a part's (words in all, stages, addresses) and of an entry
 (number of the function; words at which memory, constants and the description of tables begin)."""
 
+LEFT_OUT = 4
+"""Word of the head whose bit p is 1 where part p is left out."""
+
 OF_INPUTS = -1
 """Instead of where its memory begins: the memory of this stage are the inputs."""
 
@@ -80,8 +83,7 @@ def packed_rows(rows: Array | None, parts: Sequence[Part]) -> Array:
     every = np.zeros(ROWS)
     if rows is not None:
         every[: WORLD + SEEN] = rows
-    for row, value in FIRST.items():
-        every[WORLD + SEEN + row] = value
+    every[WORLD + SEEN :] = FIRST
     for part in parts:
         for row, value in part.rows.items():
             every[row] = value

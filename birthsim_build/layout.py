@@ -11,6 +11,61 @@ from itertools import accumulate
 
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import REFERENCE_NAMES, REFERENCES, Reference
+from birthsim_env.physics.compiled.records import Rows, part, row, rows
+
+DRAG_LIMIT = 100.0
+"""N, assumed: the person's hand pulls no harder, however far the pointer is. At 120 N downwards, more than cylinder 1 can
+hold, it slams into its end stop so fast that the pressure there leaves what the model describes; at 100 N it never did."""
+
+DRAG_DAMPING = 20.0
+"""N s/m, assumed: a hand is no bare spring; it acts only while the pointer holds."""
+
+_REFERENCE_UNITS = tuple(unit for _, unit, *_ in Reference.entries())
+
+
+class Passages(Rows):
+    """What is left of smooth passages: an offset at the time ``begins`` comes to rest at zero ``lasts`` later; 0: none."""
+
+    target_begins = row("s", "when the target's passage began")
+    target_lasts = row("s", "how long it takes")
+    target = rows(8, "SI", "offset of position, velocity, acceleration and jerk as it began")
+    setpoints_begin = row("s", "when the setpoints' passage began")
+    setpoints_last = row("s", "how long it takes")
+    setpoints = rows(5, "N/m", "offset of Kclx, Kcly, Kpneu1, Kpneu2, Kclxy as it began")
+    force_begins = row("s", "when the passage of the scenario's force began")
+    force_lasts = row("s", "how long it takes")
+    force = rows(2, "N", "offset as it began")
+
+
+class Inputs(Rows):
+    """How a person or another program acts on a loop, and what the loop makes of it."""
+
+    begins = row("s", "when the scenario began, on the clock of the loop: its target, setpoints and hand count from there")
+    episode_time = row("s", "since then; written by the loop")
+    clock = row("s", "time, while parts run that have a clock of their own; written by the loop")
+    sensors_begin = row("1", "when the sensors' own clock began: a number of control periods, where sensors are exchanged")
+    pointer_held = row("1", "1 where a person's hand holds the end effector by a spring to the pointer, else 0")
+    pointer = rows("pointer_x pointer_y", "m", "of the pointer")
+    pointer_stiffness = row("N/m", "of that spring")
+    pointer_damping = row("N s/m", "of that hand")
+    pointer_limit = row("N", "it pulls and pushes no harder")
+    push = rows("push_x push_y", "N", "what that hand pushes with besides")
+    pointer_force = rows("pointer_force_x pointer_force_y", "N", "of that hand; written by the loop")
+    scenario_force = rows("scenario_force_x scenario_force_y", "N", "of the scenario's hand; written by the loop")
+    scenario_stiffness = rows(
+        "scenario_Kclx scenario_Kcly scenario_Kpneu1 scenario_Kpneu2", "N/m", "setpoint of the scenario; written by the loop"
+    )
+    passes = rows(
+        "pass_target pass_setpoints pass_force", "1",
+        "1 begins a passage from what was asked for till now: in the next period all stays as it was, and this becomes 0",
+    )  # fmt: skip
+    passages = part(Passages, "written by the loop")
+    given = part(Reference, "what was asked for in the period before; written by the loop")
+    given_force = rows("given_force_x given_force_y", "N", "of the hand in the period before; written by the loop")
+    keep_force = row("1", "1 where the scenario's hand pushes, else 0")
+    add_force = rows("add_force_x add_force_y", "N", "force besides")
+    keep = rows(" ".join(f"keep_{name}" for name in REFERENCE_NAMES), "1", "1 where the scenario's value counts, else 0")
+    add = rows(" ".join(f"add_{name}" for name in REFERENCE_NAMES), _REFERENCE_UNITS, "added to it")
 
 
 @dataclass(frozen=True)
@@ -20,44 +75,23 @@ class Row:
     name: str
     unit: str
     about: str
-    count: int = 1
-    number: int = 0
-
-
-_INPUTS = (
-    Row("begins", "s", "when the scenario began, on the clock of the loop: its target, setpoints and hand count from there"),
-    Row("episode_time", "s", "since then; written by the loop"),
-    Row("clock", "s", "time, while the scenario's parts run; written by the loop"),
-    Row("pointer_held", "1", "1 where a person's hand holds the end effector by a spring to the pointer, else 0"),
-    *(Row(f"pointer_{axis}", "m", f"{axis} of the pointer") for axis in "xy"),
-    Row("pointer_stiffness", "N/m", "of that spring"),
-    Row("pointer_damping", "N s/m", "of that hand"),
-    Row("pointer_limit", "N", "it pulls no harder"),
-    *(Row(f"pointer_force_{axis}", "N", f"what it pulls with along {axis}; written by the loop") for axis in "xy"),
-    Row("keep_force", "1", "1 where the scenario's hand pushes, else 0"),
-    *(Row(f"add_force_{axis}", "N", f"force along {axis} besides") for axis in "xy"),
-    *(Row(f"keep_{name}", "1", f"1 where the scenario's {name} counts, else 0") for name in REFERENCE_NAMES),
-    *(Row(f"add_{name}", unit, f"added to {name}") for name, unit, *_ in Reference.entries()),
-)
+    count: int
+    number: int
 
 
 def _numbered() -> tuple[Row, ...]:
-    rows = (*(Row(*entry) for layout in (World, Seen) for entry in layout.entries()), *_INPUTS)
-    starts = accumulate((row.count for row in rows), initial=0)
-    return tuple(Row(row.name, row.unit, row.about, row.count, start) for row, start in zip(rows, starts, strict=False))
+    entries = [entry for layout in (World, Seen, Inputs) for entry in layout.entries()]
+    starts = accumulate((entry[-1] for entry in entries), initial=0)
+    return tuple(Row(*entry, start) for entry, start in zip(entries, starts, strict=False))
 
 
 LAYOUT = _numbered()
 """All rows in order."""
 
-INPUTS = sum(row.count for row in _INPUTS)
-ROWS = World.size + Seen.size + INPUTS
-"""How many inputs, and rows in all."""
+ROWS = World.size + Seen.size + Inputs.size
+"""How many there are."""
 
-(
-    BEGINS, EPISODE, CLOCK, HELD, POINTER, STIFFNESS, DAMPING, LIMIT, PULL, KEEP_FORCE, ADD_FORCE, KEEP, ADD
-) = accumulate((1, 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, REFERENCES), initial=0)  # fmt: skip
-"""Rows of the inputs at which their parts begin."""
-
-FIRST = {KEEP_FORCE: 1.0, STIFFNESS: 500.0, DAMPING: 20.0, LIMIT: 100.0, **{KEEP + k: 1.0 for k in range(REFERENCES)}}
-"""Values of inputs with which a loop begins; the others are zero. Those of the pointer are as in ``birthsim-live``."""
+FIRST = Inputs.lane(
+    keep_force=1.0, pointer_stiffness=500.0, pointer_damping=DRAG_DAMPING, pointer_limit=DRAG_LIMIT, keep=[1.0] * REFERENCES
+)
+"""Inputs (``Inputs.size``,) with which a loop begins: none acts."""

@@ -22,8 +22,14 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 RESIDUAL = "residual"
 
-ORDER = ("law", "valves", "board", "plant", "clock", "target", "setpoints", "hand", "inputs", "jumps", "sensors")
-"""Parts in the order in which a control period runs them."""
+ORDER = (
+    "policy", "law", "valves", "board", "plant", "clock", "target", "setpoints", "hand", "inputs", "start", "jumps", "sensors",
+    "show",
+)  # fmt: skip
+"""Parts in the order in which a control period runs them; the page alone has policy, start and show."""
+
+CLOCK, INPUTS = (Part((Stage(one, memory=INPUT_MEMORY),), {}) for one in (enter_scenario, outside))
+"""The parts around those of a scenario."""
 
 PAIRED_VALVES = Part((Stage(pair_valves, sees_world=False),), {})
 """The part ``valves`` of a rig with one 5/3 valve per cylinder; with two there is none."""
@@ -45,8 +51,7 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
     env.reset(seed=seed)
     simulation = env.unwrapped.simulation
     parts = {name: Part(tuple(stages), {}) for name, stages in simulation.parts().items() if name != "actuation"}
-    parts["clock"] = Part((Stage(enter_scenario, memory=INPUT_MEMORY),), {})
-    parts["inputs"] = Part((Stage(outside, memory=INPUT_MEMORY),), {})
+    parts |= {"clock": CLOCK, "inputs": INPUTS}
     parts = {name: parts[name] for name in ORDER if name in parts and parts[name].stages}
     return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
 

@@ -10,6 +10,12 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 def residual_part(rig: Parameters, sampled: bool, policy: str) -> Part:
     """A policy, a folder or a shipped name, with the law that it sits on."""
+    own, law = residual_parts(rig, sampled, policy)
+    return Part((*own.stages, *law.stages), own.rows)
+
+
+def residual_parts(rig: Parameters, sampled: bool, policy: str) -> tuple[Part, Part]:
+    """A policy, and the law that it sits on."""
     residual = ResidualController(rig, policy)
     residual.prepare(1, sampled)
     rows = (
@@ -17,4 +23,5 @@ def residual_part(rig: Parameters, sampled: bool, policy: str) -> Part:
         for array, first in ((residual.action, ACTION), (residual.shown, SHOWN))
         for k, value in enumerate(array[:, 0].tolist())
     )
-    return Part(tuple(residual.stages()), dict(rows))
+    own, stages = residual.policy_stages(), residual.stages()
+    return Part(tuple(own), dict(rows)), Part(tuple(stages[len(own) :]), {})

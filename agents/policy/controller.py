@@ -91,6 +91,10 @@ class ResidualController(ResidualLaw):
                 self._before, self._cells = [*self._before, told], told.memory[1:]
         super().prepare(lanes, sampled)
 
+    def policy_stages(self) -> list[Stage]:
+        """The policy as stages of a closed loop, once prepared."""
+        return list(self._before)
+
     def stages(self) -> list[Stage]:
         """Policy and law as stages of a closed loop, with what they remember."""
         return [*self._before, *super().stages()]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from birthsim_build.image import ENTRY, HEAD, PART_HEAD, Words
-from birthsim_build.layout import INPUTS, ROWS
+from birthsim_build.image import ENTRY, HEAD, LEFT_OUT, PART_HEAD, Words
+from birthsim_build.layout import ROWS, Inputs
 from birthsim_env.loop.rows import WORLD
 from birthsim_env.loop.stage import ARGUMENTS, call, carray, pointer
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -28,8 +28,8 @@ def advance(image: int, periods: int, dispatch: int) -> int:
     ``dispatch`` is the address of what calls a stage by its number. Before the first period the addresses of tables are put
     into their descriptions, so that an image may have been copied.
     """
-    parts, rows, missed = _words(image, HEAD)[2], image + 8 * HEAD, 0
-    seen, inputs, first = rows + 8 * WORLD, rows + 8 * (ROWS - INPUTS), rows + 8 * ROWS
+    parts, rows, missed, left_out = _words(image, HEAD)[2], image + 8 * HEAD, 0, _words(image, HEAD)[LEFT_OUT]
+    seen, inputs, first = rows + 8 * WORLD, rows + 8 * (ROWS - Inputs.size), rows + 8 * ROWS
     part = first
     for _ in range(parts):
         size, stages, tables, _ = _words(part, PART_HEAD)
@@ -39,9 +39,9 @@ def advance(image: int, periods: int, dispatch: int) -> int:
         part += 8 * size
     for _ in range(periods):
         part = first
-        for _ in range(parts):
+        for p in range(parts):
             size, stages, _, _ = _words(part, PART_HEAD)
-            for s in range(stages):
+            for s in range(0 if (left_out >> p) & 1 else stages):
                 number, memory, constants, tables = _words(part + 8 * (PART_HEAD + ENTRY * s), ENTRY)
                 own = inputs if memory < 0 else part + 8 * memory
                 missed += call(dispatch, number, rows, seen, own, part + 8 * constants, part + 8 * tables, 0)

@@ -36,14 +36,16 @@ export class Bundle {
 export class Loop {
   /** All rows, SI units; their numbers are in ROW. Take it anew after exchange(). */
   readonly rows: Float64Array;
-  /** Run control periods; returns how many times a law could not serve what it was asked for. */
-  advance(periods?: number): number;
+  /** Run control periods, of the parts `only` where they are named; returns how many times a law could not serve its setpoint. */
+  advance(periods?: number, only?: readonly string[] | null): number;
   /** Value of a row. */
   get(name: RowName): number;
   /** Set a row: an input, a parameter of the rig, an opening or a force. */
   set(name: RowName, value: number): void;
   /** Where an episode begins, with the parts that the loop was made with. */
   reset(): void;
-  /** Exchange a part (a name of INDEX.order) for another (a number of INDEX.parts) while the rig keeps its state. */
-  exchange(name: string, number: number): void;
+  /** Exchange a part (a name of INDEX.order) for another (a number of INDEX.parts), or for none, while the rig keeps its state. */
+  exchange(name: string, number?: number): void;
+  /** What the first stage of a part remembers. */
+  memory(name: string): Float64Array;
 }

@@ -7,7 +7,7 @@
  *     loop.advance(10);
  *     console.log(loop.get("x"), loop.get("y"));
  */
-import { HEAD, INDEX, MAGIC, ROW, ROWS } from "./layout.js";
+import { HEAD, INDEX, LEFT_OUT, MAGIC, ROW, ROWS } from "./layout.js";
 
 export { INDEX, ROW, ROWS };
 
@@ -99,8 +99,13 @@ export class Loop {
     for (const [, number] of this.parts) this.begin(number);
   }
 
-  /** Run control periods; returns how many times a law could not serve what it was asked for. */
-  advance(periods = 1) {
+  /** Run control periods, of the parts `only` where they are named; returns how many times a law could not serve its setpoint. */
+  advance(periods = 1, only = null) {
+    if (!this.masks.has(only)) {
+      const bits = this.parts.map(([name], k) => (only && !only.includes(name) ? 1n << BigInt(k) : 0n));
+      this.masks.set(only, bits.reduce((mask, bit) => mask | bit, 0n));
+    }
+    this.words[LEFT_OUT] = this.masks.get(only);
     return this.exports.birthsim_advance(this.base, periods);
   }
 
@@ -117,7 +122,7 @@ export class Loop {
   /**
    * Exchange a part for another, such as the law, while the rig keeps its state; the new part begins anew.
    * @param {string} name of the part in INDEX.order
-   * @param {number} number of the new part in INDEX.parts
+   * @param {number} [number] of the new part in INDEX.parts; without it there is none
    */
   exchange(name, number) {
     if (!INDEX.order.includes(name)) throw new RangeError(`part = ${JSON.stringify(name)}; allowed: ${INDEX.order.join(", ")}`);
@@ -128,11 +133,23 @@ export class Loop {
       now.set(own, this.words.slice(at, at + words));
       at += words;
     }
-    now.set(name, this.bundle.part(number));
+    if (number === undefined) now.delete(name);
+    else now.set(name, this.bundle.part(number));
     const numbers = new Map(this.parts).set(name, number);
     this.parts = INDEX.order.filter((own) => now.has(own)).map((own) => [own, numbers.get(own)]);
     this.put(this.words.slice(HEAD, HEAD + ROWS), this.parts.map(([own]) => now.get(own)));
-    this.begin(number);
+    if (number !== undefined) this.begin(number);
+  }
+
+  /** What the first stage of a part remembers. */
+  memory(name) {
+    let at = HEAD + ROWS;
+    for (const [own] of this.parts) {
+      if (own === name) break;
+      at += Number(this.words[at]);
+    }
+    const [from, to] = [5, 6].map((k) => Number(this.words[at + k])); // its constants come behind it
+    return new Float64Array(this.words.buffer, this.words.byteOffset + 8 * (at + from), to - from);
   }
 
   /** @private Write an image. */
@@ -143,6 +160,7 @@ export class Loop {
     this.words = new BigInt64Array(this.exports.memory.buffer, this.base, total);
     this.rows = new Float64Array(this.exports.memory.buffer, this.base + 8 * HEAD, ROWS);
     this.words.fill(0n, 0, HEAD);
+    this.masks = new Map();
     [MAGIC, BigInt(total), BigInt(parts.length), BigInt(ROWS)].forEach((word, k) => (this.words[k] = word));
     this.words.set(rows, HEAD);
     let at = HEAD + ROWS;

@@ -34,12 +34,3 @@ def openings(controller: Controller, measurement: Measurement, reference: Refere
     if isinstance(controller, DAMPED):
         return controller.command(measurement, reference, damping_factor=np.array([damping]))
     return controller.command(measurement, reference)
-
-
-def as_action(commanded: Array, size: int) -> Array:
-    """Openings (4, N) as the action of a valve layout with ``size`` valves.
-
-    One 5/3 valve per cylinder gets half the difference of what its chambers should: what moves the piston. Of a law for such
-    valves, whose openings are opposite, that is the opening of chamber P.
-    """
-    return np.ascontiguousarray(commanded if size == 4 else (commanded[[0, 2]] - commanded[[1, 3]]) / 2)

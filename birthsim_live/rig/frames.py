@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.info import Info, describe, single_info
-from birthsim_env.loop.rows import Signals, World
+from birthsim_env.info import Info, single_info
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.simulation import Simulation
-from birthsim_live.rig import inside
 from birthsim_live.rig.hand import Hands
+from birthsim_live.rig.lane import Lane
 
 FIELDS = {
     "time": 1,
@@ -47,23 +45,16 @@ LEAST_FORCE, LEAST_GIVEN = 5.0, 1e-4
 """N and m, assumed: below them the quotient of force and displacement says nothing."""
 
 
-def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
+def row_of(lane: Lane, hands: Hands) -> Array:
     """The present instant as a row (COLUMNS,)."""
-    now, plant, rows, within = simulation, simulation.plant, np.empty((Info.size, 1)), np.empty((inside.ROWS, 1))
-    world, seen = World(np.zeros((World.size, 1))), Signals(np.zeros((Signals.size, 1)))
-    world.rig[:], world.state[:], world.motion.rows[:] = plant.lane_parameters, plant.state, now.motion
-    world.force[:], world.impact[:], world.since_jump[:] = now.force, now.impacts, now.since_jump
-    seen.time[:], seen.reference.rows[:] = now.time, now.reference.rows
-    describe(world, seen, Info(rows), 1)
-    info = single_info(rows)
-    inside.look_inside(plant.state, plant.lane_parameters, within)
-    hold = hands.hold
-    pointer = (math.nan, math.nan) if hold is None else hold.pointer(plant.end_effector()[:2, 0], hands.stiffness)
+    inputs, rows = lane.inputs, lane.shown()
+    info, position = single_info(rows[: Info.size]), lane.world.motion.position[:, 0]
     parts: Sequence[Any] = (
-        info["time"], episode_time, info["piston_position"], info["position"], info["velocity"], info["target"],
-        info["compliant_target"], hands.scenario_now, hands.drag_now, pointer, info["pressure"], info["opening"],
+        info["time"], lane.episode_time, info["piston_position"], info["position"], info["velocity"], info["target"],
+        info["compliant_target"], inputs.scenario_force[:, 0], inputs.pointer_force[:, 0],
+        hands.pointer(position, float(inputs.pointer_stiffness[0])), info["pressure"], info["opening"],
         info["stiffness_setpoint"], info["pneumatic_stiffness"], info["pneumatic_stiffness_setpoint"],
-        within[:, 0],
+        rows[Info.size :, 0],
     )  # fmt: skip
     return np.concatenate([np.atleast_1d(part) for part in parts])
 

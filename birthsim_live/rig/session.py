@@ -10,23 +10,16 @@ from typing import Any
 import numpy as np
 
 from baselines.controller import Controller
-from birthsim_env.parts.actuation import ValveActuation
-from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.scenarios import SCENARIOS, Parts
+from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES, Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
-from birthsim_env.simulation import Simulation
-from birthsim_live.rig.bridge import Course
-from birthsim_live.rig.controllers import as_action, build_controller, has_damping, openings
+from birthsim_live.rig.controllers import build_controller, has_damping, openings
 from birthsim_live.rig.frames import frame_of, row_of
 from birthsim_live.rig.hand import Hands
+from birthsim_live.rig.lane import PASSES, Lane, path_of
 from birthsim_live.rig.recorder import Recorder
-from birthsim_live.rig.sensing import ExchangeableSensors
-from birthsim_live.rig.setpoints import Setpoints
 from birthsim_live.rig.settings import NOTHING, STIFFNESSES, Choices, Settings, default_settings, merged, true_rig
-
-PATH_POINTS = 400
 
 LOWEST, HIGHEST = np.full(STATES, -np.inf), np.full(STATES, np.inf)
 """Of every row of the state: what the model holds for, as in the environments' rewards."""
@@ -64,18 +57,11 @@ class Session:
         self.recorder: Recorder | None = None
         self.second: Session | None = None
         self.controller = controller or build_controller(self.settings.controller, rig)
-        self._seed, self._episode = seed, 0
+        self._episode = 0
         now = self.settings
         self.duration = SCENARIOS[now.scenario].duration
-        trajectory, force, schedule = SCENARIOS[now.scenario].nominal()
-        self._course, self._setpoints = Course(trajectory), Setpoints(schedule)
-        self.hands = Hands(force, now.scenario_force, now.drag_stiffness)
-        self._sensors = ExchangeableSensors(now.sensors, rig.electronics, self._world("sensors"))
-        self._actuation = ValveActuation(now.valves)
-        self._simulation = Simulation(
-            1, rig, {}, self._course, self.hands, self._setpoints, now.sensors, self._actuation, periods=1
-        )
-        self._simulation.sensors = self._sensors
+        self.hands = Hands()
+        self.lane = Lane(rig, seed, now.scenario, now.sensors, now.valves)
         if now.compare != NOTHING:
             self.second = self._beside(None)
         self.reset()
@@ -83,17 +69,17 @@ class Session:
     @property
     def time(self) -> float:
         """s since the last reset."""
-        return float(self._simulation.time[0])
+        return self.lane.time
 
     @property
     def episode_time(self) -> float:
         """s since the scenario's present episode began."""
-        return self.time - self._course.begins
+        return self.lane.episode_time
 
     @property
     def state(self) -> Array:
         """State of the plant, (18, 1)."""
-        return self._simulation.plant.state
+        return self.lane.world.state
 
     def shown_settings(self) -> dict[str, Any]:
         """The settings as the page shows them: with the scenario's setpoints where they hold."""
@@ -105,12 +91,13 @@ class Session:
 
     def reset(self) -> None:
         """Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay."""
-        now = self.settings
-        self._simulation.plant.lane_parameters[:] = parameter_column(true_rig(self.rig, now))[:, None]
+        now, inputs = self.settings, self.lane.inputs
+        self._describe_rig()
         self._episode, self.lost = 0, None
-        self._setpoints.choose(_chosen(now), 0.0)
-        lane = np.ones(1, dtype=np.bool_)
-        self._simulation.begin(lane, [self._seed], np.zeros(1, dtype=np.int64), self.duration)
+        self.lane.choose(_chosen(now))
+        inputs.keep_force[:], inputs.pointer_stiffness[:] = float(now.scenario_force), now.drag_stiffness
+        self.hands.act(inputs)
+        self.lane.start(now.scenario, self.duration)
         self.controller.reset()
         self.paths += 1
         if self.second is not None:
@@ -127,25 +114,28 @@ class Session:
         """
         changes = self.choices.checked(changes)
         before, after = self.settings, merged(self.settings, changes, self._scenario_setpoints())
-        plant = parameter_column(true_rig(self.rig, after))
-        parts = self._parts(after.scenario) if "scenario" in changes and after.scenario != before.scenario else None
         if after.controller != before.controller:
             self.controller = controller or build_controller(after.controller, self.rig)
             self.controller.reset()
-        self.settings, now = after, self.time
-        self._simulation.plant.lane_parameters[:] = plant[:, None]
-        if parts is not None:
-            self.duration, self._episode = SCENARIOS[after.scenario].duration, 0
-            self._follow(parts)
+        self.settings, lane = after, self.lane
+        self._describe_rig()
+        passes = []
         if _chosen(after) != _chosen(before):
-            self._setpoints.choose(_chosen(after), now)
-        if after.sensors != before.sensors:
-            self._sensors.exchange(after.sensors, self._world("sensors"))
-        if after.valves != before.valves:
-            self._actuation = self._simulation.actuation = ValveActuation(after.valves)
+            lane.choose(_chosen(after))
+            passes.append("setpoints")
         if after.scenario_force != before.scenario_force:
-            self.hands.want(after.scenario_force, now)
-        self.hands.stiffness = after.drag_stiffness
+            lane.inputs.keep_force[:] = float(after.scenario_force)
+            passes.append("force")
+        if after.sensors != before.sensors:
+            lane.exchange(after.sensors, self._episode)
+        if after.valves != before.valves:
+            lane.lay_out(after.valves)
+        if after.scenario != before.scenario:
+            self.duration, self._episode = SCENARIOS[after.scenario].duration, 0
+            self._follow()
+        elif passes:
+            lane.pass_over(*passes)
+        lane.inputs.pointer_stiffness[:] = after.drag_stiffness
         self._compare(before, changes, compared)
 
     def _compare(self, before: Settings, changes: Mapping[str, Any], controller: Controller | None) -> None:
@@ -163,7 +153,7 @@ class Session:
     def _beside(self, controller: Controller | None) -> Session:
         """A rig with the same settings under the controller to compare with."""
         own = self.settings.model_copy(update={"controller": self.settings.compare, "compare": NOTHING})
-        return Session(self.rig, own, self._seed, self.choices.policies, controller)
+        return Session(self.rig, own, self.lane.seed, self.choices.policies, controller)
 
     def advance(self, periods: int, until: float = math.inf) -> int:
         """Run at least one and up to ``periods`` control periods, none begun after ``until`` (``time.perf_counter``, s); how
@@ -180,22 +170,19 @@ class Session:
         return done
 
     def _advance_one(self) -> None:
-        simulation = self._simulation
+        lane = self.lane
         try:
-            commanded = openings(self.controller, simulation.measurement, simulation.reference, self.settings.damping)
+            commanded = openings(self.controller, lane.measurement, lane.reference, self.settings.damping)
         except Exception as error:
             # Whatever a controller of the bench trips over, the page says it and waits.
             self.lost = f"{self.settings.controller} gives up: {error}"
             return
-        try:
-            simulation.step(as_action(commanded, self._actuation.size))
-        except ValueError as error:
-            self.lost = self._left_range() or str(error)
-            return
+        self.hands.act(lane.inputs)
+        lane.advance(commanded)
         self.lost = self._left_range()
         if self.lost is None and self.episode_time > self.duration - self.period / 2:
             self._episode += 1
-            self._follow(self._parts(self.settings.scenario))
+            self._follow()
 
     def _left_range(self) -> str | None:
         state = self.state[:, 0]
@@ -229,31 +216,26 @@ class Session:
 
     def row(self) -> Array:
         """The present instant, as ``frames.frame_of`` takes it."""
-        return row_of(self._simulation, self.hands, self.episode_time)
+        return row_of(self.lane, self.hands)
 
     def path(self) -> list[list[float]]:
         """The target's path of the running episode, m; one point where it rests."""
-        points = np.round(self._course.path(self.duration, PATH_POINTS), 6)
-        return [[float(x), float(y)] for x, y in (points if np.ptp(points, axis=0).any() else points[:1])]
+        return path_of(self.lane.scenario, self.duration)
 
-    def _parts(self, scenario: str) -> Parts:
-        return SCENARIOS[scenario].nominal()
+    def _describe_rig(self) -> None:
+        """Write the rig that moves: mass and friction as set."""
+        self.lane.world.rig[:] = parameter_column(true_rig(self.rig, self.settings))[:, None]
 
-    def _follow(self, parts: Parts) -> None:
-        """Go over to the start of an episode with these parts."""
-        trajectory, force, schedule = parts
-        self._course.follow(trajectory, self._world("reference"), self.time)
-        self.hands.follow(force, self._world("user_force"), self.time)
-        self._setpoints.follow(schedule, self._world("stiffness"), self.time)
+    def _follow(self) -> None:
+        """Go over to the start of an episode of the scenario."""
+        self.lane.follow(self.settings.scenario, self._episode)
+        self.lane.pass_over(*PASSES)
         self.paths += 1
-
-    def _world(self, part: str) -> np.random.Generator:
-        return stream(self._seed, self._episode, part)
 
     def _scenario_setpoints(self) -> dict[str, float]:
         """What the scenario asks for at this time."""
-        asked = self._setpoints.scenario(self.time)
-        return dict(zip(STIFFNESSES, (round(float(value), 3) for value in asked[:4]), strict=True))
+        asked = self.lane.inputs.scenario_stiffness[:, 0]
+        return dict(zip(STIFFNESSES, (round(float(value), 3) for value in asked), strict=True))
 
 
 def _chosen(settings: Settings) -> tuple[float, ...] | None:

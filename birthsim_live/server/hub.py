@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from birthsim_build.layout import DRAG_LIMIT
 from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.clock import Clock, Source
-from birthsim_live.rig.hand import DRAG_LIMIT
 from birthsim_live.rig.settings import NOTHING, Choices, opening_settings
 from birthsim_live.server import protocol
 from birthsim_live.server.clients import Client

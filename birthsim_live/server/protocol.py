@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
 
+from birthsim_build.layout import DRAG_LIMIT
 from birthsim_live.rig.clock import SLOWEST
-from birthsim_live.rig.hand import DRAG_LIMIT
 from birthsim_live.rig.settings import Strict, refusal, within
 
 VERSION = 1

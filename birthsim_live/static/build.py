@@ -7,18 +7,16 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from birthsim_build.code.compiler import compile_object, link, require_linker, require_llvm
+from birthsim_build.building import write_wasm
+from birthsim_build.code.compiler import require_linker, require_llvm
+from birthsim_build.faces.javascript import write_module
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.static.pack import Packer, pack, packed_policies
+from birthsim_live.static.pack import pack
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 OVER = Path(__file__).resolve().parent / "page"
 """Files that are laid over those of the page: the connection to a worker, and the worker."""
-
-STACK = 64 * 1024
-"""Bytes of the stack of the stages, which take a tenth of it."""
 
 POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'; "
@@ -37,17 +35,18 @@ def build_page(folder: Path, rig: Parameters, policies: Sequence[str] = ()) -> i
         raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
     require_llvm()
     require_linker()
-    packer = Packer()
-    rig_pack, stored = pack(rig, packer, policies), packed_policies(rig, packer, policies)
+    packed = pack(rig, policies)
     with tempfile.TemporaryDirectory() as place:
         made = Path(place) / "page"
         shutil.copytree(PAGE, made / "static", ignore=shutil.ignore_patterns("index.html"))
         shutil.copytree(OVER, made / "static", dirs_exist_ok=True)
         (made / "index.html").write_text(_closed((PAGE / "index.html").read_text()))
-        (made / "rig" / "policies").mkdir(parents=True)
-        for name, content in {"pack.json": rig_pack, **stored}.items():
-            (made / "rig" / name).write_text(_text(content))
-        _write_code(packer.functions, Path(place), made / "rig" / "loop.wasm")
+        own = made / "rig"
+        own.mkdir()
+        (own / "pack.json").write_text(json.dumps(packed.content, separators=(",", ":"), allow_nan=False))
+        write_module(packed.index, own)
+        packed.words.tofile(own / "loop.bin")
+        write_wasm(packed.functions, own / "loop.wasm")
         shutil.copytree(made, folder, dirs_exist_ok=True)
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
@@ -55,18 +54,3 @@ def build_page(folder: Path, rig: Parameters, policies: Sequence[str] = ()) -> i
 def _closed(page: str) -> str:
     """The page with the policy that the server sends as a header."""
     return page.replace("<head>", f'<head>\n  <meta http-equiv="Content-Security-Policy" content="{POLICY}">', 1)
-
-
-def _text(content: dict[str, Any]) -> str:
-    return json.dumps(content, separators=(",", ":"), allow_nan=False)
-
-
-def _write_code(functions: list[str], place: Path, out: Path) -> None:
-    """Compile stages into a module that exports each as ``birthsim_stage_<number>``, and takes its memory from outside."""
-    compiled = place / "stages.o"
-    compile_object(functions, "wasm", compiled)
-    exports = [f"--export=birthsim_stage_{number}" for number in range(len(functions))]
-    link(
-        "wasm-ld", "--no-entry", "--stack-first", "--import-memory", "--strip-all", "-z", f"stack-size={STACK}",
-        "--export=__heap_base", *exports, str(compiled), "-o", str(out),
-    )  # fmt: skip

@@ -1,46 +1,39 @@
-"""What a rig in the browser is made of, as JSON: rows, the rig, scenarios, sensors, controllers, and the page's greeting.
+"""What a rig in the browser is made of: its parts, as of ``birthsim_build``, and what the worker must know besides, as JSON.
 
-A stage is the name of its function, its constants, the memory of a lane that starts, and its tables. Arrays are base64 of
-their bytes, little-endian, so that every bit arrives. The files of ``static/page/worker`` read it.
+The files of ``static/page/worker`` read it.
 """
 
 from __future__ import annotations
 
-import base64
-import re
-from collections.abc import Sequence
-from typing import Any, cast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import birthsim_env
-from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy, shipped_names
-from agents.policy.stage import policy_stage
-from agents.residual.law import ResidualLaw
-from baselines.staged import LawStage, StagedController
-from birthsim_build.image import function_name
-from birthsim_env.assembly import policy_periods
+from baselines.staged import StagedController
+from birthsim_build.faces.javascript import Store
+from birthsim_build.image import INPUT_MEMORY, Part, Words, function_name
+from birthsim_build.loops import CLOCK, INPUTS, ORDER, law_part
+from birthsim_build.residual import residual_parts
 from birthsim_env.info import Info
-from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage
-from birthsim_env.parts.actuation import VALVE_LAYOUTS, ValveActuation
+from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics import options, spools
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_array, parameter_column
+from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig import bridge, clock, frames, hand, recorder, recording, setpoints
+from birthsim_live.rig import clock, frames, hand, recorder, recording, stages
 from birthsim_live.rig.controllers import build_controller, has_damping
-from birthsim_live.rig.session import HIGHEST, LOWEST, PATH_POINTS
+from birthsim_live.rig.lane import PASSES, begun, on_their_clock, path_of, valve_stages
+from birthsim_live.rig.session import HIGHEST, LOWEST
 from birthsim_live.rig.settings import RESIDUAL, STIFFNESSES, Choices, opening_settings
 from birthsim_live.server.hub import surroundings
-from birthsim_live.static import stages
 
 SEED = 0
 """Of the world: that of ``Session``."""
@@ -52,39 +45,20 @@ WITHOUT = "only with birthsim-live"
 """What the page says of a controller that is not compiled."""
 
 
-class Packer:
-    """Packs stages, and keeps the ``functions`` (``module:name``) that they call, in the order of their numbers."""
+@dataclass(frozen=True)
+class Packed:
+    """What the worker must know (``content``), the ``functions`` of the code, the module's ``index`` and the ``words`` of all
+    parts."""
 
-    def __init__(self) -> None:
-        self.functions: list[str] = []
-
-    def stage(self, stage: Stage | LawStage) -> dict[str, Any]:
-        """A stage as JSON."""
-        memory = stage.fresh if isinstance(stage, LawStage) else stage.memory
-        tables = () if isinstance(stage, LawStage) else stage.tables
-        return {
-            "function": self.number(stage),
-            "constants": packed(stage.constants),
-            "memory": None if memory is None else packed(memory),
-            "tables": [{"shape": list(table.shape), "data": packed(table)} for table in tables],
-        }
-
-    def number(self, stage: Stage | LawStage) -> int:
-        """The number of a stage's function in the code."""
-        name = function_name(cast(Stage, stage))
-        if name not in self.functions:
-            self.functions.append(name)
-        return self.functions.index(name)
+    content: dict[str, Any]
+    functions: list[str]
+    index: dict[str, Any]
+    words: Words
 
 
-def packed(array: NDArray[Any]) -> str:
-    """The bytes of an array."""
-    return base64.b64encode(np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()).decode()
-
-
-def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[str, Any]:
-    """All that a rig in the browser is made of; the functions of its stages are the packer's. It opens with the first of
-    ``policies`` (folders or shipped names), where there is one.
+def pack(rig: Parameters, policies: Sequence[str] = ()) -> Packed:
+    """All that a rig in the browser is made of. It opens with the first of ``policies`` (folders or shipped names), where there
+    is one.
 
     Raises ``ValueError`` for a rig with options of ``physics.options``.
     """
@@ -94,136 +68,119 @@ def pack(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[
         )
     choices, period = Choices(rig, policies), rig.electronics.control_period
     controllers = {one["name"]: one for one in choices.controllers}
-    made = {name: law for name in controllers if (law := controller(name, rig, packer)) is not None}
+    laws = {name: law for name in controllers if (law := controller(name, rig)) is not None}
     for name, one in controllers.items():
-        if name not in made:
+        if name not in laws:
             one["missing"] = WITHOUT
-    hello = surroundings(rig, choices)
-    return {
+    parts = {
+        "rig": {
+            "plant": _part(plant_stage(Plant(rig), period)), "clock": CLOCK, "inputs": INPUTS,
+            "start": _part(Stage(stages.begin, parameter_column(rig))),
+            "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
+        },
+        "valves": {name: {"valves": _part(*valve_stages(name))} if valve_stages(name) else {} for name in VALVE_LAYOUTS},
+        "scenarios": {name: scenario(name) for name in SCENARIOS},
+        "sensors": {name: sensors(name, rig) for name in SENSORS},
+        "controllers": laws,
+    }  # fmt: skip
+    functions = sorted({function_name(stage) for part in _all(parts) for stage in part.stages})
+    store = Store(functions)
+    hello, numbers = surroundings(rig, choices), _numbered(parts, store)
+    content = {
         "birthsim": birthsim_env.__version__,
         "hello": hello,
         "settings": hello["defaults"],
         "opens": {"controller": opening_settings(rig, policies).controller},
         "stiffnesses": STIFFNESSES,
-        "period": period,
-        "rows": {
-            **{name.upper(): group.first for layout in (World, Seen) for name, group in layout.groups.items()},
-            "WORLD": World.size, "SEEN": Seen.size,
-        },
+        "passes": PASSES,
         "info": {
             **{name: [group.first, group.count] for name, group in Info.groups.items()},
             "friction": [Info.size, 2], "flows": [Info.size + 2, 4],
         },
         "rig": rig_numbers(rig),
-        "range": {"low": packed(LOWEST), "high": packed(HIGHEST), "names": at.STATE_NAMES},
-        "stages": {
-            "plant": packer.stage(plant_stage(Plant(rig), period)),
-            "begin": packer.stage(Stage(stages.begin, parameter_column(rig))),
-            "show": packer.stage(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
-            "valves": {name: packer.stage(ValveActuation(name).stages(1, False)[0]) for name in VALVE_LAYOUTS},
+        "range": {
+            name: [float(low), float(high)]
+            for name, low, high in zip(STATE_NAMES, LOWEST, HIGHEST, strict=True) if np.isfinite([low, high]).all()
         },
-        "scenarios": {name: scenario(name, packer) for name in SCENARIOS},
-        "sensors": {name: sensors(name, rig, packer) for name in SENSORS},
-        "controllers": made,
-        "numbers": numbers_of_the_page(),
+        "parts": numbers,
+        "scenarios": {
+            name: {"duration": one.duration, "path": path_of(begun(name, SEED, 0), one.duration)}
+            for name, one in SCENARIOS.items()
+        },
+        "sampled": {name: kind.sampled for name, kind in SENSORS.items()},
+        "damped": {name: has_damping(build_controller(name, rig)) for name in laws},
+        "numbers": {
+            "patience": hand.PATIENCE, "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
+        },
         "header": {
             "format": recording.FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(),
             "columns": list(frames.FIELDS), "interval": recorder.EVERY * period,
         },
     }  # fmt: skip
+    index = {"period": period, "order": ORDER, "zero": store.rows(None), "parts": store.parts}
+    return Packed(content, functions, index, store.words)
 
 
 def rig_numbers(rig: Parameters) -> dict[str, Any]:
     """The rig's column, and what of it follows from the mass and friction that are set (``settings.true_rig``)."""
     cylinders = (rig.cylinder1, rig.cylinder2)
     return {
-        "column": packed(parameter_column(rig)),
-        "rows": {name: row for row, name in enumerate(PARAMETER_NAMES)},
+        "column": parameter_column(rig).tolist(),
         "coulomb": [one.coulomb_friction for one in cylinders],
         "viscous": [one.viscous_friction for one in cylinders],
         "static_ratio": rig.friction.static_ratio,
     }
 
 
-def scenario(name: str, packer: Packer) -> dict[str, Any]:
-    """A scenario: its stages, which are the same in every episode, and the path of its target."""
-    parts: tuple[Any, ...] = SCENARIOS[name].nominal()
-    for part in parts:
-        part.prepare(1)
-        part.begin(0, stream(SEED, 0, "reference"))
-    instants = np.linspace(0.0, SCENARIOS[name].duration, PATH_POINTS)
-    points = np.round(np.concatenate([parts[0].sample(np.array([t]))[:2] for t in instants], axis=1).T, 6)
-    trajectory, force, schedule = (packer.stage(part.stage()) for part in parts)
-    return {
-        "duration": SCENARIOS[name].duration,
-        "trajectory": trajectory,
-        "force": force,
-        "schedule": schedule,
-        "path": (points if np.ptp(points, axis=0).any() else points[:1]).tolist(),
-    }
+def scenario(name: str) -> dict[str, Part]:
+    """A scenario's parts, which are the same in every episode."""
+    target, force, setpoints = (_part(part.stage()) for part in begun(name, SEED, 0))  # type: ignore[union-attr]
+    return {"target": target, "setpoints": setpoints, "hand": force}
 
 
-def sensors(name: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
-    """A sensor model: its stages, and for each episode what its random numbers have put into their tables."""
-    model: Any = SENSORS[name](rig.electronics, 1)
-    episodes = []
+def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
+    """The parts of a sensor model, for each episode."""
+    model, period, episodes = SENSORS[name](rig.electronics, 1), rig.electronics.control_period, []  # type: Any, float, list[Any]
     for episode in range(EPISODES):
         model.begin(0, stream(SEED, episode, "sensors"))
-        own = [model.stage(), *([model.board_stage()] if hasattr(model, "board_stage") else [])]
-        episodes.append([[packed(table) for table in stage.tables] for stage in own])
-    drawn = [
-        [k for k, tables in enumerate(zip(*every, strict=True)) if len(set(tables)) > 1]
-        for every in zip(*episodes, strict=True)
-    ]
-    begun = [[{k: tables[k] for k in changing} for tables, changing in zip(every, drawn, strict=True)] for every in episodes]
-    return {"sampled": model.sampled, "stages": [packer.stage(stage) for stage in own], "begun": begun}
+        own = {"sensors": model.stage(), **({"board": model.board_stage()} if hasattr(model, "board_stage") else {})}
+        for stage in own.values():
+            stage.tables = tuple(table.copy() for table in stage.tables)
+        episodes.append({kind: _part(*on_their_clock(stage, period, INPUT_MEMORY)) for kind, stage in own.items()})
+    return episodes
 
 
-def controller(name: str, rig: Parameters, packer: Packer) -> dict[str, Any] | None:
-    """A controller whose law is compiled, for measured and for sampled positions; None where it is not."""
+def controller(name: str, rig: Parameters) -> dict[str, dict[str, Part]] | None:
+    """The parts of a controller whose law is compiled, for exact and for sampled positions; None where it is not."""
+    kinds = {"exact": False, "sampled": True}
     if name.startswith(f"{RESIDUAL}:"):
-        return residual(name.partition(":")[2], rig, packer)
+        policy = name.partition(":")[2]
+        return {
+            kind: dict(zip(("policy", "law"), residual_parts(rig, flag, policy), strict=True)) for kind, flag in kinds.items()
+        }
     try:
-        law = build_controller(name, rig)
+        compiled = isinstance(build_controller(name, rig), StagedController)
     except (ImportError, ValueError):
         return None
-    return _law(law, packer) if isinstance(law, StagedController) else None
+    return {kind: {"law": law_part(name, rig, flag)} for kind, flag in kinds.items()} if compiled else None
 
 
-def _law(law: StagedController, packer: Packer) -> dict[str, Any]:
-    kinds = {kind: [packer.stage(one) for one in law.law_stages(kind == "sampled")] for kind in ("measured", "sampled")}
-    return {**kinds, "damped": has_damping(law)}
+def _part(*own: Stage) -> Part:
+    return Part(own, {})
 
 
-def residual(policy: str, rig: Parameters, packer: Packer) -> dict[str, Any]:
-    """A law with a policy on top, whose stage is in a file of its own."""
-    settings = load_policy(best_policy(policy)).settings
-    law = ResidualLaw(rig, settings)
-    told = {"size": settings.size, "shown": law.shown.shape[0], "force_sensor": settings.force_sensor}
-    return {**_law(law, packer), "policy": {"file": policy_file(policy), **told}}
+def _all(tree: Any) -> Iterator[Part]:
+    if isinstance(tree, Part):
+        yield tree
+    else:
+        for one in tree.values() if isinstance(tree, dict) else tree:
+            yield from _all(one)
 
 
-def policy_file(policy: str) -> str:
-    """Where the stage of a policy is, below the folder of the rig."""
-    return f"policies/{re.sub(r'[^A-Za-z0-9_-]+', '.', policy)}.json"
-
-
-def packed_policies(rig: Parameters, packer: Packer, policies: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """File -> the stage of every policy that comes with the package and of ``policies``, of several seeds the best."""
-    files = {}
-    for name in (*shipped_names(), *policies):
-        stored = load_policy(best_policy(name))
-        periods, law = policy_periods(stored.settings.policy_period, rig), ResidualLaw(rig, stored.settings)
-        stage = policy_stage(stored.network, periods, stored.settings.size, law.shown.shape[0], parameter_column(rig), 1)
-        files[policy_file(name)] = packer.stage(stage)
-    return files
-
-
-def numbers_of_the_page() -> dict[str, float]:
-    """Constants of ``birthsim_live.rig``, which the worker shares."""
-    return {
-        "least_time": bridge.LEAST_TIME, "pace": bridge.PACE, "negligible": bridge.NEGLIGIBLE,
-        "setpoint_transition": setpoints.TRANSITION, "hand_transition": hand.TRANSITION,
-        "drag_limit": hand.DRAG_LIMIT, "patience": hand.PATIENCE, "drag_damping": hand.DRAG_DAMPING,
-        "every": recorder.EVERY, "longest": recorder.LONGEST, "slowest": clock.SLOWEST,
-    }  # fmt: skip
+def _numbered(tree: Any, store: Store) -> Any:
+    """The tree with the number of each part in its place."""
+    if isinstance(tree, Part):
+        return store.number(tree)
+    if isinstance(tree, dict):
+        return {name: _numbered(one, store) for name, one in tree.items()}
+    return [_numbered(one, store) for one in tree]

@@ -7,8 +7,9 @@ import pytest
 
 from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
 from birthsim_build.check.running import ROW, library_loop, node_rows
-from birthsim_build.image import HEAD
+from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
+from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
 from birthsim_env import StiffnessSchedule, UserForce
 from birthsim_env.parts.scenarios import SCENARIOS
 from tests.build.targets import assert_same_bits, need_program
@@ -90,6 +91,21 @@ def test_setpoints_of_a_person(in_node):
     assert_same_bits(rows[:, SHARED], expected[:, SHARED])
 
 
+def test_setpoints_and_a_hand_s_force_pass_over(in_node):
+    at, since = 1300, (np.arange(PERIODS) - 1300) * 1e-3  # a push of the scenario is on
+    later, once = np.where(since >= 0, 0.0, 1.0), np.where(since == 0, 1.0, 0.0)
+    inputs = {"keep_Kclx": later, "keep_force": later, "pass_setpoints": once, "pass_force": once}
+    rows = in_node(inputs={**inputs, "add_Kclx": np.where(since >= 0, 3000.0, 0.0)})
+    stiffness, force = rows[:, ROW["reference_Kclx"]], rows[:, ROW["force_x"]]
+    assert force[at - 1] > 1
+    assert (stiffness[at], force[at]) == (stiffness[at - 1], force[at - 1])
+    for found, start, end, lasts in ((stiffness, 2000.0, 3000.0, SETPOINTS_TIME), (force, force[at - 1], 0.0, FORCE_TIME)):
+        u = np.clip(since / lasts, 0.0, 1.0)[at:]
+        passed = u**3 * (10 - 15 * u + 6 * u * u)
+        assert found[at:] == pytest.approx(start + passed * (end - start), rel=1e-9, abs=1e-9)
+        assert found[-1] == end
+
+
 def test_one_valve_per_cylinder(in_node):
     rows = in_node({**LOOP, "valves": "one_valve"})
     assert_same_bits(rows[:, SHARED], loop_rows("circle", "ideal", LOOP["controller"], valves="one_valve")[:, SHARED])
@@ -118,6 +134,20 @@ def test_a_copy_goes_on_by_itself(loop):
     one[:] = 0
     advance(other, 500)
     assert (other[HEAD : HEAD + ROWS] == one_rows).all()
+
+
+def test_parts_are_left_out(loop):
+    advance, words = loop
+    rows = words[HEAD : HEAD + ROWS].view(np.float64)
+    advance(words, 50)
+    words[LEFT_OUT], before = ~1, rows.copy()  # all but the first, which is the law
+    assert advance(words, 1) == 0
+    changed = {name for name, number in ROW.items() if rows[number] != before[number]}
+    assert "opening_P1" in changed
+    assert not changed & {"time", "tick", "x", "Pp1", "measured_x", "reference_x"}
+    words[LEFT_OUT] = 0
+    advance(words, 1)
+    assert rows[ROW["time"]] == pytest.approx(0.051)
 
 
 def test_a_setpoint_that_cannot_be_served_is_counted(loop):

@@ -1,6 +1,6 @@
 """The rows that header and JavaScript name are those of the loops."""
 
-from birthsim_build.layout import INPUTS, LAYOUT, ROWS
+from birthsim_build.layout import LAYOUT, ROWS, Inputs
 from birthsim_env.loop.rows import SEEN, WORLD, Seen, World
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES
@@ -25,7 +25,7 @@ def test_rows_are_those_of_the_loop():
 
 
 def test_rows_fill_the_layout_without_gaps():
-    assert sum(row.count for row in LAYOUT) == ROWS == WORLD + SEEN + INPUTS
+    assert sum(row.count for row in LAYOUT) == ROWS == WORLD + SEEN + Inputs.size
     assert [row.number for row in LAYOUT[1:]] == [row.number + row.count for row in LAYOUT[:-1]]
 
 

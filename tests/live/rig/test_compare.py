@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.reading import read_log
 from birthsim_live.rig.frames import COLUMNS, FIELDS, SLICES, frame_of
-from birthsim_live.rig.hand import DRAG_LIMIT, Hold, Push, drag_force
+from birthsim_live.rig.hand import Hold, Push
 from birthsim_live.rig.player import Player
 from birthsim_live.rig.recorder import EVERY, Recorder
 from birthsim_live.rig.recording import FIRST_COLUMNS, load_recording, packed
@@ -96,7 +97,7 @@ def test_a_place_of_the_hand_pulls_each_head_by_its_own_spring_and_a_push_pushes
     assert same(rows[0][SLICES["pointer"]], rows[1][SLICES["pointer"]])
     for row in rows:
         motion = row[SLICES["position"]], row[SLICES["velocity"]]
-        assert same(row[SLICES["drag_force"]], drag_force(one.hands.hold.position, *motion, 1000.0))
+        assert same(row[SLICES["drag_force"]], 1000.0 * (one.hands.hold.position - motion[0]) - DRAG_DAMPING * motion[1])
     pulls = [row[SLICES["drag_force"]][0] for row in rows]
     assert pulls[0] > pulls[1] + 1  # dry friction keeps the first head back, so that its spring pulls harder
     one.hands.hold = Push(np.array([20.0, 0.0]), 2)

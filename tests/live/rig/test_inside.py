@@ -26,7 +26,7 @@ from birthsim_env.physics.compiled.lanes import (
 from birthsim_env.physics.geometry import amplification
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.frames import SLICES, row_of
+from birthsim_live.rig.frames import SLICES
 from birthsim_live.rig.inside import ROWS, look_inside
 from birthsim_live.rig.session import Session
 
@@ -85,8 +85,7 @@ def test_a_row_holds_them() -> None:
     session = Session(Parameters())
     session.advance(300)
     rows = np.empty((ROWS, 1))
-    plant = session._simulation.plant
-    look_inside(plant.state, parameter_array(Parameters(), 1), rows)
-    row = row_of(session._simulation, session.hands, 0.0)
+    look_inside(session.state, parameter_array(Parameters(), 1), rows)
+    row = session.row()
     assert np.array_equal(row[SLICES["friction"]], rows[:2, 0])
     assert np.array_equal(row[SLICES["flows"]], rows[2:, 0])

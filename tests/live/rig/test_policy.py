@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import shutil
 from pathlib import Path
 
@@ -11,10 +10,11 @@ import pytest
 
 from agents.policy.files import load_policy
 from agents.policy.seeds import SHIPPED, best_policy
+from birthsim_build.residual import residual_parts
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import opening_settings
-from birthsim_live.static.pack import Packer, pack, packed_policies
+from birthsim_live.static.pack import pack
 from tests.console import call
 
 RIG = Parameters()
@@ -43,25 +43,23 @@ def test_it_is_a_choice_and_the_page_opens_with_it(mine: str) -> None:
 
 
 def test_the_page_without_a_server_has_it_too(mine: str) -> None:
-    packer = Packer()
-    packed = pack(RIG, packer, [mine])
-    own = packed["controllers"][f"residual:{mine}"]["policy"]["file"]
-    assert packed["opens"] == {"controller": f"residual:{mine}"}
-    assert packed["settings"]["controller"] == "backstepping"
-    files = packed_policies(RIG, packer, [mine])
-    assert own in files
-    assert " " not in own
-    assert own.count("/") == 1
-    assert len(files) == len({one["policy"]["file"] for one in packed["controllers"].values() if "policy" in one})
+    packed = pack(RIG, [mine])
+    assert packed.content["opens"] == {"controller": f"residual:{mine}"}
+    assert packed.content["settings"]["controller"] == "backstepping"
+    numbers = packed.content["parts"]["controllers"]
+    copied, other = numbers[f"residual:{mine}"], numbers["residual:forceps"]
+    assert copied["exact"]["policy"] == copied["sampled"]["policy"]  # kept once
+    assert copied["exact"]["policy"] != other["exact"]["policy"]
 
 
 def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
     name = "circle_honest_student"
-    file = pack(RIG, Packer())["controllers"][f"residual:{name}"]["policy"]["file"]
-    packed = packed_policies(RIG, Packer())[file]
+    policy, _ = residual_parts(RIG, True, name)
     cells = load_policy(best_policy(name)).network.cells
     assert cells > 0
-    np.testing.assert_array_equal(np.frombuffer(base64.b64decode(packed["memory"])), np.zeros(1 + cells))
+    memory = policy.stages[-1].memory
+    assert memory is not None
+    np.testing.assert_array_equal(memory[:, 0], np.zeros(1 + cells))
     session = Session(RIG)
     session.change({"controller": f"residual:{name}", "sensors": "honest"})
     session.advance(200)

@@ -11,16 +11,17 @@ import pytest
 
 import birthsim_env
 from baselines.registry import make_controller
+from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.bridge import Course
 from birthsim_live.rig.frames import SLICES, frame_of
-from birthsim_live.rig.hand import DRAG_DAMPING, DRAG_LIMIT, Hold, drag_force
+from birthsim_live.rig.hand import Hold
 from birthsim_live.rig.session import Session
 from birthsim_live.rig.settings import default_settings
 from birthsim_live.server.protocol import encode
+from tests.live.rig.course import Course
 
 RIG = Parameters()
 
@@ -130,7 +131,7 @@ def test_setpoints_pass_over_with_consistent_rates() -> None:
     rows = []
     for _ in range(80):
         one.advance(1)
-        rows.append(one._simulation.reference.rows[:, 0].copy())
+        rows.append(one.lane.reference.rows[:, 0])
     asked = np.array(rows)
     assert asked[0, 8] < 2050
     assert asked[-1, 8:12].tolist() == [4000.0, 2000.0, 3000.0, 2300.0]
@@ -154,10 +155,10 @@ def test_mass_and_friction_change_the_rig_but_not_what_the_controller_believes()
             }
         )
     )
-    assert np.array_equal(one._simulation.plant.lane_parameters[:, 0], plant)
+    assert np.array_equal(one.lane.world.rig[:, 0], plant)
     assert one.controller.parameters == RIG  # type: ignore[attr-defined]
     one.reset()
-    assert np.array_equal(one._simulation.plant.lane_parameters[:, 0], plant)
+    assert np.array_equal(one.lane.world.rig[:, 0], plant)
 
 
 def test_the_next_episode_follows_without_a_jump() -> None:
@@ -182,20 +183,21 @@ def test_the_next_episode_follows_without_a_jump() -> None:
 @pytest.mark.parametrize(("first", "second"), list(permutations(SCENARIOS, 2)))
 def test_bridges_between_scenarios_stay_in_the_workspace(first: str, second: str) -> None:
     for now in (0.7, 2.9):
-        course, rng = Course(SCENARIOS[first].nominal()[0]), np.random.default_rng(0)
-        course.prepare(1)
-        course.begin(0, rng)
-        course.follow(SCENARIOS[second].nominal()[0], rng, now)
-        samples = np.concatenate([course.sample(np.array([t]))[:2] for t in np.arange(now, now + 4, 0.02)], axis=1)
+        course = Course(SCENARIOS[first].nominal()[0])
+        course.follow(SCENARIOS[second].nominal()[0], now)
+        samples = np.stack([course.sample(t)[:2] for t in np.arange(now, now + 4, 0.02)], axis=1)
         inverse_geometry(samples, RIG)
 
 
-def test_the_drag_is_a_saturated_spring_with_a_damper() -> None:
-    position, velocity = np.array([0.5, 0.0]), np.array([0.1, -0.2])
-    force = drag_force(np.array([0.52, 0.01]), position, velocity, 1500.0)
-    assert force == pytest.approx([30.0 - 0.1 * DRAG_DAMPING, 15.0 + 0.2 * DRAG_DAMPING])
-    far = drag_force(np.array([3.5, 4.0]), position, 0 * velocity, 1500.0)
-    assert far == pytest.approx([DRAG_LIMIT * 0.6, DRAG_LIMIT * 0.8])
+@pytest.mark.parametrize(("pointer", "limited"), [([0.53, 0.01], False), ([3.5, 4.0], True)])
+def test_the_drag_is_a_saturated_spring_with_a_damper(pointer: list[float], limited: bool) -> None:
+    one = session(drag_stiffness=1500.0)
+    one.hands.hold = Hold(np.array(pointer), 1)
+    one.advance(30)
+    position, velocity = part(one, "position"), part(one, "velocity")
+    assert np.abs(velocity).max() > 0.01
+    pull = 1500.0 * (pointer - position) - DRAG_DAMPING * velocity
+    assert part(one, "drag_force") == pytest.approx(pull * DRAG_LIMIT / np.linalg.norm(pull) if limited else pull)
 
 
 def test_releasing_lets_go() -> None:

@@ -41,12 +41,10 @@ def whole(tmp_path_factory):
 def built(tmp_path_factory):
     """With a few controllers."""
     from birthsim_live.rig import settings
-    from birthsim_live.static import pack
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(settings, "listed_names", lambda: FEW)
-        for module in (seeds, pack):
-            patch.setattr(module, "shipped_names", lambda: ["circle"])
+        patch.setattr(seeds, "shipped_names", lambda: ["circle"])
         return _built(tmp_path_factory, patch)
 
 

@@ -26,19 +26,16 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(LACK) and os.environ.get
 LARGEST = 1.5e6  # bytes
 SOONEST = 2.0  # s from the address to a rig that moves
 ROWS = """async (cases) => {
-  const { Machine } = await import(new URL("static/worker/machine.js", location));
+  const { load } = await import(new URL("rig/birthsim.js", location));
   const { Session } = await import(new URL("static/worker/session.js", location));
   const { rowOf } = await import(new URL("static/worker/frames.js", location));
   const read = async (name) => await fetch(new URL(`rig/${name}`, location));
-  const [pack, code] = [await (await read("pack.json")).json(), await (await read("loop.wasm")).arrayBuffer()];
+  const pack = await (await read("pack.json")).json();
+  const [code, data] = [await (await read("loop.wasm")).arrayBuffer(), await (await read("loop.bin")).arrayBuffer()];
   const found = [];
-  const policyOf = async (name) => {
-    const file = pack.controllers[name]?.policy?.file;
-    return file && (await (await read(file)).json());
-  };
   for (const { settings, periods, hold } of cases) {
-    const session = new Session(pack, await Machine.of(code));
-    session.change(settings, await policyOf(settings.controller), await policyOf(settings.compare));
+    const session = new Session(pack, await load({ code, data }));
+    session.change(settings);
     session.reset();
     if (hold) session.hands.hold = { ...hold, id: 1 };
     const rows = [];
@@ -57,14 +54,16 @@ ROWS = """async (cases) => {
 
 
 SILENT = """async () => {
-  const { Machine } = await import(new URL("static/worker/machine.js", location));
+  const { load } = await import(new URL("rig/birthsim.js", location));
   const { Hub } = await import(new URL("static/worker/hub.js", location));
   const pack = await (await fetch(new URL("rig/pack.json", location))).json();
-  const machine = await Machine.of(await (await fetch(new URL("rig/loop.wasm", location))).arrayBuffer());
+  const read = async (name) => (await fetch(new URL(`rig/${name}`, location))).arrayBuffer();
+  const [code, data] = [await read("loop.wasm"), await read("loop.bin")];
+  const bundle = await load({ code, data });
   pack.numbers.patience = 0.2;
   const held = [];
   return new Promise((resolve) => {
-    const hub = new Hub(pack, machine, null, ({ type, pointer }) => {
+    const hub = new Hub(pack, bundle, ({ type, pointer }) => {
       if (type === "frame") held.push(pointer !== null);
       if (held.includes(true) && held.at(-1) === false) resolve(true);
     });

@@ -8,20 +8,22 @@ const INFO = {
   pneumatic_setpoint: "pneumatic_stiffness_setpoint", friction: "friction", flows: "flows",
 };
 
-const NOWHERE = [NaN, NaN];
-
 /** The present instant: name -> numbers, in the order of FIELDS. */
 export function instant(session) {
-  const { show, seen, world, pack, hands } = session;
-  show.run(seen, world);
+  const { pack, hands } = session;
+  const info = session.shown();
   const known = {
     time: [session.time],
     episode_time: [session.episodeTime],
-    scenario_force: hands.scenarioNow,
-    drag_force: hands.dragNow,
-    pointer: hands.pointer ?? NOWHERE,
+    scenario_force: session.some("scenario_force_x", 2),
+    drag_force: session.some("pointer_force_x", 2),
+    pointer: hands.pointer(session.some("x", 2), session.loop.get("pointer_stiffness")),
   };
-  return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? show.memory.some(...pack.info[INFO[name]])]));
+  const of = (name) => {
+    const [first, count] = pack.info[INFO[name]];
+    return Array.from(info.subarray(first, first + count));
+  };
+  return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? of(name)]));
 }
 
 /** The present instant as a row of numbers. */

@@ -7,15 +7,13 @@ import { Session } from "./session.js";
 import { checked } from "./settings.js";
 
 export class Hub {
-  /** `fetched(file)` fetches the stage of a policy, `post` sends a message to the page. */
-  constructor(pack, machine, fetched, post) {
-    Object.assign(this, { pack, fetched, post });
-    this.session = new Session(pack, machine);
+  /** `post` sends a message to the page. */
+  constructor(pack, bundle, post) {
+    Object.assign(this, { pack, post });
+    this.session = new Session(pack, bundle);
     this.clock = new Clock(this.session, frameOf, (frame) => this.onFrame(frame));
     this.told = {};
     this.lastRecording = null;
-    this.policies = {};
-    this.setting = Promise.resolve();
   }
 
   start() {
@@ -66,35 +64,18 @@ export class Hub {
     this.post({ type: "pong", id });
   }
 
-  /** One after the other: a policy may have to be fetched first. */
   on_set({ settings }) {
-    const changes = checked(settings, this.pack);
-    const set = async () => {
-      const policies = [await this.policyOf(changes.controller), await this.policyOf(changes.compare)];
-      const { time } = this.session;
-      this.session.change(changes, ...policies);
-      if (this.session.time < time) this.clock.pace.restart(); // what is compared starts anew
-    };
-    const done = this.setting.then(set);
-    this.setting = done.catch(() => {});
-    return done;
+    const { time } = this.session;
+    this.session.change(checked(settings, this.pack));
+    if (this.session.time < time) this.clock.pace.restart(); // what is compared starts anew
   }
 
-  /** The stage of a controller's policy, where it has one. */
-  async policyOf(controller) {
-    const file = this.pack.controllers[controller]?.policy?.file;
-    if (file) this.policies[file] ??= await this.fetched(file);
-    return this.policies[file];
-  }
-
-  async on_reset() {
-    await this.setting;
+  on_reset() {
     this.session.reset();
     this.clock.pace.restart();
   }
 
   async on_record({ on }) {
-    await this.setting;
     const { session } = this;
     if (on) session.recorder ??= new Recorder(session, nameOf(new Date()));
     else await this.endRecording();

@@ -1,139 +1,122 @@
 // A rig that a person plays with, and one beside it to compare (birthsim_live/rig/session.py): control periods, no clock.
 
-import { Law } from "./law.js";
-import { doublesOf } from "./machine.js";
-import { Course, Hands, Setpoints } from "./parts.js";
+import { INDEX, Loop, ROW } from "../../rig/birthsim.js";
 import { NOTHING, merged } from "./settings.js";
 
+// Parts that run together.
+const LAW = ["policy", "law"];
+const ASK = ["clock", "target", "setpoints", "hand", "inputs"];
+const START = ["clock", "target", "setpoints", "inputs", "start"];
+const MEASURE = ["sensors"];
+const MOVE = ["valves", "board", "plant", ...ASK, ...MEASURE];
+const SHOW = ["show"];
+// Parts that are exchanged together.
+const SCENARIO = ["target", "setpoints", "hand"];
+const SENSORS = ["sensors", "board"];
+
 export class Session {
-  /** `policy` as of `lawOf`. */
-  constructor(pack, machine, settings = pack.settings, policy = null) {
+  /** `bundle` of code and parts. */
+  constructor(pack, bundle, settings = pack.settings) {
     this.pack = pack;
-    this.machine = machine;
+    this.bundle = bundle;
     this.numbers = pack.numbers;
-    this.rows = pack.rows;
-    this.period = pack.period;
+    this.period = bundle.period;
     this.settings = { ...settings };
     this.lost = null;
     this.paths = 0;
     this.recorder = null;
     this.second = null; // the rig beside it: the same world, settings and hand under the controller `settings.compare`
-    this.low = doublesOf(pack.range.low);
-    this.high = doublesOf(pack.range.high);
-    this.column = doublesOf(pack.rig.column);
-    this.world = machine.rows(this.rows.WORLD);
-    this.seen = machine.rows(this.rows.SEEN);
-    const { plant, begin, show, valves } = pack.stages;
-    this.plant = machine.stage(plant);
-    this.beginning = machine.stage(begin);
-    this.show = machine.stage(show);
-    this.valves = Object.fromEntries(Object.entries(valves).map(([name, stage]) => [name, machine.stage(stage)]));
-    this.scenarios = {};
-    this.models = {};
-    this.laws = {};
-    this.law = this.lawOf(this.settings.controller, policy);
-    const { trajectory, force, schedule, duration } = this.scenario(this.settings.scenario);
-    this.duration = duration;
-    this.course = new Course(this, trajectory);
-    this.setpoints = new Setpoints(this, schedule);
-    this.hands = new Hands(this, force, this.settings.scenario_force, this.settings.drag_stiffness);
-    this.episode = 0;
-    this.exchange(this.settings.sensors);
+    this.hands = new Hands();
+    this.loop = new Loop(bundle, bundle.rows(INDEX.zero), pack.parts.rig);
+    this.put(["valves"], pack.parts.valves[settings.valves]);
     this.reset();
   }
 
   /** s since the last reset. */
   get time() {
-    return this.seen.get(this.rows.TIME);
+    return this.loop.get("time");
   }
 
   /** s since the scenario's present episode began. */
   get episodeTime() {
-    return this.time - this.course.begins;
+    return this.time - this.loop.get("begins");
   }
 
-  /** The stages of a scenario, made once. */
-  scenario(name) {
-    const { trajectory, force, schedule, ...rest } = this.pack.scenarios[name];
-    this.scenarios[name] ??= {
-      ...rest,
-      trajectory: this.machine.stage(trajectory),
-      force: this.machine.stage(force),
-      schedule: this.machine.stage(schedule),
-    };
-    return this.scenarios[name];
+  get duration() {
+    return this.pack.scenarios[this.settings.scenario].duration;
   }
 
-  /** A controller, made once, fresh; `policy` is the stage of its policy, where it has one. */
-  lawOf(name, policy) {
-    this.laws[name] ??= new Law(this, this.pack.controllers[name], policy);
-    this.laws[name].reset();
-    return this.laws[name];
+  /** `count` rows from the one called `name` on. */
+  some(name, count) {
+    return Array.from(this.loop.rows.subarray(ROW[name], ROW[name] + count));
   }
 
-  /** Measure with another sensor model from the next instant on. */
-  exchange(name) {
-    const { sampled, stages } = this.pack.sensors[name];
-    this.models[name] ??= stages.map((stage) => this.machine.stage(stage));
-    this.model = { name, sampled, stages: this.models[name] };
-    this.beginSensors();
+  fill(name, values) {
+    this.loop.rows.set(values, ROW[name]);
   }
 
-  beginSensors() {
-    const { begun } = this.pack.sensors[this.model.name];
-    begun[this.episode % begun.length].forEach((tables, k) => {
-      for (const [table, bytes] of Object.entries(tables)) this.model.stages[k].fill(Number(table), bytes);
-    });
-    this.first = null;
+  /** What the part `show` makes of this instant. */
+  shown() {
+    this.loop.advance(1, SHOW);
+    return this.loop.memory("show");
   }
 
-  /** Run a stage of the sensors on their own clock, which starts where they first measure. */
-  onTheirClock(stage) {
-    const { rows, world, seen } = this;
-    const [tick, time] = [world.get(rows.TICK), seen.get(rows.TIME)];
-    if (this.first > 0) {
-      world.set(rows.TICK, tick - this.first);
-      seen.set(rows.TIME, (tick - this.first) * this.period);
-    }
-    stage.run(seen, world);
-    world.set(rows.TICK, tick);
-    seen.set(rows.TIME, time);
+  put(names, parts) {
+    for (const name of names) this.loop.exchange(name, parts[name]);
   }
 
-  measure() {
-    const { rows, seen } = this;
-    this.first ??= this.world.get(rows.TICK);
-    this.onTheirClock(this.model.stages[0]);
-    if (this.first > 0) seen.set(rows.POSITION_TIME, seen.get(rows.POSITION_TIME) + this.first * this.period);
-    this.sampled = this.model.sampled;
+  /** A fresh controller, for what the last measurement was. */
+  putLaw() {
+    this.lawSampled = this.sampled;
+    this.put(LAW, this.pack.parts.controllers[this.settings.controller][this.sampled ? "sampled" : "exact"]);
+    this.damped = this.pack.damped[this.settings.controller];
+    this.loop.set("damping_factor", 0);
   }
 
-  look() {
-    this.course.run();
-    this.setpoints.run();
-    this.hands.run();
-    this.measure();
+  putSensors() {
+    const episodes = this.pack.parts.sensors[this.settings.sensors];
+    this.put(SENSORS, episodes[this.episode % episodes.length]);
+    this.loop.set("sensors_begin", this.loop.get("tick") + 1);
+  }
+
+  putScenario() {
+    this.put(SCENARIO, this.pack.parts.scenarios[this.settings.scenario]);
+  }
+
+  measured() {
+    this.sampled = this.pack.sampled[this.settings.sensors];
+  }
+
+  /** Let what has been changed (of `pack.passes`) pass over smoothly from this instant on. */
+  passOver(...what) {
+    this.pack.passes.forEach((name) => this.loop.set(`pass_${name}`, Number(what.includes(name))));
+    this.loop.advance(1, ASK);
+  }
+
+  /** Ask for setpoints that are chosen, or for the scenario's. */
+  choose(values) {
+    this.fill("keep_Kclx", new Array(7).fill(values ? 0 : 1));
+    this.fill("add_Kclx", values ?? [0, 0, 0, 0]);
   }
 
   /** Start the scenario anew: pistons on the target, in balance, at time zero. The settings stay. */
   reset() {
-    const { rows, world, seen } = this;
-    this.describeRig();
+    const { loop, settings } = this;
     this.episode = 0;
     this.lost = null;
-    world.set(rows.TICK, 0);
-    seen.set(rows.TIME, 0);
-    this.setpoints.choose(chosen(this.settings));
-    for (const part of [this.course, this.setpoints, this.hands]) part.restart();
-    this.beginSensors();
-    seen.fill(rows.OPENING, [0, 0, 0, 0]);
-    world.fill(rows.IMPACT, [0, 0]);
-    this.plant.restart();
-    this.course.run();
-    this.setpoints.run();
-    this.beginning.run(seen, world);
-    this.look();
-    this.law.reset();
+    this.putScenario();
+    this.putSensors();
+    this.describeRig();
+    for (const name of ["tick", "time", "begins", "sensors_begin"]) loop.set(name, 0);
+    this.fill("opening_P1", [0, 0, 0, 0]);
+    loop.rows.fill(0, ROW.passages_target_begins, ROW.given_x);
+    loop.set("keep_force", Number(settings.scenario_force));
+    loop.set("pointer_stiffness", settings.drag_stiffness);
+    this.choose(chosen(settings));
+    this.hands.act(this);
+    for (const parts of [START, ASK, MEASURE]) loop.advance(1, parts);
+    this.measured();
+    this.putLaw();
     this.paths += 1;
     if (!this.second) return;
     this.second.hands.hold = this.hands.hold;
@@ -142,59 +125,61 @@ export class Session {
 
   /** Write the rig that moves: mass and friction as set. */
   describeRig() {
-    const { rows, coulomb, viscous, static_ratio: ratio } = this.pack.rig;
+    const { column, coulomb, viscous, static_ratio: ratio } = this.pack.rig;
     const { mass, friction } = this.settings;
-    this.world.fill(0, this.column);
-    this.world.set(rows.mass, mass);
-    this.world.set(rows.inverse_mass, 1 / mass);
+    this.loop.rows.set(column);
+    this.loop.set("rig_mass", mass);
+    this.loop.set("rig_inverse_mass", 1 / mass);
     coulomb.forEach((force, k) => {
-      this.world.set(rows[`fc${k + 1}`], force * friction);
-      this.world.set(rows[`fs${k + 1}`], ratio * (force * friction));
-      this.world.set(rows[`fv${k + 1}`], viscous[k] * friction);
+      this.loop.set(`rig_fc${k + 1}`, force * friction);
+      this.loop.set(`rig_fs${k + 1}`, ratio * (force * friction));
+      this.loop.set(`rig_fv${k + 1}`, viscous[k] * friction);
     });
   }
 
-  /**
-   * Apply checked settings; the rig keeps its state and its motion, unless another pair of controllers is to be compared.
-   * `policy` and `compared`, that of the second rig, as of `lawOf`.
-   */
-  change(changes, policy, compared) {
+  /** Apply checked settings; the rig keeps its state and its motion, unless another pair of controllers is to be compared. */
+  change(changes) {
     const before = this.settings;
     const after = merged(before, changes, this.scenarioSetpoints());
-    if (after.controller !== before.controller) this.law = this.lawOf(after.controller, policy);
     this.settings = after;
+    if (after.controller !== before.controller) this.putLaw();
     this.describeRig();
+    const passes = [];
+    const [now, then] = [chosen(after), chosen(before)];
+    if (JSON.stringify(now) !== JSON.stringify(then)) {
+      this.choose(now);
+      passes.push("setpoints");
+    }
+    if (after.scenario_force !== before.scenario_force) {
+      this.loop.set("keep_force", Number(after.scenario_force));
+      passes.push("force");
+    }
+    if (after.sensors !== before.sensors) this.putSensors();
+    if (after.valves !== before.valves) this.put(["valves"], this.pack.parts.valves[after.valves]);
     if (after.scenario !== before.scenario) {
-      this.duration = this.scenario(after.scenario).duration;
       this.episode = 0;
       this.follow();
-    }
-    const [now, then] = [chosen(after), chosen(before)];
-    if (JSON.stringify(now) !== JSON.stringify(then)) this.setpoints.choose(now);
-    if (after.sensors !== before.sensors) this.exchange(after.sensors);
-    if (after.scenario_force !== before.scenario_force) this.hands.want(after.scenario_force);
-    this.hands.stiffness = after.drag_stiffness;
-    this.compare(before, changes, compared);
+    } else if (passes.length) this.passOver(...passes);
+    this.loop.set("pointer_stiffness", after.drag_stiffness);
+    this.compare(before, changes);
   }
 
   /** Let the second rig follow the settings, come or go. */
-  compare(before, { controller, compare, ...others }, policy) {
+  compare(before, { controller, compare, ...others }) {
     const now = this.settings;
     if (now.compare === NOTHING) this.second = null;
     else if (this.second && now.compare === before.compare) this.second.change(others);
     else {
-      const own = { ...now, controller: now.compare, compare: NOTHING };
-      this.second = new Session(this.pack, this.machine.another(), own, policy);
+      this.second = new Session(this.pack, this.bundle, { ...now, controller: now.compare, compare: NOTHING });
     }
     if (this.second && (now.controller !== before.controller || now.compare !== before.compare)) this.reset();
   }
 
   /** Go over to the start of an episode of the scenario. */
   follow() {
-    const { trajectory, force, schedule } = this.scenario(this.settings.scenario);
-    this.course.follow(trajectory);
-    this.hands.follow(force);
-    this.setpoints.follow(schedule);
+    this.putScenario();
+    this.loop.set("begins", this.time);
+    this.passOver(...this.pack.passes);
     this.paths += 1;
   }
 
@@ -214,20 +199,16 @@ export class Session {
   }
 
   advanceOne() {
-    const { rows, seen, world } = this;
-    const openings = this.law.openings(seen, this.sampled, this.settings.damping);
-    if (openings === null) {
-      this.lost = `${this.settings.controller} gives up: it has no gains for these setpoints.`;
+    const { loop, settings } = this;
+    if (this.sampled !== this.lawSampled) this.putLaw();
+    if (this.damped) loop.set("damping_factor", settings.damping);
+    if (loop.advance(1, LAW)) {
+      this.lost = `${settings.controller} gives up: it has no gains for these setpoints.`;
       return;
     }
-    const valves = this.settings.valves;
-    const action = valves === "two_valves" ? openings : [(openings[0] - openings[1]) / 2, (openings[2] - openings[3]) / 2];
-    seen.fill(rows.ACTION, action);
-    world.fill(rows.IMPACT, [0, 0]);
-    this.valves[valves].run(seen);
-    if (this.model.stages.length > 1 && this.first !== null) this.onTheirClock(this.model.stages[1]);
-    this.plant.run(seen, world);
-    this.look();
+    this.hands.act(this);
+    loop.advance(1, MOVE);
+    this.measured();
     this.lost = this.leftRange();
     if (this.lost === null && this.episodeTime > this.duration - this.period / 2) {
       this.episode += 1;
@@ -236,14 +217,13 @@ export class Session {
   }
 
   leftRange() {
-    const state = this.world.some(this.rows.STATE, this.low.length);
-    const row = state.findIndex((value, k) => !(value > this.low[k] && value < this.high[k]));
-    if (row < 0) return null;
-    if (!state.every(Number.isFinite)) return "the state is no longer finite";
-    const [kind, unit] = this.pack.range.names[row].startsWith("P") ? ["pressure", "Pa"] : ["temperature", "K"];
-    const chamber = this.pack.range.names[row].slice(1).toUpperCase();
-    const words = [state[row], this.low[row], this.high[row]].map((value) => Number(value.toPrecision(6)));
-    return `${kind} of chamber ${chamber} = ${words[0]} ${unit}; the model holds from ${words[1]} to ${words[2]}`;
+    const { pack, loop } = this;
+    const name = Object.keys(pack.range).find((one) => !(loop.get(one) > pack.range[one][0] && loop.get(one) < pack.range[one][1]));
+    if (!name && Number.isFinite(loop.get("v1"))) return null;
+    if (!name || !Number.isFinite(loop.get(name))) return "the state is no longer finite";
+    const [kind, unit] = name.startsWith("P") ? ["pressure", "Pa"] : ["temperature", "K"];
+    const words = [loop.get(name), ...pack.range[name]].map((value) => Number(value.toPrecision(6)));
+    return `${kind} of chamber ${name.slice(1).toUpperCase()} = ${words[0]} ${unit}; the model holds from ${words[1]} to ${words[2]}`;
   }
 
   /** Both rigs stand still where one is lost. */
@@ -253,18 +233,41 @@ export class Session {
 
   /** What the scenario asks for at this time. */
   scenarioSetpoints() {
-    const asked = this.setpoints.scenario();
+    const asked = this.some("scenario_Kclx", 4);
     return Object.fromEntries(this.pack.stiffnesses.map((name, k) => [name, Math.round(1e3 * asked[k]) / 1e3]));
   }
 
   /** The settings as the page shows them: with the scenario's setpoints where they hold. */
   shownSettings() {
     const given = this.settings.stiffness_source === "scenario" ? this.scenarioSetpoints() : {};
-    return { ...this.settings, ...given, damping_applies: this.law.damped || Boolean(this.second?.law.damped) };
+    return { ...this.settings, ...given, damping_applies: this.damped || Boolean(this.second?.damped) };
   }
 
   path() {
     return this.pack.scenarios[this.settings.scenario].path;
+  }
+}
+
+/** What the person's hand does, or null: { position, id } of a hand at a place, { force, id } of one that pushes. */
+class Hands {
+  constructor() {
+    this.hold = null;
+    this.used = null;
+  }
+
+  /** Do so from now on. */
+  act(session) {
+    const { position, force, id } = this.hold ?? {};
+    session.loop.set("pointer_held", Number(Boolean(position)));
+    if (position) session.fill("pointer_x", position);
+    session.fill("push_x", force ?? [0, 0]);
+    this.used = id ?? this.used;
+  }
+
+  /** Where the spring from `place` ends, or would end for a hand that pushes; nowhere where there is no hand. */
+  pointer(place, stiffness) {
+    const { position, force } = this.hold ?? {};
+    return position ?? place.map((value, k) => (force ? value + force[k] / stiffness : NaN));
   }
 }
 

@@ -1,7 +1,7 @@
 // The rig in a worker: it loads what was built, says hello, and takes the page's messages from then on.
 
+import { load } from "../../rig/birthsim.js";
 import { Hub } from "./hub.js";
-import { Machine } from "./machine.js";
 
 const place = (name) => new URL(`../../rig/${name}`, import.meta.url);
 
@@ -12,8 +12,8 @@ async function fetched(name) {
 }
 
 async function begin() {
-  const [pack, code] = await Promise.all([fetched("pack.json"), fetched("loop.wasm")]);
-  return new Hub(pack, await Machine.of(code), fetched, (message) => postMessage(message));
+  const [pack, code, data] = await Promise.all(["pack.json", "loop.wasm", "loop.bin"].map(fetched));
+  return new Hub(pack, await load({ code, data }), (message) => postMessage(message));
 }
 
 const hub = begin();

@@ -1,7 +1,4 @@
-"""Stages that only a rig in the browser needs: its start, and what a frame shows.
-
-They wrap the kernels of the packages, so that the browser computes what Python computes.
-"""
+"""Stages that only the page's rig has: its start, and what a frame shows of it."""
 
 from __future__ import annotations
 
