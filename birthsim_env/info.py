@@ -42,16 +42,16 @@ FIELDS = {name: (count, f"{unit}, {about}") for name, unit, about, count in Info
 @helper
 def describe(world: World, seen: Signals, info: Info, n: int) -> None:
     """Writes all fields of n lanes."""
-    state, p, reference = world.state, world.rig, seen.reference
+    state, p, reference, motion = world.state, world.rig, seen.reference, world.motion
     for i in range(n):
         info.time[i], info.since_jump[i] = seen.time[i], world.since_jump[i]
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         given = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
         for k in range(2):
             compliant = reference.position[k, i] + given[k]
-            info.position[k, i], info.velocity[k, i] = world.motion[k, i], world.motion[2 + k, i]
+            info.position[k, i], info.velocity[k, i] = motion.position[k, i], motion.velocity[k, i]
             info.target[k, i], info.compliant_target[k, i] = reference.position[k, i], compliant
-            info.tracking_error[k, i] = world.motion[k, i] - compliant
+            info.tracking_error[k, i] = motion.position[k, i] - compliant
             info.user_force[k, i], info.stiffness_setpoint[k, i] = world.force[k, i], reference.stiffness[k, i]
             info.pneumatic_stiffness_setpoint[k, i] = reference.pneumatic_stiffness[k, i]
             info.impact_speed[k, i] = world.impact[k, i]

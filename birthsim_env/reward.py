@@ -98,8 +98,8 @@ def assess(
             due = kept * (owed.owed[axis, i] + (change if jumped else 0.0))
             asked = given[axis] - due
             rate = (asked - owed.given[axis, i] + owed.owed[axis, i]) / limits.period
-            error += abs(world.motion[axis, i] - reference.position[axis, i] - asked)
-            speed += abs(world.motion[2 + axis, i] - reference.velocity[axis, i] - rate)
+            error += abs(world.motion.position[axis, i] - reference.position[axis, i] - asked)
+            speed += abs(world.motion.velocity[axis, i] - reference.velocity[axis, i] - rate)
             owed.given[axis, i], owed.owed[axis, i] = given[axis], due
         cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
         hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)

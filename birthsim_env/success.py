@@ -36,8 +36,8 @@ def add(world: World, reference: Reference, failed: Array, tally: Tally, success
     for i in range(n):
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         given_x, given_y = compliance(world.force[0, i], world.force[1, i], kx, ky, kxy)
-        x = world.motion[0, i] - reference.position[0, i] - given_x
-        y = world.motion[1, i] - reference.position[1, i] - given_y
+        x = world.motion.position[0, i] - reference.position[0, i] - given_x
+        y = world.motion.position[1, i] - reference.position[1, i] - given_y
         tally.squares[i] += x * x + y * y
         tally.steps[i] += 1.0
         if world.since_jump[i] >= SETTLED:

@@ -61,8 +61,10 @@ NAMES = (
 VALVE_NAMES = tuple(f"opening of the valve of chamber {chamber}, 1" for chamber in ("P1", "N1", "P2", "N2"))
 """What they say without a law."""
 
-MET = tuple(f"unexplained force on piston {i}, {about}, {FORCE_UNIT:g} N" for i, _, about, _ in unexplained.Met.entries())
-"""What is said of ``unexplained.Met``."""
+UNEXPLAINED = tuple(
+    f"unexplained force on piston {i}, {when}, {FORCE_UNIT:g} N" for i, _, when, _ in unexplained.Forces.entries()
+)
+"""What is said of ``unexplained.Forces``."""
 
 
 def action_names(settings: ResidualSettings) -> tuple[str, ...]:
@@ -73,7 +75,7 @@ def action_names(settings: ResidualSettings) -> tuple[str, ...]:
 def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
     """What each row of ``ResidualLaw.memory`` says."""
     smooth = (f"smoothed action: {name}" for name in action_names(settings))
-    return (*smooth, *(f"fraction of the authority on cylinder {i}, 1" for i in (1, 2)), *MET)
+    return (*smooth, *(f"fraction of the authority on cylinder {i}, 1" for i in (1, 2)), *UNEXPLAINED)
 
 
 def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
@@ -113,8 +115,8 @@ class Memory(Rows):
 
     smooth = rows(max(VALVES, *IMPEDANCES.values()), "1", "smoothed action")
     limiter = part(authority.Limiter, "authority")
-    met = part(unexplained.Met, "forces met")
-    ways = part(unexplained.Ways, "which ways pistons have moved")
+    moved = part(unexplained.Moved, "which ways pistons have moved")
+    unexplained = part(unexplained.Forces, "unexplained forces")
     pistons = part(Pistons, "observer")
 
 
@@ -174,7 +176,7 @@ def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, l
     own = Memory(block(memory, Memory.size + int(about.more_rows))[:, :n])
     joints, said = Joints(scratch(Joints.size)[:, :n]), Correction(scratch(Correction.size)[:, :n])
     _observe(signals, own.pistons, about, joints)
-    unexplained.remember(joints, own.pistons.disturbance, belief.rig, belief.period, own.ways, own.met)
+    unexplained.remember(joints, own.pistons.disturbance, belief.rig, belief.period, own.moved, own.unexplained)
     limiter, action, shown, asked, target = own.limiter, signals.action[:size], signals.shown, signals.asked, signals.reference
     authority.limit_authority(joints, target, belief.rig, belief.period, about.level, limiter)
     _correct(action, limiter.left, about, own.smooth, said)
@@ -188,8 +190,8 @@ def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, l
             said.powers[k, i] = said.powers[k, i] - limiter.softness[i]
             shown[size + k, i] = limiter.left[k, i]
         signals.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
-        for k in range(unexplained.Met.size):
-            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, own.met.rows[k, i] / about.unit))
+        for k in range(unexplained.Forces.size):
+            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, own.unexplained.rows[k, i] / about.unit))
         for valve in range(4 if about.has_law == 0.0 else 0):
             signals.opening[valve, i] = action[valve, i]
     if about.stiffens > 0.0:
@@ -208,7 +210,7 @@ class ResidualLaw(StagedController):
         # Whichever law it is can be told of forces; those that have an impedance also of a damping factor.
         self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
         self.action: Array = np.zeros((settings.size, 0))
-        self.shown: Array = np.zeros((settings.size + len(MET) + 2, 0))
+        self.shown: Array = np.zeros((settings.size + len(UNEXPLAINED) + 2, 0))
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
@@ -271,7 +273,7 @@ class ResidualLaw(StagedController):
         return [(self.action, ACTION), (self.shown, SHOWN)]
 
     def memory(self) -> Array:
-        """What a policy sees of it, (size + 8, N): smoothed action, authority that is left, forces met in ``FORCE_UNIT``."""
+        """What a policy sees of it, (size + 8, N): smoothed action, authority left, unexplained forces in ``FORCE_UNIT``."""
         return self.shown.copy()
 
 

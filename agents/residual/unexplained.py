@@ -24,7 +24,7 @@ AVERAGE = 0.2
 """s of sliding over which what was met is averaged; assumed."""
 
 
-class Met(Rows):
+class Forces(Rows):
     """Unexplained force on the pistons."""
 
     now = rows("1 2", "N", "now")
@@ -32,7 +32,7 @@ class Met(Rows):
     inwards = rows("1 2", "N", "when last moving in")
 
 
-class Ways(Rows):
+class Moved(Rows):
     """Which ways pistons have moved."""
 
     out = rows("1 2", "1", "1 where a piston has moved out")
@@ -40,8 +40,8 @@ class Ways(Rows):
 
 
 @helper
-def _meet(last: Array, moved: Array, cylinder: int, i: int, moves: bool, force: float, fraction: float) -> None:
-    """What was met one way, ``last`` (2, N), averaged while the piston ``moves`` that way."""
+def _average(last: Array, moved: Array, cylinder: int, i: int, moves: bool, force: float, fraction: float) -> None:
+    """Averages what was met one way, ``last`` (2, N), while the piston ``moves`` that way."""
     if moves:
         last[cylinder, i] += (fraction if moved[cylinder, i] > 0.0 else 1.0) * (force - last[cylinder, i])
         moved[cylinder, i] = 1.0
@@ -50,8 +50,8 @@ def _meet(last: Array, moved: Array, cylinder: int, i: int, moves: bool, force: 
 
 
 @helper
-def remember(joints: Joints, disturbance: Array, p: Array, period: float, ways: Ways, met: Met) -> None:
-    """Brings what is ``met`` in N lanes up to a ``disturbance`` (2, N), m/s2."""
+def remember(joints: Joints, disturbance: Array, p: Array, period: float, moved: Moved, forces: Forces) -> None:
+    """Brings the ``forces`` of N lanes up to a ``disturbance`` (2, N), m/s2."""
     fraction = 1.0 - exact.exp(-period / AVERAGE)
     for i in range(joints.rows.shape[1]):
         y1, y2 = joints.position[0, i], joints.position[1, i]
@@ -61,6 +61,6 @@ def remember(joints: Joints, disturbance: Array, p: Array, period: float, ways: 
         for cylinder in range(2):
             mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
             force, speed = mass * disturbance[cylinder, i], joints.speed[cylinder, i]
-            met.now[cylinder, i] = force
-            _meet(met.out, ways.out, cylinder, i, speed > MOVING, force, fraction)
-            _meet(met.inwards, ways.inwards, cylinder, i, speed < -MOVING, force, fraction)
+            forces.now[cylinder, i] = force
+            _average(forces.out, moved.out, cylinder, i, speed > MOVING, force, fraction)
+            _average(forces.inwards, moved.inwards, cylinder, i, speed < -MOVING, force, fraction)

@@ -60,16 +60,16 @@ class AdmittanceController(StagedController):
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         force_sensor: whether the hand's force is measured.
-        learn: whether it learns, beside this, the friction of sliding pistons (not without a force sensor, since nothing tells
-            friction from the hand), the tracker's noise and the force sensor's bias, and reads an acceleration sensor where the
-            rig as believed has one and positions are samples.
+        learn: whether it learns the tracker's noise and, with a force sensor, that sensor's bias and the friction of sliding
+            pistons, which nothing else separates from the hand. It then also reads an acceleration sensor, where positions are
+            samples and the rig as believed has one, and yields faster to large oscillations.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests.
             rest_push: by how much the position error of a resting piston is multiplied.
             bandwidth: 1/s, of the observer of disturbances.
             pressure_bandwidth: 1/s, of the observer of pressures, where their cells are noisy (``lab`` sensors).
             friction_fraction: fraction of the believed friction that is fed forward along the reference.
-            friction_rate: 1/s, at which friction is learned; 0 learns nothing.
+            friction_rate: 1/s, at which friction is learned; 0 learns none.
             dead_zone: m, of a resting piston's error. lead_time: s, in which a spool follows.
             oscillation: m/s. Where the speed error swings beyond it, each sustained half wave multiplies the gain by yielding.
 

@@ -13,8 +13,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from baselines.admittance.rows import Beliefs, Follower, Known, Memory, Watch
 from baselines.estimation import (
     admittance,
@@ -29,7 +27,7 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.rows import Pistons, Point
+from baselines.estimation.rows import Point
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
@@ -126,9 +124,9 @@ def know(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> int:
 
 def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     """``Memory`` of a lane that starts."""
-    pistons, whole = observers.fresh_memory(rig, sampled), Watch.lane(fraction=1.0)
-    fixed = Memory.lane(fresh=1.0, friction=Friction.lane(level=1.0), follower=Follower.lane(across=whole, along=whole))
-    return np.concatenate([fixed[: Memory.size - Pistons.size], pistons])
+    whole, pistons = Watch.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
+    follower = Follower.lane(across=whole, along=whole)
+    return Memory.lane(fresh=1.0, friction=Friction.lane(level=1.0), follower=follower, pistons=pistons)
 
 
 def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, float], **others: float) -> dict[str, Any]:

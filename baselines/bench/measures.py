@@ -67,7 +67,7 @@ def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for k in range(STATES):
                 own.state[k, i] = world.state[k, i]
             for k in range(4):
-                own.motion[k, i] = world.motion[k, i]
+                own.motion[k, i] = world.motion.rows[k, i]
         if own.alive[i] > 0.0 and number % every == 0:
             for axis in range(2):
                 errors[number // every, axis, i] = now.tracking_error[axis, i]
@@ -96,7 +96,7 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
             for k in range(STATES):
                 world.state[k, i] = own.state[k, i]
             for k in range(4):
-                world.motion[k, i] = own.motion[k, i]
+                world.motion.rows[k, i] = own.motion[k, i]
         own.success[i] = good[i] * own.alive[i]
     return 0
 

@@ -1,7 +1,7 @@
 """What goes on inside valves and chambers: spools from what was commanded, pressures from noisy cells.
 
 A spool follows its command with the lag that is known. A pressure is carried on by the control model (6), with the flow that
-the believed spool lets through and the dead volume, and corrected by what its cell says,
+the believed spool lets through and the dead volume, and corrected by what its cell measures,
     P' = k (r T q - P S L')/V + w (P_measured - P),   V = V0 + S L,
 so that noise is averaged over 1/w without the delay of a filter: only the model's error of P' lags, and by 1/w.
 """
@@ -68,6 +68,6 @@ def observe(
                 chambers.pressure[chamber, i], opening + mean * away, area, half + sign * joints.position[cylinder, i],
                 sign * joints.speed[cylinder, i], period, p,
             )  # fmt: skip
-            new, shown = fresh[i] > 0.0, measured[chamber, i]
-            chambers.pressure[chamber, i] = shown if new else fraction * shown + (1.0 - fraction) * expected
+            new, cell = fresh[i] > 0.0, measured[chamber, i]
+            chambers.pressure[chamber, i] = cell if new else fraction * cell + (1.0 - fraction) * expected
             chambers.spool[chamber, i] = 0.0 if new else opening + kept * away

@@ -43,9 +43,9 @@ def accelerations(
 
 @helper
 def observe(pistons: Pistons, point: Point, pressures: Array, given: Given, about: Belief, joints: Joints) -> None:
-    """One control period of at most a block of lanes, of which ``point`` is measured; ``joints`` gets what that says.
+    """Carries speed and disturbance of ``pistons`` on by one control period; writes ``joints`` for the measured ``point``.
 
-    Carries speed and disturbance of ``pistons`` on.
+    N is at most that of a block.
     """
     p, period, bandwidth, speed, disturbance = about.rig, about.period, about.bandwidth, pistons.speed, pistons.disturbance
     piston_motion(point.rows, p, joints.rows, pistons.fresh.shape[0])

@@ -1,8 +1,8 @@
-"""What a force sensor shows when nobody touches: its bias, taken over the first moments of an episode.
+"""What a force sensor measures when nobody touches: its bias, taken over the first moments of an episode.
 
-Force sensors are tared so before use. While a hand rests on the head, no sensor of the rig tells bias from hand: the chambers'
-force balance knows the hand only up to friction, which is ten times the bias. So a bias beyond what the sensor is believed to
-have is not taken off: a hand that was there at the start costs no more than that.
+Force sensors are tared so before use. While a hand rests on the head, no sensor of the rig separates bias and hand: the force
+balance of the chambers gives the hand only up to friction, which is ten times the bias. So a bias beyond what the sensor is
+believed to have is not taken off: a hand that was there at the start costs no more than that.
 """
 
 from __future__ import annotations

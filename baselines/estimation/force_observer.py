@@ -2,8 +2,8 @@
 
     J^T F = R + friction,   friction = a s0 z,   z = clip(z + dy, -Fc/s0, Fc/s0)
 R is what pressures, weight and motion leave unexplained. Friction is an elastic-plastic element (Prandtl) on the measured
-motion: unlike LuGre's it does not creep under noise. A resting piston tells the hand by its bristles alone, which give way by
-20 um for 1 N. A sliding one tells it up to the error of the friction believed. The fraction a < 1 keeps the loop from feeding
+motion: unlike LuGre's it does not creep under noise. A resting piston reveals the hand by its bristles alone, which give way by
+20 um for 1 N. A sliding one reveals it up to the error of the friction believed. The fraction a < 1 keeps the loop from feeding
 itself where less friction is there than believed. What is left at the start, before a hand comes, is taken for an error of the
 mass and of the pressure cells.
 """

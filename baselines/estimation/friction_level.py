@@ -3,7 +3,7 @@
 What the known forces leave, R, is friction that opposes sliding and a part that knows no direction: an error of the mass, of
 the pressures or of the force sensor. With u in [-1, 1], friction along the reference over that believed,
     R = -level Fc u - offset,   e = R + level Fc u + offset,   level' = -a e u / Fc,   offset' = -a e
-while the piston slides as u says. Only sliding in both directions tells the two apart. R is the feedforward that was given plus
+while the piston slides as u says. Only sliding in both directions separates the two. R is the feedforward that was given plus
 what the observer found besides, so that it does not depend on what has been learned.
 """
 

@@ -5,7 +5,7 @@ On each axis, with the acceleration a that a sensor feels and its bias b,
 runs at the control rate. It needs neither forces nor a mass, so friction that turns, pressures and the hand leave it alone.
 A position sample corrects it as in ``observers``, by the difference to what was believed when that sample was taken:
 1 - e^3, 3/2 (1 - e)^2 (1 + e)/Ts and -(1 - e)^3/Ts^2 times the difference are added to x, v and b. They place a triple pole at
-e = exp(-w Ts). What a sample says is carried on over its age.
+e = exp(-w Ts). A sample's correction is carried on over its age.
 
 Noise of 0.02 m/s2 at 1 kHz and of 0.1 mm at 240 Hz have their Kalman filter at w = (q/r)^(1/4) = 10 1/s, with the densities
 q = 4e-7 m2/s3 and r = 4.2e-11 m2 s; the speed is then known to 0.24 mm/s. Friction turns within 0.24 mm of motion.
@@ -91,7 +91,7 @@ def observe(memory: Memory, signals: Signals, about: Gains, point: Point) -> Non
                 to_position = 1.0 - kept**3
                 to_speed = 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
                 to_rate = (1.0 - kept) ** 3 / sampled**2
-                # What the sample says of its own instant is carried on to the present.
+                # The correction of the sample's own instant is carried on to the present.
                 for k in range(depth):
                     since = age - k * period
                     change = to_position + since * (to_speed + 0.5 * since * to_rate)
@@ -115,6 +115,6 @@ def law_stage(rig: Parameters) -> LawStage:
     """The stage for a rig as believed, which remembers as much as its tracker asks for."""
     board = rig.electronics
     periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4
-    fresh = np.concatenate([Memory.lane(fresh=1.0), np.zeros(2 * periods)])
+    fresh = Memory.lane(fresh=1.0, past=np.zeros(2 * periods))
     about = Gains.numbers(period=board.control_period, bandwidth=BANDWIDTH, rows_of_memory=len(fresh))
     return LawStage(stage, about, fresh, feels=True)

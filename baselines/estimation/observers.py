@@ -3,7 +3,7 @@
 A Luenberger observer with a disturbance state runs at the control rate on the control model; pressures are measured at every
 period:
     y' = v,  v' = f(y, v) + g F + d,  d' = 0
-The disturbance d is an acceleration. It stands for what the observer is not told: Coulomb friction, the model's errors, and
+The disturbance d is an acceleration. It stands for what the observer is not given: Coulomb friction, the model's errors, and
 the user's force where it is not measured.
 
 When a position sample arrives, the observer is corrected by the difference to what it believed when that sample was taken.
@@ -13,7 +13,7 @@ triple pole at e = exp(-w Ts), whatever the time Ts between samples. They are ca
 Friction holds a resting piston still. An observer that knows this averages the noise away. While a piston rests,
     v' = ... - 2 wr v,  d' = -wr^2 v    (the pseudo-measurement v = 0 with a double pole wr: d is what friction carries)
 and position samples move y alone, by 1 - exp(-ws Ts). A piston counts as resting once it is slow. It no longer does when the
-low-passed innovation is larger than noise explains, or when the user of the observer says that the reference moves.
+low-passed innovation is larger than noise explains, or when the observer is given that the reference moves.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float
         to_position = (1.0 - resting) * (1.0 - kept**3) + resting * (1.0 - exact.exp(-SLOW_BANDWIDTH * sampled))
         to_speed = (1.0 - resting) * 1.5 * (1.0 - kept) ** 2 * (1.0 + kept) / sampled
         to_disturbance = (1.0 - resting) * (1.0 - kept) ** 3 / sampled**2
-        # What the sample says of its own instant is carried on to the present: late samples do not destabilise.
+        # The correction of the sample's own instant is carried on to the present: late samples do not destabilise.
         for k in range(depth):
             since = age - k * period
             change = to_position + since * (to_speed + 0.5 * since * to_disturbance)
@@ -172,7 +172,7 @@ def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     """``Pistons`` of a lane that starts, which remember as much as a rig's tracker asks for where positions are samples."""
     board = rig.electronics
     periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4 if sampled else 0
-    return np.concatenate([Pistons.lane(fresh=1.0), np.zeros(2 * periods)])
+    return Pistons.lane(fresh=1.0, past=np.zeros(2 * periods))
 
 
 def belief(rig: Parameters, bandwidth: float = BANDWIDTH) -> Array:

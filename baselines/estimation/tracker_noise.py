@@ -2,7 +2,7 @@
 
 Three samples at times t1 < t2 < t3 of a motion without acceleration are on one line: with q = (t3 - t2)/(t2 - t1),
     e = x3 - x2 - q (x2 - x1)   has the variance   s^2 (1 + (1 + q)^2 + q^2).
-So the samples tell s without a model of the rig, wherever the noise comes from. An acceleration of 2 m/s2 at 240 Hz is an e of
+So the samples give s without a model of the rig, wherever the noise comes from. An acceleration of 2 m/s2 at 240 Hz is an e of
 35 um; larger ones are clipped.
 """
 

@@ -11,27 +11,35 @@ import math
 
 import numpy as np
 
-from baselines.estimation.stages import MOTION, MOVING, OWN
+from baselines.backstepping.law import Wanted
+from baselines.estimation.stages import Estimate
 from baselines.staged import LawStage
-from birthsim_env.loop.rows import REFERENCE, SEEN, USER_FORCE
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, parameter_column
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
 
 SIGN_WIDTH = 0.01
 """m/s; assumed: over this REFERENCE speed the Coulomb feedforward goes from rest to sliding, slowly enough for the valves."""
 
-WANTED = OWN
-"""Where the pistons should be: y1, y2 (m) and three derivatives."""
-NEEDED = WANTED + 8
-FORCE1, FORCE2, RATE1, RATE2, KAPPA = range(5)
-"""What the motion needs, in rows from ``NEEDED`` on: F* (N) and dF*/dt (N/s) of cylinders 1 and 2, and kappa, all at the
-reference pose."""
-END = NEEDED + 5
+
+class Needed(Rows):
+    """What the motion needs, at the reference pose."""
+
+    force = rows("F1 F2", "N", "F*")
+    rate = rows("dF1 dF2", "N/s", "dF*/dt")
+    kappa = row("1", "amplification of cylinder 1")
+
+
+class Tracked(Estimate):
+    """What the stages before a law hand on."""
+
+    wanted = part(Wanted, "where the pistons should be")
+    needed = part(Needed, "forces")
 
 
 @helper
@@ -44,43 +52,46 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 
 @helper
-def needed_forces(wanted: Array, motion: Array, force: Array, p: Array, fraction: float, needed: Array, n: int) -> None:
-    """Writes ``needed`` (5, n) for the motion (8, n), its pistons ``wanted`` (8, n) and the user's force (2, n)."""
+def needed_forces(tracked: Tracked, hand: Array, p: Array, fraction: float, n: int) -> None:
+    """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N."""
+    wanted, motion, needed = tracked.wanted, tracked.motion, tracked.needed
     for i in range(n):
-        v1, v2 = wanted[2, i], wanted[3, i]
+        y1, y2, v1, v2 = wanted.position[0, i], wanted.position[1, i], wanted.speed[0, i], wanted.speed[1, i]
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
-            wanted[0, i], wanted[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
         )
         m = p[at.MASS]
-        px, py = m * motion[4, i] - force[0, i], m * (motion[5, i] + p[at.GRAVITY]) - force[1, i]
-        jx, jy = m * motion[6, i], m * motion[7, i]
+        ax, ay, jx, jy = motion.acceleration[0, i], motion.acceleration[1, i], m * motion.jerk[0, i], m * motion.jerk[1, i]
+        px, py = m * ax - hand[0, i], m * (ay + p[at.GRAVITY]) - hand[1, i]
         along, across = sine * px - cosine * py, -cosine * px - sine * py
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         along_rate = sine * jx - cosine * jy - turn * across
         across_rate = -cosine * jx - sine * jy + turn * along
-        drag1, drag1_rate = friction_ahead(v1, wanted[4, i], fraction * p[at.FC1], p[at.FV1])
-        drag2, drag2_rate = friction_ahead(v2, wanted[5, i], fraction * p[at.FC2], p[at.FV2])
-        needed[FORCE1, i] = kappa * across + p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1]) + drag1
-        needed[FORCE2, i] = along + p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2]) + drag2
-        needed[RATE1, i] = kappa * (across_rate + growth * across) + drag1_rate
-        needed[RATE2, i] = along_rate + drag2_rate
-        needed[KAPPA, i] = kappa
+        drag1, drag1_rate = friction_ahead(v1, wanted.acceleration[0, i], fraction * p[at.FC1], p[at.FV1])
+        drag2, drag2_rate = friction_ahead(v2, wanted.acceleration[1, i], fraction * p[at.FC2], p[at.FV2])
+        needed.force[0, i] = kappa * across + p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1]) + drag1
+        needed.force[1, i] = along + p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2]) + drag2
+        needed.rate[0, i] = kappa * (across_rate + growth * across) + drag1_rate
+        needed.rate[1, i] = along_rate + drag2_rate
+        needed.kappa[i] = kappa
 
 
-FRACTION, RIG = 0, 1
-"""Constants of the stage: how much of the Coulomb friction is fed forward. The rig follows."""
+class Constants(Numbers):
+    """Of the stage."""
+
+    fraction = number("1", "how much of the Coulomb friction is fed forward")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
 
 
 @kernel
-def _look_ahead(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    s, about = block(seen, SEEN), numbers(constants, RIG + PARAMETERS)
-    p, motion, wanted = about[RIG:], s[MOTION:MOVING], s[WANTED:NEEDED]
-    piston_reference(motion, p, wanted, n)
-    needed_forces(wanted, motion, s[USER_FORCE:REFERENCE], p, about[FRACTION], s[NEEDED:END], n)
+def _look_ahead(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    tracked = Tracked(seen.handed[: Tracked.size])
+    piston_reference(tracked.motion.rows, about.rig, tracked.wanted.rows, n)
+    needed_forces(tracked, seen.user_force, about.rig, about.fraction, n)
     return 0
 
 
 def feedforward(rig: Parameters, fraction: float) -> LawStage:
-    """Finds ``WANTED`` and ``NEEDED`` of the motion, with a ``fraction`` of the Coulomb friction that is believed."""
-    return LawStage(_look_ahead, np.array([fraction, *parameter_column(rig)]), np.zeros(0))
+    """Finds what ``Tracked`` adds of the motion, with a ``fraction`` of the Coulomb friction that is believed."""
+    return LawStage(_look_ahead, Constants.numbers(fraction=fraction, rig=parameter_column(rig)), np.zeros(0))

@@ -15,21 +15,21 @@ second started from what the first had found:
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
+from baselines.rivals.feedforward import Tracked
+from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
 from baselines.valve_inverse import two_valve_openings
-from birthsim_env.loop.rows import SEEN
-from birthsim_env.loop.stage import block, carray, numbers, pointer
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.records import Numbers, number, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 RATE_TOLERANCE = 1000.0
@@ -85,39 +85,46 @@ def scheduled(table: Array, row: int, place: float) -> float:
     return entry
 
 
-PERIOD, LOWEST, STEP, ZONE, STIFFNESS_GAIN, TABLE = range(6)
-RIG = TABLE + 8 * SCHEDULE
-"""Constants of the stage: control period, s; dead zone, m; c4, 1/s; the table (8, SCHEDULE), with the gains of cylinder 1 over
-kappa = ``LOWEST`` + ``STEP`` j, and those of cylinder 2. The rig follows."""
+class Constants(Numbers):
+    """Of the stage."""
+
+    period = number("s", "control period")
+    lowest = number("1", "first kappa of the table")
+    step = number("1", "from one kappa to the next")
+    dead_zone = number("m", "at the end effector")
+    pneumatic_gain = number("1/s", "c4")
+    table = rows(8 * SCHEDULE, "SI", "gains (8, SCHEDULE) over kappa: four of cylinder 1, then of cylinder 2")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
 
 
 @kernel
-def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Carries the integrals, m s, on. The signals are those of ``tracking``."""
-    s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
-    (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
-    lowest, step, zone, c4 = about[LOWEST], about[STEP], about[ZONE], about[STIFFNESS_GAIN]
-    table = carray(pointer(constants + 8 * TABLE, np.float64), (8, SCHEDULE))
+def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+    """Carries the integrals, m s, on."""
+    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
+    wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
+    lowest, step, zone, c4 = about.lowest, about.step, about.dead_zone, about.pneumatic_gain
+    table = about.table.reshape((8, SCHEDULE))
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         for i in range(n):
-            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
-            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
-            place = (needed[KAPPA, i] - lowest) / step
+            y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
+            scale = needed.kappa[i] if cylinder == 0 else 1.0
+            place = (needed.kappa[i] - lowest) / step
             k1, k2 = scheduled(table, gain, place), scheduled(table, gain + 1, place)
             k3, k4 = scheduled(table, gain + 2, place), scheduled(table, gain + 3, place)
-            error, excess = y - wanted[cylinder, i], pp * ap - pn * an - needed[FORCE1 + cylinder, i]
-            summed = held(m, cylinder, i, -k4 * excess / k1)
-            wish = k1 * summed + k2 * error + k3 * (v - wanted[2 + cylinder, i]) + k4 * excess
+            error, excess = y - wanted.position[cylinder, i], pp * ap - pn * an - needed.force[cylinder, i]
+            summed = held(memory, cylinder, i, -k4 * excess / k1)
+            wish = k1 * summed + k2 * error + k3 * (v - wanted.speed[cylinder, i]) + k4 * excess
             lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
             stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
-            stiffness_rate = target[12 + cylinder, i] - c4 * (stiffness - target[10 + cylinder, i])
-            rate = needed[RATE1 + cylinder, i] - wish
+            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness - setpoint[cylinder, i])
+            rate = needed.rate[cylinder, i] - wish
             two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
             slope = beyond(error, zone / scale)
-            carry_on(m, cylinder, i, summed, slope, about[PERIOD], openings)
+            carry_on(memory, cylinder, i, summed, slope, about.period, openings)
     return 0
 
 
@@ -129,7 +136,7 @@ class LinearQuadratic(TrackingController):
     friction_fraction; dead_zone.
     """
 
-    LAW = staticmethod(control)
+    LAW, CONSTANTS = staticmethod(control), Constants
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
         "integral_tolerance": (1e-6, 1e-3),
         "position_tolerance": (3e-4, 1e-1),
@@ -157,11 +164,12 @@ class LinearQuadratic(TrackingController):
         },
     }
 
-    def _design(self, gains: dict[str, float]) -> list[float]:
+    def _design(self, gains: dict[str, float]) -> dict[str, Any]:
         mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.TUNABLE)[:4]])
         low, high = kappa_range(self.parameters)
         grid = np.linspace(low, high, SCHEDULE)
         first = [regulator(mass, self.parameters.cylinder1.viscous_friction, kappa, tolerances) for kappa in grid]
         second = regulator(mass, self.parameters.cylinder2.viscous_friction, 1.0, tolerances)
         table = np.concatenate([np.array(first).T, np.repeat(second[:, None], SCHEDULE, axis=1)])
-        return [low, float(grid[1] - grid[0]), gains["dead_zone"], PNEUMATIC_GAIN, *table.ravel()]
+        scheduled = {"lowest": low, "step": float(grid[1] - grid[0]), "table": table.ravel()}
+        return {**scheduled, "dead_zone": gains["dead_zone"], "pneumatic_gain": PNEUMATIC_GAIN}

@@ -17,15 +17,15 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from baselines.rivals.feedforward import FORCE1, KAPPA
-from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
+from baselines.rivals.feedforward import Tracked
+from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
 from baselines.valve_inverse import driving_flows
-from birthsim_env.loop.rows import SEEN
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS
+from birthsim_env.physics.compiled.records import Numbers, number, rows
 
 
 @helper
@@ -55,17 +55,25 @@ def flow_for(rate: float, pressure: float, area: float, length: float, length_ra
     return (area * length * rate / index + pressure * area * length_rate) / gas_t
 
 
-GAIN_NAMES = ("bandwidth", "damping", "integral_rate", "pressure_gain", "dead_zone")
-PERIOD, BANDWIDTH, DAMPING, INTEGRAL_RATE, PRESSURE_GAIN, ZONE, RIG = range(7)
-"""Constants of the stage: control period, s; the gains ``GAIN_NAMES``. The rig follows."""
+class Constants(Numbers):
+    """Of the stage; the gains are those of ``PositionPID``."""
+
+    period = number("s", "control period")
+    bandwidth = number("1/s", "w")
+    damping = number("1", "zeta")
+    integral_rate = number("1/s", "a")
+    pressure_gain = number("1/s", "b")
+    dead_zone = number("m", "at the end effector")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
 
 
 @kernel
-def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Carries the integrals, N, on. The signals are those of ``tracking``."""
-    s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
-    (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
-    bandwidth, damping, zone = about[BANDWIDTH], about[DAMPING], about[ZONE]
+def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+    """Carries the integrals, N, on."""
+    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    setpoint = seen.asked.pneumatic_stiffness
+    wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
+    bandwidth, damping, zone = about.bandwidth, about.damping, about.dead_zone
     index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
     low, high = p[at.ATMOSPHERE], p[at.SUPPLY]
     for cylinder in range(2):
@@ -73,24 +81,24 @@ def control(world: int, seen: int, memory: int, constants: int, tables: int, lan
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         for i in range(n):
-            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
-            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
+            y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
+            scale = needed.kappa[i] if cylinder == 0 else 1.0
             spring = p[at.MASS] * scale * scale * bandwidth * bandwidth
-            error, error_rate = wanted[cylinder, i] - y, wanted[2 + cylinder, i] - v
-            force = needed[FORCE1 + cylinder, i]
-            summed = held(m, cylinder, i, pp * ap - pn * an - force)
+            error, error_rate = wanted.position[cylinder, i] - y, wanted.speed[cylinder, i] - v
+            force = needed.force[cylinder, i]
+            summed = held(memory, cylinder, i, pp * ap - pn * an - force)
             force += spring * (error + 2.0 * damping / bandwidth * error_rate) + summed
             least, most = low * ap - high * an, high * ap - low * an
             given = max(least, min(most, force))
             lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
-            pp_set, pn_set = pressure_setpoints(given, target[10 + cylinder, i], ap, an, lp, ln, index, low, high)
-            flow_p = flow_for(about[PRESSURE_GAIN] * (pp_set - pp), pp, ap, lp, v, index, gas_t)
-            flow_n = flow_for(about[PRESSURE_GAIN] * (pn_set - pn), pn, an, ln, -v, index, gas_t)
+            pp_set, pn_set = pressure_setpoints(given, setpoint[cylinder, i], ap, an, lp, ln, index, low, high)
+            flow_p = flow_for(about.pressure_gain * (pp_set - pp), pp, ap, lp, v, index, gas_t)
+            flow_n = flow_for(about.pressure_gain * (pn_set - pn), pn, an, ln, -v, index, gas_t)
             (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
             openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
             openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
-            rate = spring * about[INTEGRAL_RATE] * beyond(error, zone / scale) if given == force else 0.0
-            carry_on(m, cylinder, i, summed, rate, about[PERIOD], openings)
+            rate = spring * about.integral_rate * beyond(error, zone / scale) if given == force else 0.0
+            carry_on(memory, cylinder, i, summed, rate, about.period, openings)
     return 0
 
 
@@ -101,7 +109,7 @@ class PositionPID(TrackingController):
     of the speed error; integral_rate: a, 1/s; pressure_gain: b, 1/s, of the pressure loops; friction_fraction; dead_zone.
     """
 
-    LAW = staticmethod(control)
+    LAW, CONSTANTS = staticmethod(control), Constants
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
         "bandwidth": (15.0, 100.0),
         "damping": (0.1, 2.0),
@@ -129,5 +137,5 @@ class PositionPID(TrackingController):
         },
     }
 
-    def _design(self, gains: dict[str, float]) -> list[float]:
-        return [gains[name] for name in GAIN_NAMES]
+    def _design(self, gains: dict[str, float]) -> dict[str, float]:
+        return {name: gains[name] for name in Constants.groups if name in gains}

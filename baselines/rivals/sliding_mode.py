@@ -18,48 +18,59 @@ from __future__ import annotations
 from typing import ClassVar
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
-from baselines.rivals.feedforward import FORCE1, KAPPA, RATE1
-from baselines.rivals.tracking import LEAST_LENGTH, MEMORY, TrackingController, beyond, carry_on, held, signals
+from baselines.rivals.feedforward import Tracked
+from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
 from baselines.valve_inverse import two_valve_openings
-from birthsim_env.loop.rows import SEEN
-from birthsim_env.loop.stage import block, numbers
+from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS
+from birthsim_env.physics.compiled.records import Numbers, number, rows
 
-PERIOD, SURFACE, REACHING, LAYER, ZONE, STIFFNESS_GAIN, RIG = range(7)
-"""Constants of the stage: control period, s; r, 1/s; h, m/s3; b, 1/s; dead zone, m; c4, 1/s. The rig follows."""
+
+class Constants(Numbers):
+    """Of the stage."""
+
+    period = number("s", "control period")
+    surface_rate = number("1/s", "r")
+    reaching_rate = number("m/s3", "h")
+    layer_rate = number("1/s", "b")
+    dead_zone = number("m", "at the end effector")
+    pneumatic_gain = number("1/s", "c4")
+    rig = rows(PARAMETERS, "SI", "parameters of the rig")
 
 
 @kernel
-def control(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Carries the integrals, m s, on. The signals are those of ``tracking``."""
-    s, m, about = block(seen, SEEN), block(memory, MEMORY), numbers(constants, RIG + PARAMETERS)
-    (joints, wanted, needed, pressures, target, openings), p = signals(s), about[RIG:]
-    r, reaching, inside, zone, c4 = about[SURFACE], about[REACHING], about[LAYER], about[ZONE], about[STIFFNESS_GAIN]
+def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
+    """Carries the integrals, m s, on."""
+    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
+    wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
+    r, reaching, inside = about.surface_rate, about.reaching_rate, about.layer_rate
+    zone, c4 = about.dead_zone, about.pneumatic_gain
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
         half, viscous = (p[at.HALF_L1], p[at.FV1]) if cylinder == 0 else (p[at.HALF_L2], p[at.FV2])
         for i in range(n):
-            y, v, pp, pn = joints[cylinder, i], joints[2 + cylinder, i], pressures[row, i], pressures[row + 1, i]
-            scale = needed[KAPPA, i] if cylinder == 0 else 1.0
+            y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
+            scale = needed.kappa[i] if cylinder == 0 else 1.0
             mass = p[at.MASS] * scale * scale
-            excess = pp * ap - pn * an - needed[FORCE1 + cylinder, i]
-            error, error_rate = y - wanted[cylinder, i], v - wanted[2 + cylinder, i]
+            excess = pp * ap - pn * an - needed.force[cylinder, i]
+            error, error_rate = y - wanted.position[cylinder, i], v - wanted.speed[cylinder, i]
             second = (excess - viscous * error_rate) / mass
-            summed = held(m, cylinder, i, -excess / (mass * r * r * r))
+            summed = held(memory, cylinder, i, -excess / (mass * r * r * r))
             slope = beyond(error, zone / scale)
             surface = scale * (second + r * (3.0 * error_rate + r * (3.0 * error + r * summed)))
             switched = max(-reaching, min(reaching, inside * surface)) / scale
             turned = viscous / mass * second - r * (3.0 * second + r * (3.0 * error_rate + r * slope)) - switched
-            rate = needed[RATE1 + cylinder, i] + mass * turned
+            rate = needed.rate[cylinder, i] + mass * turned
             lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
             stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
-            stiffness_rate = target[12 + cylinder, i] - c4 * (stiffness - target[10 + cylinder, i])
+            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness - setpoint[cylinder, i])
             two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
-            carry_on(m, cylinder, i, summed, slope, about[PERIOD], openings)
+            carry_on(memory, cylinder, i, summed, slope, about.period, openings)
     return 0
 
 
@@ -73,7 +84,7 @@ class SlidingMode(TrackingController):
     - layer_rate: b, 1/s, at which s decays inside the layer, which is h/b thick.
     """
 
-    LAW = staticmethod(control)
+    LAW, CONSTANTS = staticmethod(control), Constants
     TUNABLE: ClassVar[dict[str, tuple[float, float]]] = {
         "surface_rate": (10.0, 100.0),
         "reaching_rate": (100.0, 10000.0),
@@ -98,5 +109,5 @@ class SlidingMode(TrackingController):
         },
     }
 
-    def _design(self, gains: dict[str, float]) -> tuple[float, ...]:
-        return gains["surface_rate"], gains["reaching_rate"], gains["layer_rate"], gains["dead_zone"], PNEUMATIC_GAIN
+    def _design(self, gains: dict[str, float]) -> dict[str, float]:
+        return {"pneumatic_gain": PNEUMATIC_GAIN, **{name: gains[name] for name in Constants.groups if name in gains}}

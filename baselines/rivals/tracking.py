@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import ClassVar
-
-import numpy as np
+from typing import Any, ClassVar
 
 from baselines.controller import check_gains, require_stiffness
 from baselines.estimation.admittance import DAMPING_RATIO
-from baselines.estimation.stages import JOINTS, OWN, compliant_motion, pistons
+from baselines.estimation.stages import compliant_motion, pistons
 from baselines.impedance import Impedance, mass_spring_damper
-from baselines.rivals.feedforward import END, NEEDED, WANTED, feedforward
+from baselines.rivals.feedforward import feedforward
 from baselines.staged import LawStage, StagedController
-from birthsim_env.loop.rows import ASKED, FEEDFORWARD, OPENING, PRESSURE, SHOWN, USER_FORCE
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, Rows, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 LEAST_LENGTH = 0.002
 """m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""
 
-INTEGRAL, FRESH, MEMORY = 0, 2, 4
-"""Rows of a law's memory: integrals of cylinders 1 and 2, and 1 where they start; the number of rows."""
+
+class Integrals(Rows):
+    """What a law remembers."""
+
+    integral = rows("1 2", "SI", "integral of a cylinder")
+    fresh = rows("1 2", "1", "1 where it starts")
 
 
 @helper
@@ -35,24 +37,16 @@ def beyond(error: float, zone: float) -> float:
 
 
 @helper
-def signals(s: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """What a law reads of what is seen: joints (4, N), ``WANTED`` (8, N), ``NEEDED`` (5, N), pressures (4, N) and the reference
-    (15, N); and the openings (4, N) that it writes."""
-    target, pressures, openings = s[ASKED:FEEDFORWARD], s[PRESSURE:USER_FORCE], s[OPENING:SHOWN]
-    return s[JOINTS:OWN], s[WANTED:NEEDED], s[NEEDED:END], pressures, target, openings
-
-
-@helper
-def held(memory: Array, cylinder: int, i: int, first: float) -> float:
+def held(memory: Integrals, cylinder: int, i: int, first: float) -> float:
     """The integral of a cylinder, or ``first`` where it starts."""
-    return first if memory[FRESH + cylinder, i] > 0.0 else memory[INTEGRAL + cylinder, i]
+    return first if memory.fresh[cylinder, i] > 0.0 else memory.integral[cylinder, i]
 
 
 @helper
-def carry_on(memory: Array, cylinder: int, i: int, integral: float, rate: float, period: float, openings: Array) -> None:
+def carry_on(memory: Integrals, cylinder: int, i: int, integral: float, rate: float, period: float, openings: Array) -> None:
     """Takes the integral to the next period; it rests while a valve of the cylinder saturates (conditional integration)."""
     full = max(abs(openings[2 * cylinder, i]), abs(openings[2 * cylinder + 1, i])) >= 1.0
-    memory[INTEGRAL + cylinder, i], memory[FRESH + cylinder, i] = integral if full else integral + period * rate, 0.0
+    memory.integral[cylinder, i], memory.fresh[cylinder, i] = integral if full else integral + period * rate, 0.0
 
 
 class TrackingController(StagedController, ABC):
@@ -67,12 +61,13 @@ class TrackingController(StagedController, ABC):
     of the reference speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The
     integrals start from the forces that the chambers hold (bumpless start). From sampled positions an observer estimates
     the speeds.
-    ``LAW`` is the law as a stage. It reads and writes ``signals``, carries the integrals on, and has as constants the control
-    period, s, what ``_design`` gives, and the rig.
+    ``LAW`` is the law as a stage, which carries its ``Integrals`` on. ``CONSTANTS`` are its constants: the control ``period``,
+    s, what ``_design`` gives, and the ``rig``.
     Raises ``ValueError`` for unknown gains and for gains that are not positive (zero where the lowest to try is zero).
     """
 
     LAW: ClassVar[Callable[..., int]]
+    CONSTANTS: ClassVar[type[Numbers]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
     TUNED: ClassVar[dict[str, dict[str, float]]]
     TOLD: ClassVar[tuple[str, ...]] = ("damping_factor",)
@@ -89,13 +84,13 @@ class TrackingController(StagedController, ABC):
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
     @abstractmethod
-    def _design(self, gains: dict[str, float]) -> Sequence[float]:
+    def _design(self, gains: dict[str, float]) -> dict[str, Any]:
         """The constants of ``LAW`` that come from the gains, all those of ``TUNABLE``."""
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
-        rig, kind, fresh = self.parameters, "lab" if sampled else "ideal", np.zeros(MEMORY)
-        fresh[FRESH:] = 1.0
-        law = LawStage(self.LAW, np.array([rig.electronics.control_period, *self._designs[kind], *self._p]), fresh)
+        rig, kind = self.parameters, "lab" if sampled else "ideal"
+        about = self.CONSTANTS.numbers(period=rig.electronics.control_period, rig=self._p, **self._designs[kind])
+        law = LawStage(self.LAW, about, Integrals.lane(fresh=1.0))
         return [compliant_motion(rig), pistons(rig, sampled, informed=True), feedforward(rig, self._fractions[kind]), law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.signals import Measurement, Point, Reference
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
 
@@ -16,7 +16,7 @@ class World(Rows):
     rig = rows(" ".join(f"rig_{name}" for name in PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
     state = rows(" ".join(STATE_NAMES), STATE_UNITS, "state of the plant")
     impact = rows("impact1 impact2", "m/s", "fastest collision with an end stop in this policy step; zero begins anew")
-    motion = rows("x y vx vy", ("m", "m", "m/s", "m/s"), "of the end effector (its handle, if it bends), true")
+    motion = part(Point, "end effector (its handle, if it bends), true", "")
     force = rows("force_x force_y", "N", "force of the hand, true")
     since_jump = row("s", "since force or stiffness setpoint jumped")
     tick = row("1", "control periods since the episode began")
@@ -60,10 +60,8 @@ class Seen(Signals):
 
 STATE, IMPACT, MOTION, FORCE = (one.first for one in (World.state, World.impact, World.motion, World.force))
 SINCE_JUMP, TICK, WORLD = World.since_jump.first, World.tick.first, World.size
-TIME, POSITION, VELOCITY, POSITION_TIME = (one.first for one in (Seen.time, Seen.position, Seen.velocity, Seen.position_time))
-ACCELERATION, PRESSURE, USER_FORCE, REFERENCE = (
-    one.first for one in (Seen.acceleration, Seen.pressure, Seen.user_force, Seen.reference)
-)
+TIME, POSITION, ACCELERATION, PRESSURE = (one.first for one in (Seen.time, Seen.position, Seen.acceleration, Seen.pressure))
+REFERENCE = Seen.reference.first
 ASKED, FEEDFORWARD, DAMPING, ACTION = (one.first for one in (Seen.asked, Seen.feedforward, Seen.damping_factor, Seen.action))
 OPENING, SHOWN, HANDED, SEEN = Seen.opening.first, Seen.shown.first, Seen.handed.first, Seen.size
 """Numbers of rows, for arrays that a loop places."""

@@ -26,13 +26,18 @@ compliance = helper(displacement)
 """``displacement`` for kernels."""
 
 
-class Motion(Rows):
-    """Where the end effector should be."""
+class Point(Rows):
+    """Where a point is."""
 
-    position = rows("x y", "m", "target of the end effector")
-    velocity = rows("vx vy", "m/s", "of the target")
-    acceleration = rows("ax ay", "m/s2", "of the target")
-    jerk = rows("jx jy", "m/s3", "of the target")
+    position = rows("x y", "m", "position")
+    velocity = rows("vx vy", "m/s", "velocity")
+
+
+class Motion(Point):
+    """How the end effector should move."""
+
+    acceleration = rows("ax ay", "m/s2", "acceleration")
+    jerk = rows("jx jy", "m/s3", "jerk")
 
 
 class Setpoints(Rows):

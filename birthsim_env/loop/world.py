@@ -46,7 +46,7 @@ def _move(world: World, seen: Seen, u: Array, clock: Clock, dx: Array, total: Ar
     dynamics.integrate(x, u, world.force, p, steps, clock.period / steps, world.impact, dx, total, trial, n)
     dynamics.settle(x, n)
     _tick(world, seen, clock.period, n)
-    end_effector_motion(x[:, :n], p[:, :n], world.motion[:, :n])
+    end_effector_motion(x[:, :n], p[:, :n], world.motion.rows[:, :n])
 
 
 @kernel
@@ -73,7 +73,7 @@ def _optional_plant(world: World, seen: Seen, memory: FurtherStates, clock: Cloc
     steps = int(clock.steps)
     options.integrate(x, further, u, world.force, p, steps, clock.period / steps, world.impact, own, n)
     _tick(world, seen, clock.period, n)
-    options.port_motion(x[:, :n], further[:, :n], p[:, :n], world.motion[:, :n])
+    options.port_motion(x[:, :n], further[:, :n], p[:, :n], world.motion.rows[:, :n])
     return 0
 
 

@@ -12,13 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
-from birthsim_env.loop.rows import ACTION, OPENING, SEEN, STATE, WORLD
+from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.loop.stage import Stage, block, numbers
+from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.dynamics import driving_flows
 from birthsim_env.physics.plant import Plant
 
@@ -65,13 +66,19 @@ class Forgetful:
         return np.empty((0, 0))
 
 
+class Layout(Numbers):
+    """Constants of a stage."""
+
+    one_valve = number("1", "1 with one valve per cylinder")
+
+
 @kernel
-def _valve_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constant: 1 with one valve per cylinder."""
-    s, one_valve = block(seen, SEEN), numbers(constants, 1)[0] > 0.0
+def _valve_stage(world: int, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
+    one_valve = layout.one_valve > 0.0
     for i in range(n):
         for valve in range(4):
-            s[OPENING + valve, i] = s[ACTION + valve, i] if not one_valve else (1 - 2 * (valve % 2)) * s[ACTION + valve // 2, i]
+            opened = seen.action[valve, i] if not one_valve else (1 - 2 * (valve % 2)) * seen.action[valve // 2, i]
+            seen.opening[valve, i] = opened
     return 0
 
 
@@ -98,7 +105,7 @@ class ValveActuation(Forgetful):
 
     def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
-        return [Stage(_valve_stage, np.array([float(self._one_valve)]), sees_world=False)]
+        return [Stage(_valve_stage, Layout.numbers(one_valve=self._one_valve), sees_world=False)]
 
 
 @helper
@@ -125,11 +132,8 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
 
 
 @kernel
-def _flow_stage(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Constant: 1 with one valve per cylinder."""
-    w, s, one_valve = block(world, WORLD), block(seen, SEEN), numbers(constants, 1)[0] > 0.0
-    state, p = w[STATE : STATE + at.STATES, :n], w[: at.PARAMETERS, :n]
-    _flow_openings(s[ACTION : ACTION + 4, :n], one_valve, state, p, s[OPENING : OPENING + 4, :n])
+def _flow_stage(world: World, seen: Seen, memory: int, layout: Layout, tables: int, lane: int, n: int) -> int:
+    _flow_openings(seen.action, layout.one_valve > 0.0, world.state[:, :n], world.rig[:, :n], seen.opening)
     return 0
 
 
@@ -167,7 +171,7 @@ class FlowActuation(Forgetful):
 
     def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """``openings``, compiled into the closed loop."""
-        return [Stage(_flow_stage, np.array([float(self._one_valve)]))]
+        return [Stage(_flow_stage, Layout.numbers(one_valve=self._one_valve))]
 
 
 ACTUATIONS: dict[str, Callable[[str], Actuation]] = {"valve": ValveActuation, "flow": FlowActuation}

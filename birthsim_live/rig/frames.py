@@ -51,7 +51,7 @@ def row_of(simulation: Simulation, hands: Hands, episode_time: float) -> Array:
     """The present instant as a row (COLUMNS,)."""
     now, plant, rows, within = simulation, simulation.plant, np.empty((Info.size, 1)), np.empty((inside.ROWS, 1))
     world, seen = World(np.zeros((World.size, 1))), Signals(np.zeros((Signals.size, 1)))
-    world.rig[:], world.state[:], world.motion[:] = plant.lane_parameters, plant.state, now.motion
+    world.rig[:], world.state[:], world.motion.rows[:] = plant.lane_parameters, plant.state, now.motion
     world.force[:], world.impact[:], world.since_jump[:] = now.force, now.impacts, now.since_jump
     seen.time[:], seen.reference.rows[:] = now.time, now.reference.rows
     describe(world, seen, Info(rows), 1)

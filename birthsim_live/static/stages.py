@@ -29,7 +29,7 @@ def begin(world: World, seen: Seen, memory: int, constants: int, tables: int, la
             x[row, i] = 0.0
         x[Y1, i], x[Y2, i], x[V1, i], x[V2, i] = joints[0, i], joints[1, i], joints[2, i], joints[3, i]
     balance(x, seen.reference.pneumatic_stiffness[:, :n], p)
-    end_effector_motion(x, p, world.motion[:, :n])
+    end_effector_motion(x, p, world.motion.rows[:, :n])
     return 0
 
 

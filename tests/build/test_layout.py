@@ -1,8 +1,7 @@
 """The rows that header and JavaScript name are those of the loops."""
 
 from birthsim_build.layout import INPUTS, LAYOUT, ROWS
-from birthsim_env.loop import rows as at
-from birthsim_env.loop.rows import SEEN, WORLD
+from birthsim_env.loop.rows import SEEN, WORLD, Seen, World
 from birthsim_env.loop.signals import REFERENCE_NAMES
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, STATE_NAMES
 
@@ -10,18 +9,18 @@ NUMBER = {row.name: row.number for row in LAYOUT}
 
 
 def test_rows_are_those_of_the_loop():
-    world = {"impact1": at.IMPACT, "x": at.MOTION, "force_x": at.FORCE, "since_jump": at.SINCE_JUMP, "tick": at.TICK}
+    world = {"impact1": "impact", "x": "motion", "force_x": "force", "since_jump": "since_jump", "tick": "tick"}
     seen = {
-        "time": at.TIME, "measured_x": at.POSITION, "measured_vx": at.VELOCITY, "position_time": at.POSITION_TIME,
-        "measured_ax": at.ACCELERATION,
-        "measured_Pp1": at.PRESSURE, "measured_force_x": at.USER_FORCE, "reference_x": at.REFERENCE, "asked_x": at.ASKED,
-        "feedforward_force1": at.FEEDFORWARD, "damping_factor": at.DAMPING, "action": at.ACTION, "opening_P1": at.OPENING,
-        "shown": at.SHOWN, "handed": at.HANDED,
+        "time": "time", "measured_x": "position", "measured_vx": "velocity", "position_time": "position_time",
+        "measured_ax": "acceleration", "measured_Pp1": "pressure", "measured_force_x": "user_force", "reference_x": "reference",
+        "asked_x": "asked", "feedforward_force1": "feedforward", "damping_factor": "damping_factor", "action": "action",
+        "opening_P1": "opening", "shown": "shown", "handed": "handed",
     }  # fmt: skip
-    for name, number in {**world, **{name: WORLD + row for name, row in seen.items()}}.items():
-        assert NUMBER[name] == number, name
+    for begins, layout, names in ((0, World, world), (WORLD, Seen, seen)):
+        for name, group in names.items():
+            assert NUMBER[name] == begins + layout.groups[group].first, name
     assert [NUMBER[f"rig_{name}"] for name in PARAMETER_NAMES] == list(range(len(PARAMETER_NAMES)))
-    assert [NUMBER[name] for name in STATE_NAMES] == [at.STATE + row for row in range(len(STATE_NAMES))]
+    assert [NUMBER[name] for name in STATE_NAMES] == [World.state.first + row for row in range(len(STATE_NAMES))]
     assert [NUMBER[f"add_{name}"] for name in REFERENCE_NAMES] == list(range(ROWS - len(REFERENCE_NAMES), ROWS))
 
 

@@ -80,10 +80,10 @@ def assess(lanes=1, policy_period=0.01, **changes):
     world, reference = World(np.zeros((World.size, lanes))), Reference(np.zeros((Reference.size, lanes)))
     world.state[list(PRESSURES)], world.state[list(TEMPERATURES)] = 3e5, 293.0
     world.since_jump[:] = policy_period
-    reference.position[0], reference.stiffness[:], world.motion[0] = 0.5, 2000.0, 0.5
+    reference.position[0], reference.stiffness[:], world.motion.position[0] = 0.5, 2000.0, 0.5
     given = {
-        **{name: getattr(world, name) for name in ("state", "motion", "force", "since_jump", "impact")},
-        "reference": reference.rows,
+        **{name: getattr(world, name) for name in ("state", "force", "since_jump", "impact")},
+        "motion": world.motion.rows,
         "owed": np.zeros((4, lanes)),
         "action": np.zeros((2, lanes)),
         "last_action": np.zeros((2, lanes)),
@@ -91,7 +91,7 @@ def assess(lanes=1, policy_period=0.01, **changes):
     for name, change in changes.items():
         given[name] = change(given[name]) if callable(change) else np.asarray(change, dtype=np.float64)
         if name in World.groups:
-            getattr(world, name)[:] = given[name]
+            world.rows[World.groups[name].place] = given[name]
     limits = reward.Limits(reward.Limits.numbers(period=policy_period, jumped_below=0.5 * policy_period, impact_speed=0.1))
     terms, failed = reward.Terms(np.empty((reward.Terms.size, lanes))), np.empty(lanes)
     owed = reward.Owed(given["owed"])

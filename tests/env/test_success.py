@@ -41,10 +41,10 @@ def test_a_lost_episode_is_no_success_and_the_next_one_begins_anew():
     reference.stiffness[:], world.since_jump[:] = 2000.0, 1.0
     add(world, reference, np.array([1.0, 0.0]), tally, now, 2)
     np.testing.assert_array_equal(now, [0, 1])
-    world.motion[0] = 0.1
+    world.motion.position[0] = 0.1
     add(world, reference, np.zeros(2), tally, now, 2)
     assert not now.any()
     tally.rows[:, 0] = 0.0
-    world.motion[0] = 0.9e-3
+    world.motion.position[0] = 0.9e-3
     add(world, reference, np.zeros(2), tally, now, 2)
     np.testing.assert_array_equal(now, [1, 0])

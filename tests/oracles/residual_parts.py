@@ -41,12 +41,15 @@ class UnexplainedForceObserver:
     def __init__(self, parameters: Parameters) -> None:
         self._period, self._p = parameters.electronics.control_period, parameter_column(parameters)
         self._rig, self._sampled = parameters, Sampled(parameters)
-        self.met: Array = np.zeros((unexplained.Met.size, 0))
+        self.met: Array = np.zeros((unexplained.Forces.size, 0))
         self.joints: Array = np.zeros((4, 0))
 
     def reset(self, lanes: Mask) -> None:
         if self.met.shape[1] != len(lanes):
-            self.met, self._seen = np.zeros((unexplained.Met.size, len(lanes))), np.zeros((unexplained.Ways.size, len(lanes)))
+            self.met, self._seen = (
+                np.zeros((unexplained.Forces.size, len(lanes))),
+                np.zeros((unexplained.Moved.size, len(lanes))),
+            )
             self._measured = Measured(self._rig, unexplained.BANDWIDTH, len(lanes))
             self._sampled = Sampled(self._rig)
         self._measured.pistons.fresh[lanes] = 1.0
@@ -58,5 +61,5 @@ class UnexplainedForceObserver:
         observer = self._sampled if measurement.sampled else self._measured
         self.joints = np.ascontiguousarray(observer.update(measurement, force, np.zeros_like(force)))
         disturbance = np.ascontiguousarray(observer.pistons.disturbance)
-        ways, met = unexplained.Ways(self._seen), unexplained.Met(self.met)
+        ways, met = unexplained.Moved(self._seen), unexplained.Forces(self.met)
         unexplained.remember(Joints(self.joints), disturbance, self._p, self._period, ways, met)

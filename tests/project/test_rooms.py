@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import collections
 import pathlib
 import subprocess
 import sys
@@ -52,3 +53,52 @@ def test_no_module_gives_a_name_twice():
                 twice += [f"{path.relative_to(root)}: {name}" for name in names if name in named]
                 named.update(names)
     assert twice == []
+
+
+LEFT = {
+    "agents/policy": 12, "agents/residual": 4, "baselines": 3, "baselines/admittance": 1, "baselines/bench": 2,
+    "baselines/estimation": 28, "baselines/identification": 6, "baselines/limiter": 8, "baselines/rivals": 4,
+    "birthsim_env": 11, "birthsim_env/loop": 12, "birthsim_env/parts": 17,
+}  # fmt: skip
+"""Folder -> how many subscripts of its kernels have a number for a row; it may only shrink (``physics.compiled.records``)."""
+
+
+def _assigned(function):
+    """Name and value of every assignment in a function, those of tuples one by one."""
+    for node in ast.walk(function):
+        for target in node.targets if isinstance(node, ast.Assign) else []:
+            both = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+            yield from zip(target.elts, node.value.elts, strict=True) if both else [(target, node.value)]
+
+
+def rows_by_number(source):
+    """Subscripts of kernels whose row is written with a number: ``x[12, i]``, ``own[8:10]``, ``rows[36 + k, i]``.
+
+    Rows of a named group are told apart by number: ``seen.force[0, i]`` does not count, nor ``f[0, i]`` after
+    ``f = seen.force``.
+    """
+    for function in ast.walk(ast.parse(source)):
+        decorators = {one.id for one in getattr(function, "decorator_list", []) if isinstance(one, ast.Name)}
+        if not decorators & {"kernel", "helper"}:
+            continue
+        named = {one.id for one, value in _assigned(function) if isinstance(one, ast.Name) and isinstance(value, ast.Attribute)}
+        for node in (one for one in ast.walk(function) if isinstance(one, ast.Subscript)):
+            is_named = isinstance(node.value, ast.Attribute) or getattr(node.value, "id", None) in named
+            row = node.slice.elts[0] if isinstance(node.slice, ast.Tuple) else node.slice
+            if not is_named and any(isinstance(one, ast.Constant) and type(one.value) is int for one in ast.walk(row)):
+                yield ast.unparse(node)
+
+
+def test_rows_by_number_are_found():
+    body = "f, g = seen.force, s[8:10]\n  x[12, i] = rows[36 + k, i] + f[0, i] + seen.force[1, i] + x[ROW, i]"
+    assert sorted(rows_by_number(f"@kernel\ndef k(x):\n  {body}")) == ["rows[36 + k, i]", "s[8:10]", "x[12, i]"]
+    assert not list(rows_by_number(f"def k(x):\n  {body}"))
+
+
+def test_kernels_name_their_rows():
+    root, found = pathlib.Path(__file__).parents[2], collections.Counter()
+    for path in (one for package in (birthsim_env, baselines, agents) for one in (root / package.__name__).rglob("*.py")):
+        *folders, _ = path.relative_to(root).parts
+        if "physics" not in folders:
+            found["/".join(folders[:2])] += len(list(rows_by_number(path.read_text(encoding="utf-8"))))
+    assert {folder: count for folder, count in found.items() if count > LEFT.get(folder, 0)} == {}, "rows without a name"

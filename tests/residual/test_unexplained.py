@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from agents.residual.unexplained import MOVING, Met
+from agents.residual.unexplained import MOVING, Forces
 from baselines.admittance.controller import AdmittanceController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
@@ -76,7 +76,7 @@ def seen(sensors: str, seconds: float = 5.0) -> tuple[list[Measurement], Array]:
 
 
 def course(record: list[Measurement], lanes: int = LANES) -> Array:
-    """What was met, (T, Met.size, N)."""
+    """What was met, (T, Forces.size, N)."""
     observer, path = UnexplainedForceObserver(BELIEVED), []
     observer.reset(np.ones(lanes, dtype=np.bool_))
     for measured in record:
@@ -173,7 +173,7 @@ def test_lanes_are_independent_and_a_reset_forgets_one_alone(sensors: str) -> No
         fresh.update(measured)
         np.testing.assert_array_equal(observer.met[:, 1], fresh.met[:, 1])
         np.testing.assert_array_equal(observer.met[:, [0, 2]], kept[1200 + k][:, [0, 2]])
-    assert fresh.met.shape == (Met.size, LANES)
+    assert fresh.met.shape == (Forces.size, LANES)
 
 
 def test_joints_are_those_of_the_sensors() -> None:

@@ -10,10 +10,10 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from baselines.estimation.stages import MOTION
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
-from baselines.rivals.feedforward import NEEDED, SIGN_WIDTH, WANTED, feedforward
+from baselines.rivals.feedforward import SIGN_WIDTH, Tracked, feedforward
 from baselines.rivals.tracking import TrackingController
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import USER_FORCE
+from birthsim_env.loop.rows import HANDED, Seen
 from birthsim_env.loop.signals import Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics import geometry
@@ -38,7 +38,12 @@ def prepared(joints: Array, force: Array, rig: Parameters, fraction: float, forc
     motion[6:8] -= force_rate / rig.mechanics.mass
     stage, lanes = feedforward(rig, fraction), joints.shape[1]
     wanted, needed = np.empty((8, lanes)), np.empty((5, lanes))
-    placed = [(motion, MOTION), (force.copy(), USER_FORCE), (wanted, WANTED), (needed, NEEDED)]
+    placed = [
+        (motion, MOTION),
+        (force.copy(), Seen.user_force.first),
+        (wanted, HANDED + Tracked.wanted.first),
+        (needed, HANDED + Tracked.needed.first),
+    ]
     Loop(lanes, [], placed, [Stage(stage.function, stage.constants, sees_world=False)]).run()
     np.testing.assert_allclose(wanted[:6], joints[:6], atol=1e-10)
     return needed
@@ -177,8 +182,8 @@ def test_the_linear_model_is_the_control_model_about_rest() -> None:
 def test_the_schedule_covers_the_workspace_and_is_fine_enough() -> None:
     rig, tolerances = TILTED, np.array([4e-4, 3e-3, 0.2, 20.0])
     law = LinearQuadratic(rig, **dict(zip(LinearQuadratic.TUNABLE, tolerances, strict=False)))
-    design = np.array([0.0, *law._designs["lab"]])
-    low, step, table = design[lqr.LOWEST], design[lqr.STEP], design[lqr.TABLE :].reshape(8, lqr.SCHEDULE)
+    design = law._designs["lab"]
+    low, step, table = design["lowest"], design["step"], design["table"].reshape(8, lqr.SCHEDULE)
     high = low + step * (lqr.SCHEDULE - 1)
     strokes = np.array(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 5))).reshape(2, -1)
     kappa = np.hypot(*geometry.jacobian(strokes * [[rig.cylinder1.stroke], [rig.cylinder2.stroke]], rig)[:, 0])

@@ -13,7 +13,7 @@ import pytest
 from baselines import BacksteppingController
 from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
-from baselines.rivals.tracking import INTEGRAL, TrackingController, beyond
+from baselines.rivals.tracking import Integrals, TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics import geometry
@@ -52,7 +52,7 @@ def rivals(kind: type[TrackingController], count: int) -> list[TrackingControlle
 
 def integrals(law: TrackingController) -> Array:
     """Of cylinders 1 and 2, (2, N)."""
-    return law._memories[-1][INTEGRAL : INTEGRAL + 2].copy()
+    return Integrals(law._memories[-1]).integral.copy()
 
 
 def circle_error(command: Callable[..., Array], rig: Parameters, lab: bool) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from birthsim_env.loop.rows import Seen, World
+from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import Stage, table2, table3, table4
 from birthsim_env.parts.drawn.seeding import Range, draw, put, vectorised
 from birthsim_env.parts.hands.user_forces import STRONGEST, AlternatingSteps, UserForce
@@ -155,14 +156,14 @@ class Grip(Numbers):
 
 
 @helper
-def _guide(time: Array, motion: Array, arm: Arm, points: Array, hand: Hand, grip: Grip, force: Array, n: int) -> None:
-    """``motion`` (4, N): x, y, vx, vy of the end effector; ``points`` (POINTS, 2, N), m from where the hand began."""
+def _guide(time: Array, motion: Point, arm: Arm, points: Array, hand: Hand, grip: Grip, force: Array, n: int) -> None:
+    """``motion`` of the end effector; ``points`` (POINTS, 2, N), m from where the hand began."""
     for i in range(n):
         mass, spring, damper, lasts = arm.mass[i], arm.stiffness[i], arm.damping[i], arm.lasts[i]
         if not (hand.time[i] <= time[i]):
             for axis in range(2):
-                hand.position[axis, i], hand.velocity[axis, i] = motion[axis, i], motion[2 + axis, i]
-                hand.origin[axis, i] = motion[axis, i]
+                place, speed = motion.position[axis, i], motion.velocity[axis, i]
+                hand.position[axis, i], hand.velocity[axis, i], hand.origin[axis, i] = place, speed, place
             hand.time[i] = time[i]
         passed = time[i] - hand.time[i]
         steps = math.ceil(passed / STEP - 1e-6)
@@ -187,9 +188,9 @@ def _guide(time: Array, motion: Array, arm: Arm, points: Array, hand: Hand, grip
 
 
 @helper
-def _held(motion: Array, hand: Hand, grip: Grip, axis: int, i: int) -> float:
+def _held(motion: Point, hand: Hand, grip: Grip, axis: int, i: int) -> float:
     """What the grip pulls the end effector with, N."""
-    off, pace = hand.position[axis, i] - motion[axis, i], hand.velocity[axis, i] - motion[2 + axis, i]
+    off, pace = hand.position[axis, i] - motion.position[axis, i], hand.velocity[axis, i] - motion.velocity[axis, i]
     pull: float = grip.stiffness * off + grip.damping * pace
     return pull
 
@@ -245,7 +246,7 @@ class Guided(UserForce):
 
     def force(self, time: Array, position: Array, velocity: Array) -> Array:
         forces = np.empty((1, 2, time.shape[1]))
-        motion, grip = np.concatenate([position, velocity]), Grip(np.array(self.GRIP))
+        motion, grip = Point(np.concatenate([position, velocity])), Grip(np.array(self.GRIP))
         _guide(time[0], motion, Arm(self._own), self._points, Hand(self._state), grip, forces[0], time.shape[1])
         return forces
 

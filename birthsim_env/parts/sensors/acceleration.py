@@ -11,7 +11,7 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
 
-class Felt(Rows):
+class Accelerometer(Rows):
     """What the sensor remembers."""
 
     velocity = rows("x y", "m/s", "of the end effector a period ago")
@@ -29,28 +29,28 @@ def passed(bandwidth: float, period: float) -> float:
 
 
 @helper
-def looked(felt: Felt, i: int, tick: int) -> bool:
+def looked(memory: Accelerometer, i: int, tick: int) -> bool:
     """Whether lane ``i`` has been measured in this period before: it is where others begin anew."""
-    before = tick > 0 and felt.tick[i] == tick
-    felt.tick[i] = tick
+    before = tick > 0 and memory.tick[i] == tick
+    memory.tick[i] = tick
     return before
 
 
 @helper
 def feel(
-    felt: Felt, i: int, axis: int, tick: int, velocity: float, gain: float, bias: float, period: float, share: float,
+    memory: Accelerometer, i: int, axis: int, tick: int, velocity: float, gain: float, bias: float, period: float, share: float,
     again: bool,
 ) -> float:  # fmt: skip
-    """Carries what is ``felt`` in lane ``i`` on by one ``period``, s; returns the acceleration without noise, m/s2.
+    """Carries the ``memory`` of lane ``i`` on by one ``period``, s; returns the acceleration without noise, m/s2.
 
     ``share`` is that of ``passed``. ``again`` is what ``looked`` says; the memory stays as it is then. Where an episode begins
     nothing is known of the motion before it, and the acceleration is taken for zero.
     """
     if not again:
-        before = velocity if tick == 0 else felt.velocity[axis, i]
+        before = velocity if tick == 0 else memory.velocity[axis, i]
         now = (1.0 + gain) * ((velocity - before) / period) + bias
-        felt.velocity[axis, i] = velocity
-        last = felt.low_passed[axis, i]
-        felt.low_passed[axis, i] = now if tick == 0 else last + share * (now - last)
-    low_passed: float = felt.low_passed[axis, i]
+        memory.velocity[axis, i] = velocity
+        last = memory.low_passed[axis, i]
+        memory.low_passed[axis, i] = now if tick == 0 else last + share * (now - last)
+    low_passed: float = memory.low_passed[axis, i]
     return low_passed

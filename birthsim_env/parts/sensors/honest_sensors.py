@@ -31,7 +31,7 @@ TRACKED, NOISE_OF_FORCE, LOST, MISSED, LATE = 4, 6, 8, 9, 10
 """Channels of random numbers; the pressures have the first four, all as the sensor model ``lab``."""
 
 
-class Shown(Rows):
+class Readings(Rows):
     """What the sensors say, which stays as it is in a missed period."""
 
     position = rows("x y", "m", "of the end effector")
@@ -54,8 +54,8 @@ class Kept(NamedTuple):
     """Forces behind the low-pass, N, (2, N)."""
     late: Array
     """The last forces converted, N, (Q, 2, N)."""
-    shown: Shown
-    felt: acceleration.Felt
+    readings: Readings
+    accelerometer: acceleration.Accelerometer
 
 
 @helper
@@ -88,64 +88,74 @@ def _track(world: World, seen: Signals, shared: Shared, kept: Kept, i: int, tick
     e, key, time, latency = kept.errors, kept.keys[i], seen.time[i], kept.errors.figures.position_latency[i]
     due = tracker.sample_due(tick, time, shared.period, shared.rate)
     if due and (tick == 0 or not happens(key, tick, LOST, e.figures.position_dropout[i])):
-        x, y = world.motion[0, i], world.motion[1, i]
+        x, y = world.motion.position[0, i], world.motion.position[1, i]
         noise = e.figures.position_noise[i] * _growth(e, shared, i, x, y)
         at_x = _sample(e, shared, i, 0, x, y, noise * normal(key, tick, TRACKED))
         at_y = _sample(e, shared, i, 1, x, y, noise * normal(key, tick, TRACKED + 1))
         tracker.take(kept.queue, i, time, shared.rate, at_x, at_y)
         if tick == 0:
-            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, world.motion[2, i], world.motion[3, i])
+            speed = world.motion.velocity
+            tracker.start(kept.queue, kept.arrived, i, at_x, at_y, speed[0, i], speed[1, i])
     tracker.arrive(kept.queue, kept.arrived, i, time, latency)
 
 
 @helper
 def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> None:
     """One control instant."""
-    e, shown, late, passed, slots = kept.errors, kept.shown, kept.late, kept.passed, kept.late.shape[0]
+    e, readings, late, passed, slots = kept.errors, kept.readings, kept.late, kept.passed, kept.late.shape[0]
     for i in range(n):
         tick, key = int(world.tick[i]), kept.keys[i]
         _track(world, seen, shared, kept, i, tick)
         whole = math.floor(e.delay[i] + 1e-9)
         rest = max(0.0, e.delay[i] - whole)
-        again = acceleration.looked(kept.felt, i, tick)
+        again = acceleration.looked(kept.accelerometer, i, tick)
         read = tick == 0 or not happens(key, tick, MISSED, e.figures.missed_periods[i])
         for axis in range(2):
             force = world.force[axis, i]
-            felt = force + (e.gain[axis, i] * force + e.crosstalk[axis, i] * world.force[1 - axis, i]) + e.bias[axis, i]
+            sensed = force + (e.gain[axis, i] * force + e.crosstalk[axis, i] * world.force[1 - axis, i]) + e.bias[axis, i]
             share = 1.0 if tick == 0 else e.passed[i]
             if not again:
-                passed[axis, i] = passed[axis, i] + share * (felt - passed[axis, i]) if share < 1.0 else felt
-            told = passed[axis, i] + e.figures.force_noise[i] * normal(key, tick, NOISE_OF_FORCE + axis)
-            told = _converted(told, e.force_step[i], -shared.force_range, shared.force_range)
+                passed[axis, i] = passed[axis, i] + share * (sensed - passed[axis, i]) if share < 1.0 else sensed
+            value = passed[axis, i] + e.figures.force_noise[i] * normal(key, tick, NOISE_OF_FORCE + axis)
+            value = _converted(value, e.force_step[i], -shared.force_range, shared.force_range)
             for k in range(slots if tick == 0 else 1):
-                late[(tick + k) % slots, axis, i] = told
+                late[(tick + k) % slots, axis, i] = value
             if read:
                 newer, older = late[(tick - int(whole)) % slots, axis, i], late[(tick - int(whole) - 1) % slots, axis, i]
-                shown.force[axis, i] = newer + rest * (older - newer)
+                readings.force[axis, i] = newer + rest * (older - newer)
             if shared.share > 0.0:
                 gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
-                told = acceleration.feel(
-                    kept.felt, i, axis, tick, world.motion[2 + axis, i], gain, bias, shared.period, shared.share, again
+                value = acceleration.feel(
+                    kept.accelerometer,
+                    i,
+                    axis,
+                    tick,
+                    world.motion.velocity[axis, i],
+                    gain,
+                    bias,
+                    shared.period,
+                    shared.share,
+                    again,
                 )
                 if read:
                     noise = shared.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
-                    shown.acceleration[axis, i] = told + noise
+                    readings.acceleration[axis, i] = value + noise
         if read:
             arrived = kept.arrived
             stamp = arrived.time[i] + (e.figures.position_latency[i] - shared.stamped)
-            shown.position_time[i] = max(0.0, min(seen.time[i], stamp))
+            readings.position_time[i] = max(0.0, min(seen.time[i], stamp))
             for axis in range(2):
-                shown.position[axis, i], shown.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
+                readings.position[axis, i], readings.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             for chamber in range(4):
                 noise = e.figures.pressure_noise[i] * normal(key, tick, chamber)
-                told = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
-                shown.pressure[chamber, i] = _converted(told, e.pressure_step[i], 0.0, shared.pressure_range)
-        seen.position_time[i] = shown.position_time[i]
+                value = world.state[PRESSURES[chamber], i] + e.cells[chamber, i] + noise
+                readings.pressure[chamber, i] = _converted(value, e.pressure_step[i], 0.0, shared.pressure_range)
+        seen.position_time[i] = readings.position_time[i]
         for axis in range(2):
-            seen.position[axis, i], seen.velocity[axis, i] = shown.position[axis, i], shown.velocity[axis, i]
-            seen.user_force[axis, i], seen.acceleration[axis, i] = shown.force[axis, i], shown.acceleration[axis, i]
+            seen.position[axis, i], seen.velocity[axis, i] = readings.position[axis, i], readings.velocity[axis, i]
+            seen.user_force[axis, i], seen.acceleration[axis, i] = readings.force[axis, i], readings.acceleration[axis, i]
         for chamber in range(4):
-            seen.pressure[chamber, i] = shown.pressure[chamber, i]
+            seen.pressure[chamber, i] = readings.pressure[chamber, i]
 
 
 @kernel
@@ -154,7 +164,7 @@ def _honest_stage(world: World, seen: Seen, memory: int, shared: Shared, tables:
     kept = Kept(
         table1(tables, 0).view(np.uint64)[mine], Errors(table2(tables, 1)[:, mine]), table3(tables, 2)[:, :, mine],
         tracker.Arrived(table2(tables, 3)[:, mine]), table2(tables, 4)[:, mine], table3(tables, 5)[:, :, mine],
-        Shown(table2(tables, 6)[:, mine]), acceleration.Felt(table2(tables, 7)[:, mine]),
+        Readings(table2(tables, 6)[:, mine]), acceleration.Accelerometer(table2(tables, 7)[:, mine]),
     )  # fmt: skip
     _honest(world, seen, shared, kept, n)
     return 0
@@ -172,10 +182,10 @@ def _put_out(ticks: NDArray[Any], keys: NDArray[np.uint64], e: Errors, last: Arr
         missed = tick > 0 and happens(keys[i], tick, MISSED, e.figures.missed_periods[i])
         late = jitter * uniform(keys[i], np.uint64(tick * 32 + 2 * LATE)) if tick > 0 and jitter > 0.0 else 0.0
         for valve in range(4):
-            told = _converted(openings[valve, i], e.opening_step[i], -1.0, 1.0)
-            told = last[valve, i] if missed else told
-            openings[valve, i] = told + late * (last[valve, i] - told)
-            last[valve, i] = told
+            value = _converted(openings[valve, i], e.opening_step[i], -1.0, 1.0)
+            value = last[valve, i] if missed else value
+            openings[valve, i] = value + late * (last[valve, i] - value)
+            last[valve, i] = value
 
 
 @kernel
@@ -194,7 +204,7 @@ class HonestSensors:
     transmitter, and lost samples; ``position_time`` is worked out with the latency of the rig as described, which is wrong
     where another one is drawn. Pressures: bias of the episode, noise, converter.
     Acceleration, where the rig has such a sensor: gain and bias of the episode, low-pass, noise. In a missed period everything
-    that is shown stays as it was, and so do the valves, which are commanded through a converter (``board_stage``).
+    that they say stays as it was, and so do the valves, which are commanded through a converter (``board_stage``).
     """
 
     sampled = True
@@ -208,9 +218,9 @@ class HonestSensors:
         self._errors: Array = np.zeros((Errors.size, num_envs))
         self._arrived: Array = np.zeros((tracker.Arrived.size, num_envs))
         self._passed: Array = np.zeros((2, num_envs))
-        self._shown: Array = np.zeros((Shown.size, num_envs))
+        self._readings: Array = np.zeros((Readings.size, num_envs))
         self._last: Array = np.zeros((4, num_envs))
-        self._felt: Array = np.zeros((acceleration.Felt.size, num_envs))
+        self._accelerometer: Array = np.zeros((acceleration.Accelerometer.size, num_envs))
         self._make_room()
 
     def _make_room(self) -> None:
@@ -264,15 +274,18 @@ class HonestSensors:
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         (world, seen), constants = looked_at(ticks, time, motion, pressures, force), Shared(self._shared)
-        arrived, shown, felt = tracker.Arrived(self._arrived), Shown(self._shown), acceleration.Felt(self._felt)
-        kept = Kept(self._keys, Errors(self._errors), self._queue, arrived, self._passed, self._late, shown, felt)
+        accelerometer, arrived = acceleration.Accelerometer(self._accelerometer), tracker.Arrived(self._arrived)
+        kept = Kept(
+            self._keys, Errors(self._errors), self._queue, arrived, self._passed, self._late, Readings(self._readings),
+            accelerometer,
+        )  # fmt: skip
         _honest(world, seen, constants, kept, len(time))
         return measurement_of(seen.rows, True, constants.share > 0.0)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
         tables = (self._keys.view(np.float64), self._errors, self._queue, self._arrived, self._passed, self._late)
-        return Stage(_honest_stage, self._shared, tables=(*tables, self._shown, self._felt))
+        return Stage(_honest_stage, self._shared, tables=(*tables, self._readings, self._accelerometer))
 
     def put_out(self, ticks: NDArray[np.int64], openings: Array) -> Array:
         """What reaches the valves of ``openings`` (4, N): converted, late by the clock's jitter, and not at all in a missed

@@ -14,6 +14,6 @@ def looked_at(
 ) -> tuple[World, Signals]:  # fmt: skip
     """The world of N lanes, as far as sensors know it, and the signals that they write."""
     world, seen = World(np.zeros((World.size, len(time)))), Signals(np.zeros((Signals.size, len(time))))
-    world.tick[:], world.motion[:], world.force[:], seen.time[:] = ticks, motion, force, time
+    world.tick[:], world.motion.rows[:], world.force[:], seen.time[:] = ticks, motion, force, time
     world.state[list(PRESSURES)] = pressures
     return world, seen

@@ -31,10 +31,11 @@ from birthsim_env.physics.electronics import Electronics
 @kernel
 def ideal_stage(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
     """Shows position, velocity, pressures and the hand's force as they are."""
+    place, speed = world.motion.position, world.motion.velocity
     for i in range(n):
         seen.position_time[i] = seen.time[i]
         for axis in range(2):
-            seen.position[axis, i], seen.velocity[axis, i] = world.motion[axis, i], world.motion[2 + axis, i]
+            seen.position[axis, i], seen.velocity[axis, i] = place[axis, i], speed[axis, i]
             seen.user_force[axis, i] = world.force[axis, i]
         for chamber in range(4):
             seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i]
@@ -80,34 +81,35 @@ class Kept(NamedTuple):
     keys: NDArray[np.uint64]
     queue: Array
     arrived: tracker.Arrived
-    felt: acceleration.Felt
+    accelerometer: acceleration.Accelerometer
 
 
 @helper
 def _lab(world: World, seen: Signals, board: Board, kept: Kept, n: int) -> None:
     """One control instant."""
-    arrived = kept.arrived
+    arrived, place, speed = kept.arrived, world.motion.position, world.motion.velocity
     for i in range(n):
         tick, key, time = int(world.tick[i]), kept.keys[i], seen.time[i]
         if tracker.sample_due(tick, time, board.period, board.rate):
-            x = world.motion[0, i] + board.position_noise * normal(key, tick, 4)
-            y = world.motion[1, i] + board.position_noise * normal(key, tick, 5)
+            x = place[0, i] + board.position_noise * normal(key, tick, 4)
+            y = place[1, i] + board.position_noise * normal(key, tick, 5)
             tracker.take(kept.queue, i, time, board.rate, x, y)
             if tick == 0:
-                tracker.start(kept.queue, arrived, i, x, y, world.motion[2, i], world.motion[3, i])
+                tracker.start(kept.queue, arrived, i, x, y, speed[0, i], speed[1, i])
         tracker.arrive(kept.queue, arrived, i, time, board.latency)
         seen.position_time[i] = arrived.time[i]
         for chamber in range(4):
             seen.pressure[chamber, i] = world.state[PRESSURES[chamber], i] + board.pressure_noise * normal(key, tick, chamber)
-        again = acceleration.looked(kept.felt, i, tick)
+        again = acceleration.looked(kept.accelerometer, i, tick)
         for axis in range(2):
             seen.position[axis, i], seen.velocity[axis, i] = arrived.position[axis, i], arrived.velocity[axis, i]
             seen.user_force[axis, i], seen.acceleration[axis, i] = world.force[axis, i], 0.0
             if board.share > 0.0:
-                speed = world.motion[2 + axis, i]
-                felt = acceleration.feel(kept.felt, i, axis, tick, speed, 0.0, 0.0, board.period, board.share, again)
+                sensed = acceleration.feel(
+                    kept.accelerometer, i, axis, tick, speed[axis, i], 0.0, 0.0, board.period, board.share, again
+                )
                 noise = board.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
-                seen.acceleration[axis, i] = felt + noise
+                seen.acceleration[axis, i] = sensed + noise
 
 
 @kernel
@@ -115,7 +117,7 @@ def _lab_stage(world: World, seen: Seen, memory: int, board: Board, tables: int,
     mine = slice(lane, lane + n)
     kept = Kept(
         table1(tables, 0).view(np.uint64)[mine], table3(tables, 1)[:, :, mine], tracker.Arrived(table2(tables, 2)[:, mine]),
-        acceleration.Felt(table2(tables, 3)[:, mine]),
+        acceleration.Accelerometer(table2(tables, 3)[:, mine]),
     )  # fmt: skip
     _lab(world, seen, board, kept, n)
     return 0
@@ -143,7 +145,7 @@ class LabSensors:
         self._queue: Array = np.zeros((tracker.slots(rate, board.position_latency), tracker.Sample.size, num_envs))
         self._arrived: Array = np.zeros((tracker.Arrived.size, num_envs))
         self._keys = np.zeros(num_envs, dtype=np.uint64)
-        self._felt: Array = np.zeros((acceleration.Felt.size, num_envs))
+        self._accelerometer: Array = np.zeros((acceleration.Accelerometer.size, num_envs))
 
     @vectorised
     def begin(self, lane: int, rng: np.random.Generator) -> None:
@@ -153,14 +155,14 @@ class LabSensors:
     def measure(self, ticks: NDArray[np.int64], time: Array, motion: Array, pressures: Array, force: Array) -> Measurement:
         """``motion`` (4, N): x, y, vx, vy of the end effector; ``ticks`` (N,) control periods since the episode began."""
         (world, seen), board = looked_at(ticks, time, motion, pressures, force), Board(self._board)
-        kept = Kept(self._keys, self._queue, tracker.Arrived(self._arrived), acceleration.Felt(self._felt))
+        kept = Kept(self._keys, self._queue, tracker.Arrived(self._arrived), acceleration.Accelerometer(self._accelerometer))
         _lab(world, seen, board, kept, len(time))
         return measurement_of(seen.rows, True, board.share > 0.0)
 
     def stage(self) -> Stage:
         """``measure``, compiled into the closed loop."""
         keys = self._keys.view(np.float64)
-        return Stage(_lab_stage, self._board, tables=(keys, self._queue, self._arrived, self._felt))
+        return Stage(_lab_stage, self._board, tables=(keys, self._queue, self._arrived, self._accelerometer))
 
 
 class SensorModel(Protocol):

@@ -78,9 +78,9 @@ def number(unit: str, about: str) -> Group[float]:
     return Group(1, (unit,), about, single=True)
 
 
-def part(layout: type[L], about: str) -> Group[L]:
-    """The rows of another layout."""
-    return Group(layout.size, (), about, layout=layout)
+def part(layout: type[L], about: str, prefix: str | None = None) -> Group[L]:
+    """The rows of another layout. Others know them by names that begin with ``prefix``, or with the name of the part."""
+    return Group(layout.size, (), about, () if prefix is None else (prefix,), layout)
 
 
 class Rows(Named):
@@ -123,7 +123,7 @@ class Rows(Named):
         """Name, unit, meaning and number of rows of all entries in order, those of a part behind its name."""
         for name, group in cls.groups.items():
             if group.layout:
-                inner = group.layout.entries(f"{prefix}{name}_")
+                inner = group.layout.entries(prefix + (group.names[0] if group.names else f"{name}_"))
                 yield from ((own, unit, f"{group.about}: {about}", count) for own, unit, about, count in inner)
             elif group.names:
                 units = group.units * (1 if len(group.units) > 1 else group.count)
