@@ -59,6 +59,14 @@ SHARED = (
     _law_inside("gym.make_vec step, paper's law inside, 64 lanes", 64),
     _law_inside("gym.make_vec step, paper's law inside, 256 lanes", 256),
     _law_inside("gym.make_vec step, best law, lab sensors, 256 lanes", 256, law="admittance-backstepping", sensors="lab"),
+    *(
+        Job(
+            f"evaluation, best law, lab sensors, {lanes} lanes",
+            "evaluation",
+            {"environment": CIRCLE, "law": "admittance-backstepping", "lanes": lanes, "sensors": "lab", "randomize": True},
+        )
+        for lanes in (64, 256)
+    ),
     Job("reset, all randomized, 1024 lanes", "vector_reset", {"environment": CIRCLE, "lanes": 1024, "randomize": True}),
 )
 """What every checkout has."""

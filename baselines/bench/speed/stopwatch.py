@@ -1,7 +1,8 @@
 """Times environments through Gymnasium alone, in a process of its own that is told line by line what to measure.
 
 A job is a line of JSON, {"kind": name of a function here, its arguments}; the answer is a line too. The file runs under any
-checkout of the project that PYTHONPATH names, so it imports nothing of it but the package that registers the ids.
+checkout of the project that PYTHONPATH names, so it imports nothing of it but the package that registers the ids and what
+evaluates laws.
 """
 
 from __future__ import annotations
@@ -56,6 +57,17 @@ def vector_step(environment: str, lanes: int, budget: float, clock: str = "cpu",
     return seconds_per_call(lambda: env.step(next(actions)), budget, clock) / lanes
 
 
+def evaluation(environment: str, law: str, lanes: int, budget: float, **arguments: Any) -> float:
+    """CPU s per lane and 10 ms of an evaluation with all that it measures, of episodes of 16 s."""
+    from baselines import make_controller
+    from baselines.bench.evaluation import evaluate
+
+    def run() -> None:
+        evaluate(environment, make_controller(law, birthsim_env.Parameters()), law, lanes, 0, False, duration=16.0, **arguments)
+
+    return seconds_per_call(run, budget, "cpu") / lanes / 1600
+
+
 def vector_reset(environment: str, lanes: int, budget: float, **arguments: Any) -> float:
     """CPU s per lane of a reset without a seed."""
     env = gymnasium.make_vec(environment, num_envs=lanes, **arguments)
@@ -78,7 +90,9 @@ def _actions(space: gymnasium.Space[Any], count: int) -> cycle[Any]:
 
 def main() -> None:
     """Says which package it measures, then answers jobs until there are no more."""
-    kinds: dict[str, Callable[..., float]] = {kind.__name__: kind for kind in (step, vector_step, vector_reset, first_step)}
+    kinds: dict[str, Callable[..., float]] = {
+        kind.__name__: kind for kind in (step, vector_step, evaluation, vector_reset, first_step)
+    }
     print(json.dumps(birthsim_env.__file__), flush=True)
     for line in sys.stdin:
         job = json.loads(line)
