@@ -80,8 +80,8 @@ def kappa_range(parameters: Parameters) -> tuple[float, float]:
 def scheduled(table: Array, row: int, place: float) -> float:
     """Entry ``place`` (not necessarily whole) of one row of a table (8, SCHEDULE), which is flat."""
     left = max(0, min(int(place), SCHEDULE - 2))
-    before, after = table[row * SCHEDULE + left], table[row * SCHEDULE + left + 1]
-    entry: float = before + (place - left) * (after - before)
+    first, second = row * SCHEDULE + left, row * SCHEDULE + left + 1
+    entry: float = table[first] + (place - left) * (table[second] - table[first])
     return entry
 
 
