@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -16,22 +15,17 @@ import numpy as np
 
 from baselines.controller import TOLD, Controller, checked_command, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
-from birthsim_env.loop.rows import ACTION, ASKED, OPENING, REFERENCE, Feedforward, Seen, fill_measurement
+from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, Seen, fill_measurement
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import Forgetful
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.compiled.records import Rows, part, row
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.simulation import Simulation
 
 NO_ACTION = np.zeros(0, dtype=np.float32)
 """What a single environment's ``step`` takes where a controller drives it."""
-
-TIMED = 10
-"""Control periods, and repetitions of them, over which a compiled law is timed."""
 
 
 @dataclass(frozen=True)
@@ -155,22 +149,12 @@ class StagedController:
         return []
 
 
-class Told(Rows):
-    """What a law is told besides."""
-
-    feedforward = part(Feedforward, "what it is to believe acts on the pistons")
-    damping_factor = row("1", "damping in units of the least, where the law has one to vary; 0: the law's own")
-
-
 @kernel
-def _ask(world: int, seen: Seen, told: Told, constants: int, tables: int, lane: int, n: int) -> int:
-    """A law is asked for the reference, and told what its memory holds."""
+def ask(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
+    """A law without a residual is asked for the reference; what it is told besides stays as it was set."""
     for i in range(n):
         for k in range(Reference.size):
             seen.asked.rows[k, i] = seen.reference.rows[k, i]
-        for k in range(Feedforward.size):
-            seen.feedforward.rows[k, i] = told.feedforward.rows[k, i]
-        seen.damping_factor[i] = told.damping_factor[i]
     return 0
 
 
@@ -178,14 +162,14 @@ class Driving(Forgetful):
     """A controller as an actuation, called back once per control period. A policy step has no action.
 
     With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``told`` are options of
-    ``command``.
+    ``command``. ``spent`` has the time of each call, us per lane.
     """
 
     size, every_period = 0, True
     names: tuple[str, ...] = ()
 
     def __init__(self, controller: Controller, name: str | None, told: dict[str, Array]) -> None:
-        self.controller, self._name, self._told, self._spent = controller, name, told, list[float]()
+        self.controller, self._name, self._told, self.spent = controller, name, told, list[float]()
 
     def begin(self, lanes: Mask) -> None:
         self.controller.reset(None if lanes.all() else lanes)
@@ -196,12 +180,8 @@ class Driving(Forgetful):
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         started = time.perf_counter()
         command = self.controller.command(measurement, reference, **self._told)
-        self._spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
+        self.spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
         return command if self._name is None else checked_command(self._name, command, plant.num_envs)
-
-    def cost(self, simulation: Simulation) -> list[float]:
-        """us per lane and call."""
-        return self._spent
 
 
 class CompiledDriving(Driving):
@@ -212,14 +192,15 @@ class CompiledDriving(Driving):
     def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """The law, compiled into the closed loop."""
         self.controller.prepare(lanes, sampled)
-        force, rate, factor = map(self._told.get, TOLD)
-        told = feedforward_rows(lanes, force, rate, factor, self.controller.TOLD)
-        before = [] if self.controller.asks else [Stage(_ask, memory=told, sees_world=False)]
-        return [*before, *self.controller.stages()]
+        return [*([] if self.controller.asks else [Stage(ask, sees_world=False)]), *self.controller.stages()]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays that the loop places in rows of what is seen."""
-        return self.controller.more_rows(lanes)
+        own = self.controller.more_rows(lanes)
+        if self.controller.asks:
+            return own
+        force, rate, factor = map(self._told.get, TOLD)
+        return [(feedforward_rows(lanes, force, rate, factor, self.controller.TOLD), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the law."""
@@ -228,15 +209,6 @@ class CompiledDriving(Driving):
     def check(self, measurement: Measurement) -> None:
         """Raise ``ValueError`` where episodes begin with less than the law has to measure."""
         self.controller.require_acceleration(measurement)
-
-    def cost(self, simulation: Simulation) -> list[float]:
-        """us per lane and call, on a copy of a ``simulation`` that this drives."""
-        acting, spent = deepcopy(simulation).loops_of_parts()[1], []
-        for _ in range(TIMED):
-            started = time.perf_counter()
-            acting.run(TIMED)
-            spent.append((time.perf_counter() - started) * 1e6 / TIMED / simulation.plant.num_envs)
-        return spent
 
 
 def driving(controller: Controller, name: str | None, told: dict[str, Array] | None = None) -> Driving:

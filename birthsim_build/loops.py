@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 
 from baselines.registry import controller_names, make_controller
-from baselines.staged import StagedController
+from baselines.staged import StagedController, ask
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
-from birthsim_build.stages import ask, enter_scenario, outside, pair_valves
+from birthsim_build.stages import enter_scenario, outside, pair_valves
 from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import plant_stage

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from agents.policy.files import load_policy
-from agents.policy.seeds import best_policy
-from agents.policy.stage import policy_stage
-from agents.residual.law import ResidualLaw
+from agents.policy.controller import ResidualController
 from birthsim_build.image import Part
-from birthsim_env.assembly import policy_periods
 from birthsim_env.loop.rows import ACTION, SHOWN, WORLD
-from birthsim_env.loop.world import no_force_stage
-from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
 
 def residual_part(rig: Parameters, sampled: bool, policy: str) -> Part:
     """A policy, a folder or a shipped name, with the law that it sits on."""
-    stored = load_policy(best_policy(policy))
-    settings = stored.settings
-    residual = ResidualLaw(rig, settings)
+    residual = ResidualController(rig, policy)
     residual.prepare(1, sampled)
-    shown, periods = residual.shown.shape[0], policy_periods(settings.policy_period, rig)
-    told = policy_stage(stored.network, periods, settings.size, shown, parameter_column(rig), 1)
-    hidden = () if settings.force_sensor else (no_force_stage(),)
-    first = {
-        **{WORLD + ACTION + k: 0.0 for k in range(settings.size)},
-        **{WORLD + SHOWN + k: float(settings.size <= k < settings.size + 2) for k in range(shown)},
-    }
-    return Part((*hidden, told, *residual.stages()), first)
+    rows = (
+        (WORLD + first + k, value)
+        for array, first in ((residual.action, ACTION), (residual.shown, SHOWN))
+        for k, value in enumerate(array[:, 0].tolist())
+    )
+    return Part(tuple(residual.stages()), dict(rows))

@@ -20,20 +20,10 @@ from birthsim_build.layout import (
     PULL,
     STIFFNESS,
 )
-from birthsim_env.loop.rows import ASKED, FORCE, MOTION, OPENING, REFERENCE, SEEN, TIME, WORLD
+from birthsim_env.loop.rows import FORCE, MOTION, OPENING, REFERENCE, SEEN, TIME, WORLD
 from birthsim_env.loop.signals import REFERENCES
 from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled.compilation import kernel
-
-
-@kernel
-def ask(world: int, seen: int, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """A law without a residual is asked for the reference; forces and damping that it is told stay as they were set."""
-    s = block(seen, SEEN)
-    for row in range(REFERENCES):
-        for i in range(n):
-            s[ASKED + row, i] = s[REFERENCE + row, i]
-    return 0
 
 
 @kernel

@@ -88,7 +88,7 @@ def assess(
     ``owed`` is carried on. ``action`` and ``last_action`` (size, N).
     """
     steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
-    unit, size, state, force = steps / LARGEST_COST, max(1, action.shape[0]), world.state, world.force
+    unit, entries, state, force = steps / LARGEST_COST, max(1, action.shape[0]), world.state, world.force
     for i in range(n):
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         given, jumped = compliance(force[0, i], force[1, i], kx, ky, kxy), world.since_jump[i] < limits.jumped_below
@@ -104,7 +104,7 @@ def assess(
         cost = exact.log1p(min(FARTHEST, error) / ERROR_UNIT)
         hunting = exact.log1p(min(FASTEST, speed) / SPEED_UNIT)
         turned, effort = 0.0, 0.0
-        for k in range(size):
+        for k in range(action.shape[0]):
             turned += abs(action[k, i] - last_action[k, i])
             effort += action[k, i] * action[k, i]
         inside = True
@@ -117,6 +117,6 @@ def assess(
         terms.survive[i] = steps
         terms.tracking[i] = -unit * cost
         terms.hunting[i] = -unit * HUNTING_COST * hunting
-        terms.effort[i] = -unit * EFFORT_COST * effort / size
-        terms.action_change[i] = -unit * ACTION_CHANGE_COST * turned / size
+        terms.effort[i] = -unit * EFFORT_COST * effort / entries
+        terms.action_change[i] = -unit * ACTION_CHANGE_COST * turned / entries
         terms.total[i] = terms.survive[i] + terms.tracking[i] + terms.hunting[i] + terms.effort[i] + terms.action_change[i]

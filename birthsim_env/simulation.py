@@ -227,6 +227,7 @@ class Simulation:
             self._assemble()
         self.action[:] = actions
         self.actuation.accept(actions)
+        self.impacts[:] = 0.0
         self.run(self.periods)
 
     def watch(self, commanded: list[Stage], moved: list[Stage]) -> bool:
@@ -240,7 +241,6 @@ class Simulation:
 
     def run(self, periods: int) -> None:
         """Go on by some control periods under the action that was accepted last."""
-        self.impacts[:] = 0.0
         self._run(self._loop, periods)
 
     def _run(self, loop: MixedLoop | None, periods: int) -> None:

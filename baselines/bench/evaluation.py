@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
-from baselines.bench.metrics import UNITS
+from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.controller import Controller
 from baselines.staged import driving
@@ -24,6 +24,9 @@ LANES = 256
 
 AT_ONCE = 250
 """Control periods between two looks at what is lost, where nothing stops the loop."""
+
+TIMED = 10
+"""Calls of a controller, at least, over which its time is taken; a compiled one is called when its episodes are over."""
 
 
 @dataclass
@@ -123,6 +126,7 @@ def _run_batch(
     env.reset(seed=list(seeds))
     asked, simulation = required_strength_ratio(env), env.simulation
     measures = Measures(simulation, env.steps)
+    own = measures.own
     at_once = 1 if measures.stops else AT_ONCE
     bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
     for step in range(0, env.steps, at_once):
@@ -130,20 +134,22 @@ def _run_batch(
         fallen = measures.fallen()
         if fallen.any():
             controller.reset(fallen)
-        if not measures.alive.any():
+        if not own.alive.any():
             break
         if step % AT_ONCE == 0:
             bar.update(AT_ONCE)
     bar.close()
-    spent += driver.cost(simulation)
+    while len(driver.spent) < TIMED:
+        driver.openings(simulation.plant, simulation.measurement, simulation.reference)
+    spent += driver.spent
     env.close()
-    for name, values in measures.metrics().items():
+    for name, values in figures_of(own, period).items():
         result.metrics[name] += values.tolist()
     result.seeds += seeds
     result.required_strength_ratio += asked.tolist()
-    result.lost += (~measures.alive).tolist()
-    result.success += measures.success.tolist()
-    for discount, sums in zip(DISCOUNTS, measures.returns, strict=True):
+    result.lost += (own.alive == 0.0).tolist()
+    result.success += (own.success > 0.0).tolist()
+    for discount, sums in zip(DISCOUNTS, own.returns, strict=True):
         result.returns[discount] += sums.tolist()
     result.traces.append(measures.error.transpose(0, 2, 1))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.bench.metrics import Tally, figures_of, fresh_tally, sample, window
+from baselines.bench.metrics import Tally, fresh_tally, sample, window
 from birthsim_env import reward, success
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
@@ -104,7 +104,8 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
 class Measures:
     """Metrics, rewards, success and error of the episodes that have just begun in a ``simulation``, whose loop they join.
 
-    ``steps`` is the most control periods of an episode. ``error`` (T, 2, N), m, every ``TRACE`` s, is NaN where a lane is lost.
+    ``steps`` is the most control periods of an episode. ``own`` is what has been measured, ``error`` (T, 2, N), m, the error
+    every ``TRACE`` s, NaN where a lane is lost.
     ``stops`` says whether the loop stops in every period for a user's Python.
     """
 
@@ -112,36 +113,17 @@ class Measures:
         period, lanes = simulation.period, simulation.plant.num_envs
         every = max(1, round(TRACE / period))
         self.error: Array = np.full((-(-steps // every), 2, lanes), np.nan)
-        self._period, self._own = period, Memory(fresh_tally(lanes, Memory.size - Tally.size))
-        self._own.weight[:] = 1.0
+        self.own = Memory(fresh_tally(lanes, Memory.size - Tally.size))
+        self.own.weight[:] = 1.0
         limits = reward.Limits.numbers(
             period=period, jumped_below=period - 0.5 * period, impact_speed=simulation.parameters.mechanics.impact_speed
         )
         about = About.numbers(limits=limits, every=every, discounts=np.power(DISCOUNTS, period / 0.01))
-        see = Stage(_see, about, self._own.rows, (window(lanes, period), self.error))
-        self.stops = simulation.watch([see], [Stage(_pay, about, self._own.rows)])
-
-    @property
-    def alive(self) -> NDArray[np.bool_]:
-        """Lanes (N,) that are not lost."""
-        return np.asarray(self._own.alive > 0.0)
-
-    @property
-    def success(self) -> NDArray[np.bool_]:
-        """Lanes (N,) that are successful so far, see ``birthsim_env.success``."""
-        return np.asarray(self._own.success > 0.0)
-
-    @property
-    def returns(self) -> Array:
-        """Sums of discounted rewards, (D, N), for each of ``DISCOUNTS``."""
-        return self._own.returns.copy()
+        see = Stage(_see, about, self.own.rows, (window(lanes, period), self.error))
+        self.stops = simulation.watch([see], [Stage(_pay, about, self.own.rows)])
 
     def fallen(self) -> NDArray[np.bool_]:
         """Lanes (N,) that have left the physical range since the last call."""
-        fallen: NDArray[np.bool_] = self._own.fallen > 0.0
-        self._own.fallen[:] = 0.0
+        fallen: NDArray[np.bool_] = self.own.fallen > 0.0
+        self.own.fallen[:] = 0.0
         return fallen
-
-    def metrics(self) -> dict[str, Array]:
-        """Every metric of ``metrics.UNITS`` per lane, (N,)."""
-        return figures_of(self._own, self._period)

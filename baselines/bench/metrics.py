@@ -1,4 +1,4 @@
-"""What an evaluation measures, accumulated while lanes run (docs/controllers.md): tracking, stiffness, hunting, air."""
+"""What an evaluation measures, accumulated while lanes run: tracking, stiffness, hunting, air."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.info import Info
-from birthsim_env.loop.stage import scratch
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
 from birthsim_env.success import SETTLED
@@ -67,10 +66,6 @@ class Asked(Rows):
     pneumatic_stiffness = rows(2, "N/m", "setpoint of the cylinders")
 
 
-STILL = Asked.compliant_target.first
-"""So many of the first rows stay as they are in a stiffness test."""
-
-
 class Tally(Rows):
     """What is carried from sample to sample."""
 
@@ -98,7 +93,6 @@ class Tally(Rows):
     is_held = row("1", "1 where a push has been held for ``HELD`` s")
     moved = rows(2, "m", "mean position of the last ``WINDOW`` s")
     wanted = rows(2, "m", "displacement asked for")
-    push = rows(2, "N", "the hand's force")
     before = part(Asked, "at the last sample")
     alive = row("1", "1 in lanes that are measured")
 
@@ -139,12 +133,14 @@ def _hunt(now: Info, period: float, tally: Tally, i: int) -> None:
 
 
 @helper
-def _add_rest(now: Info, asked: Asked, period: float, tally: Tally, kept: Array, i: int) -> None:
+def _add_rest(now: Info, period: float, tally: Tally, kept: Array, i: int) -> None:
     width, same, still, before = kept.shape[0], True, True, tally.before
-    for k in range(Asked.size):
-        changed = asked.rows[k, i] != before.rows[k, i]
-        same, still = same and not changed, still and not (changed and k < STILL)
-    if not (same or tally.count[i] <= 1.0):
+    for k in range(2):
+        still = still and now.target[k, i] == before.target[k, i] and now.stiffness_setpoint[k, i] == before.stiffness[k, i]
+        same = same and now.compliant_target[k, i] == before.compliant_target[k, i]
+        same = same and now.user_force[k, i] == before.force[k, i]
+        same = same and now.pneumatic_stiffness_setpoint[k, i] == before.pneumatic_stiffness[k, i]
+    if not ((same and still) or tally.count[i] <= 1.0):
         if before.force[0, i] == 0.0 and before.force[1, i] == 0.0:
             size = min(tally.kept[i], float(width))
             for k in range(2):
@@ -168,10 +164,10 @@ def _add_rest(now: Info, asked: Asked, period: float, tally: Tally, kept: Array,
     tally.is_held[i] = 1.0 if pushed and tally.quiet_now[i] >= HELD else 0.0
     for k in range(2):
         tally.moved[k, i] = tally.sum[k, i] / min(tally.kept[i], float(width))
-        tally.wanted[k, i] = asked.compliant_target[k, i] - asked.target[k, i]
-        tally.push[k, i] = now.user_force[k, i]
-    for k in range(Asked.size):
-        before.rows[k, i] = asked.rows[k, i]
+        tally.wanted[k, i] = now.compliant_target[k, i] - now.target[k, i]
+        before.target[k, i], before.compliant_target[k, i] = now.target[k, i], now.compliant_target[k, i]
+        before.stiffness[k, i], before.force[k, i] = now.stiffness_setpoint[k, i], now.user_force[k, i]
+        before.pneumatic_stiffness[k, i] = now.pneumatic_stiffness_setpoint[k, i]
 
 
 @helper
@@ -181,23 +177,15 @@ def sample(now: Info, command: Array, period: float, tally: Tally, kept: Array, 
     ``kept`` (W, 2, N): the positions of the last W samples since anything asked for changed. A lane that is not alive is left
     as it is.
     """
-    asked = Asked(scratch(Asked.size))
     for i in range(n):
-        for k in range(2):
-            asked.target[k, i], asked.compliant_target[k, i] = now.target[k, i], now.compliant_target[k, i]
-            asked.stiffness[k, i], asked.force[k, i] = now.stiffness_setpoint[k, i], now.user_force[k, i]
-            asked.pneumatic_stiffness[k, i] = now.pneumatic_stiffness_setpoint[k, i]
         if tally.alive[i] > 0.0:
             _add_errors(now, command, period, tally, i)
-            _add_rest(now, asked, period, tally, kept, i)
+            _add_rest(now, period, tally, kept, i)
 
 
 @kernel
 def _sample(now: Info, command: Array, period: float, tally: Tally, kept: Array) -> None:
-    for first in range(0, command.shape[1], BLOCK):
-        part = slice(first, min(first + BLOCK, command.shape[1]))
-        n = part.stop - first
-        sample(Info(now.rows[:, part]), command[:, part], period, Tally(tally.rows[:, part]), kept[:, :, part], n)
+    sample(now, command, period, tally, kept, command.shape[1])
 
 
 def fresh_tally(lanes: int, more: int = 0) -> Array:
@@ -269,7 +257,7 @@ def figures_of(tally: Tally, period: float) -> dict[str, Array]:
 
 
 def _rendered(tally: Tally) -> tuple[Array, Array, Array]:
-    push, asked, moved = tally.push, tally.wanted, tally.moved - tally.rest
+    push, asked, moved = tally.before.force, tally.wanted, tally.moved - tally.rest
     direction = push / np.hypot(*push)
     along, wanted = (np.einsum("in,in->n", way, direction) for way in (moved, asked))
     across = direction[0] * (moved - asked)[1] - direction[1] * (moved - asked)[0]

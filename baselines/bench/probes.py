@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.bench.resting import RestingRigs, recording
+from baselines.bench.resting import RestingRigs
 from baselines.bench.statistics import penalize_lost
 from baselines.controller import Controller
 from birthsim_env.loop.signals import REFERENCES, Mask, Reference
@@ -85,14 +85,15 @@ def run_stiffness_test(
     reference, end = probes.reference(), REST + RISE + HOLD
     loop = RestingRigs(rigs, reference, controller, sensors, seed, force_sensor)
     times = np.arange(round(end / loop.period)) * loop.period
-    spans = [np.flatnonzero((times > REST - WINDOW) & (times <= REST)), np.flatnonzero(times > end - WINDOW)]
-    paths = [np.zeros((len(span), 2, probes.size)) for span in spans]
-    watching = [recording(int(span[0]), path) for span, path in zip(spans, paths, strict=True)]
-    hand = RampedForces(probes.force)
-    loop.close([hand.stage()], watching)
-    loop.run(len(times))
-    rest, held = (path.mean(axis=0) for path in paths)
-    displacement = held - rest
+    loop.close([RampedForces(probes.force).stage()])
+    # The last second of rest, with its end, and that of the hold, without its beginning.
+    begun, rested, held = np.searchsorted(times, [REST - WINDOW, REST, end - WINDOW], "right").tolist()
+    loop.run(begun)
+    paths = [loop.path(rested - begun)]
+    loop.run(held - rested)
+    paths.append(loop.path(len(times) - held))
+    rest, pushed = (path.mean(axis=0) for path in paths)
+    displacement = pushed - rest
     lost = ~np.isfinite(displacement).all(axis=0) | (loop.impacts.max(axis=0) > board_limit(rigs))
     expected = reference.compliant_target(probes.force) - probes.position
     hunting = np.max([np.ptp(path, axis=0) for path in paths], axis=0)

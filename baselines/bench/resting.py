@@ -9,43 +9,18 @@ import numpy as np
 from baselines.controller import Controller
 from baselines.staged import driving
 from birthsim_env.loop.loop import MixedLoop, available_threads
-from birthsim_env.loop.rows import ASKED, REFERENCE, TIME, World
+from birthsim_env.loop.rows import ASKED, REFERENCE, TIME
 from birthsim_env.loop.signals import Reference
-from birthsim_env.loop.stage import Stage, table3
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
-from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Part, Simulation
-
-
-class Begins(Numbers):
-    """Constant of the stage that records."""
-
-    tick = number("1", "the first one that is recorded")
-
-
-@kernel
-def _record(world: World, seen: int, memory: int, begins: Begins, tables: int, lane: int, n: int) -> int:
-    """Table: positions (T, 2, N), m."""
-    path, k = table3(tables, 0)[:, :, lane : lane + n], int(world.tick[0] - begins.tick)
-    if 0 <= k < path.shape[0]:
-        for axis in range(2):
-            for i in range(n):
-                path[k, axis, i] = world.motion.position[axis, i]
-    return 0
-
-
-def recording(first: int, path: Array) -> Stage:
-    """Writes where the end effector is from the tick ``first`` on into ``path`` (T, 2, N), m."""
-    return Stage(_record, Begins.numbers(tick=first), tables=(path,))
 
 
 class RestingRigs(Simulation):
@@ -83,6 +58,14 @@ class RestingRigs(Simulation):
         self._loop = MixedLoop(self.plant.num_envs, *self._places(), order)
         if hasattr(self.actuation, "check"):
             self.actuation.check(self.measurement)
+
+    def path(self, periods: int) -> Array:
+        """Go on by some control periods; returns where the end effector was at the beginning of each, m, (T, 2, N)."""
+        places = np.empty((periods, 2, self.plant.num_envs))
+        for place in places:
+            place[:] = self._motion[:2]
+            self.run(1)
+        return places
 
     def moves(self, _: int = 0) -> None:
         """The clock goes on by a period; the end effector is where the plant has it."""

@@ -31,17 +31,18 @@ def openings(name, sensors, lanes=3, steps=120, shown=None, **gains):
     return np.array(told)
 
 
-def test_without_learning_it_is_the_law_that_it_derives_from():
+def test_with_exact_sensors_and_no_rate_it_is_the_law_that_does_not_learn():
     np.testing.assert_array_equal(
         openings("admittance-adaptive", "ideal", friction_rate=0.0), openings("admittance-backstepping", "ideal")
     )
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "honest"])
-def test_without_a_force_sensor_the_hands_force_is_not_read(sensors):
-    np.testing.assert_array_equal(
-        openings("admittance-sensorless", sensors), openings("admittance-sensorless", sensors, shown=25.0)
-    )
+@pytest.mark.parametrize("learn", [True, False])
+def test_without_a_force_sensor_the_hands_force_is_not_read(sensors, learn):
+    found, pushed = (openings("admittance-sensorless", sensors, shown=shown, learn=learn) for shown in (None, 25.0))
+    np.testing.assert_array_equal(found, pushed)
+    assert np.abs(found).max() > 0.01
 
 
 @pytest.mark.parametrize("factor", [0.5, pytest.param(1.6, marks=pytest.mark.slow)])
