@@ -78,10 +78,10 @@ def kappa_range(parameters: Parameters) -> tuple[float, float]:
 
 @helper
 def scheduled(table: Array, row: int, place: float) -> float:
-    """Entry ``place`` (not necessarily whole) of one row of a table."""
-    last = table.shape[1] - 2
-    left = max(0, min(int(place), last))
-    entry: float = table[row, left] + (place - left) * (table[row, left + 1] - table[row, left])
+    """Entry ``place`` (not necessarily whole) of one row of a table (8, SCHEDULE), which is flat."""
+    left = max(0, min(int(place), SCHEDULE - 2))
+    first, second = row * SCHEDULE + left, row * SCHEDULE + left + 1
+    entry: float = table[first] + (place - left) * (table[second] - table[first])
     return entry
 
 
@@ -104,7 +104,6 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
     lowest, step, zone, c4 = about.lowest, about.step, about.dead_zone, about.pneumatic_gain
-    table = about.table.reshape((8, SCHEDULE))
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
@@ -113,8 +112,8 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
             place = (needed.kappa[i] - lowest) / step
-            k1, k2 = scheduled(table, gain, place), scheduled(table, gain + 1, place)
-            k3, k4 = scheduled(table, gain + 2, place), scheduled(table, gain + 3, place)
+            k1, k2 = scheduled(about.table, gain, place), scheduled(about.table, gain + 1, place)
+            k3, k4 = scheduled(about.table, gain + 2, place), scheduled(about.table, gain + 3, place)
             error, excess = y - wanted.position[cylinder, i], pp * ap - pn * an - needed.force[cylinder, i]
             summed = held(memory, cylinder, i, -k4 * excess / k1)
             wish = k1 * summed + k2 * error + k3 * (v - wanted.speed[cylinder, i]) + k4 * excess
