@@ -55,7 +55,7 @@ def test_no_module_gives_a_name_twice():
     assert twice == []
 
 
-LEFT = {
+ROWS_BY_NUMBER = {
     "agents/policy": 12, "agents/residual": 4, "baselines": 3, "baselines/admittance": 1, "baselines/bench": 2,
     "baselines/estimation": 28, "baselines/identification": 6, "baselines/limiter": 8, "baselines/rivals": 4,
     "birthsim_env": 11, "birthsim_env/loop": 12, "birthsim_env/parts": 17,
@@ -101,4 +101,6 @@ def test_kernels_name_their_rows():
         *folders, _ = path.relative_to(root).parts
         if "physics" not in folders:
             found["/".join(folders[:2])] += len(list(rows_by_number(path.read_text(encoding="utf-8"))))
-    assert {folder: count for folder, count in found.items() if count > LEFT.get(folder, 0)} == {}, "rows without a name"
+    assert {folder: count for folder, count in found.items() if count > ROWS_BY_NUMBER.get(folder, 0)} == {}, (
+        "rows without a name"
+    )
