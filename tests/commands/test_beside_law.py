@@ -71,6 +71,7 @@ def test_other_laws_and_policies_run_in_the_same_worlds(monkeypatch, capsys):
     assert float(settled[-1][4].split()[0]) == pytest.approx(0.0, abs=1e-9), "the mean over seeds of what differs from it"
 
 
+@pytest.mark.slow
 def test_without_a_force_sensor_no_law_that_reads_one_runs_beside(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         told(

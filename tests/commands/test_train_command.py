@@ -11,6 +11,7 @@ from baselines.work.files import own_folder
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("brief")
 def test_train_writes_a_policy_that_evaluate_runs_beside_the_law(trained, tmp_path, monkeypatch, capsys):
     folder, done = trained

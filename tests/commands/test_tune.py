@@ -93,6 +93,7 @@ def test_the_search_gets_from_a_bad_start_to_the_bottom(own, tmp_path, trial_cos
     assert np.ptp([np.log10(trial["gains"]["stiff"]) for trial in random]) > 2.5, "the random ones cover the range, by decades"
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_carries_on_where_it_was(own, tmp_path, trial_costs, monkeypatch, capsys):
     tried, limit = trial_costs
     options = ("--controller", own, "--trials", 40, "--seed", 5)

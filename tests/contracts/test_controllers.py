@@ -74,7 +74,9 @@ def test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone(name, sensors, ri
     np.testing.assert_array_equal(reset.command(*signals[0]), again.command(*signals[0]))
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not name.endswith("-valves")])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES if not name.endswith("-valves")]
+)
 def test_signals_over_different_lanes_are_refused(name):
     """A compiled loop would read past the shorter array without a word."""
     law = made(name)

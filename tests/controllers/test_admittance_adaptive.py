@@ -79,6 +79,7 @@ def test_nothing_wrong_leaves_nothing():
     assert all(np.abs(values).max() < 1e-9 for values in floor.values())
 
 
+@pytest.mark.slow
 def test_on_circles_a_scale_and_a_gain_leave_their_share():
     """Scale s: the distance from the registration times s/(1 + s); gain g: g times the displacement asked for; else nothing."""
     off = {f"electronics.{name}": 0.0 for name in ("force_gain_error", "force_crosstalk", "position_distortion")}

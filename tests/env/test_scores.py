@@ -30,7 +30,7 @@ they pay more than it, though their settled error is larger."""
         *(pytest.param(name, 24, {}, marks=pytest.mark.slow, id=name) for name in IDS),
     ],
 )
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", ["ideal", pytest.param("lab", marks=pytest.mark.slow)])
 def test_returns_order_controllers_as_their_errors_do(environment, episodes, options, sensors):
     """Slammed valves, then shut ones, the paper's law, and better ones; ending early never pays, with any discount."""
     names = ("slammed-valves", "shut-valves", *(() if environment == PROBE else ("backstepping",)), "admittance-backstepping")

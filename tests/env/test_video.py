@@ -50,6 +50,7 @@ def test_record_video_writes_what_was_drawn_at_the_rate_of_the_environment(tmp_p
         assert np.abs(frames.astype(float) - wanted[::-1]).mean() > 1.1 * np.abs(frames.astype(float) - wanted).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*autoreset mode is same-step:UserWarning")
 def test_several_environments_are_recorded_side_by_side(tmp_path):
     envs = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, render_mode="rgb_array", policy_period=0.02, picture_size=SIZE)

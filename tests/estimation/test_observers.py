@@ -118,8 +118,10 @@ def rms(values: Array) -> Array:
 
 @pytest.mark.parametrize(
     ("rig", "position", "speed"),
-    [(closed_loop.FRICTIONLESS, (5e-5, 1.2e-4), (0.003, 0.007)), (Parameters(), (6e-5, 2.1e-4), (0.0045, 0.025))],
-    ids=["frictionless", "LuGre"],
+    [
+        pytest.param(closed_loop.FRICTIONLESS, (5e-5, 1.2e-4), (0.003, 0.007), id="frictionless", marks=pytest.mark.slow),
+        pytest.param(Parameters(), (6e-5, 2.1e-4), (0.0045, 0.025), id="LuGre"),
+    ],
 )
 def test_position_and_speed_of_a_moving_rig(rig: Parameters, position: tuple[float, float], speed: tuple[float, float]) -> None:
     """RMS against 0.1 mm of the tracker's noise and pistons that move at 23 and 56 mm/s RMS.
@@ -133,7 +135,10 @@ def test_position_and_speed_of_a_moving_rig(rig: Parameters, position: tuple[flo
     assert np.abs(seen["piston error"].mean(axis=(0, 2))).max() < 1e-5, "no offset"
 
 
-@pytest.mark.parametrize(("rate", "latency"), [(240.0, 0.0), (240.0, 0.004), (240.0, 0.05), (60.0, 0.004)])
+@pytest.mark.parametrize(
+    ("rate", "latency"),
+    [*(pytest.param(240.0, late, marks=pytest.mark.slow) for late in (0.0, 0.05)), (240.0, 0.004), (60.0, 0.004)],
+)
 def test_the_trackers_delay_is_made_up_for(rate: float, latency: float) -> None:
     """Without noise: the time by which the estimate trails the motion, fitted by least squares over the circle."""
     changes = {"position_rate": rate, "position_latency": latency, "position_noise": 0.0, "pressure_noise": 0.0}

@@ -125,7 +125,7 @@ def test_a_piston_that_has_slipped_unasked_is_slow_to_rest_again() -> None:
     assert settling(told=True) == pytest.approx(0.08 + REST_TIME, rel=0.5)
 
 
-@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 2e-3, 1e-2])
+@pytest.mark.parametrize("period", [pytest.param(2.5e-4, marks=pytest.mark.slow), 1e-3, 2e-3, 1e-2])
 def test_other_control_periods(period: float) -> None:
     """Noise at rest and awake is much the same at all of them, and the load is found."""
     rig = Parameters().replace({"electronics.control_period": period})

@@ -28,6 +28,7 @@ def assert_no_failures(tmp_path, cases, seed):
     assert all(found["cases"] == cases for found in figures.values())
 
 
+@pytest.mark.slow
 def test_a_dozen_cases_of_every_kind(tmp_path):
     assert_no_failures(tmp_path, 12, 1)
 

@@ -194,6 +194,7 @@ def test_the_scale_of_the_tracker_is_off_about_its_registration():
     assert (scales**2).mean() == pytest.approx(0.02**2 / 3, abs=4.5 * 0.02**2 * math.sqrt(4 / 45 / 500))
 
 
+@pytest.mark.slow
 def test_samples_are_lost_at_their_rate_and_the_others_are_as_ever():
     ticks, lanes = 3000, 8
     lossy, whole = (

@@ -124,6 +124,7 @@ def tops_of(hand, duration, seed=0):
     return [at(times, size, (a + b) / 2) for a, b in plateaus(times, size)]
 
 
+@pytest.mark.slow
 def test_vacuum_pulls_are_those_of_births_as_far_as_the_rig_holds_them():
     np.testing.assert_allclose(tops_of(SCENARIOS["vacuum"].nominal()[1], 24.0), (176, 225, 241))
     tops = np.array([tops_of(SCENARIOS["vacuum"].varied()[1], 24.0, seed) for seed in range(100)])

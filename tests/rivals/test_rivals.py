@@ -77,7 +77,9 @@ def papers_law() -> float:
 
 
 @every_rival
-@pytest.mark.parametrize(("lab", "fraction"), [(False, 0.13), (True, 0.35)], ids=["ideal", "lab"])
+@pytest.mark.parametrize(
+    ("lab", "fraction"), [(False, 0.13), pytest.param(True, 0.35, marks=pytest.mark.slow)], ids=["ideal", "lab"]
+)
 def test_a_rival_stays_on_the_circle(rival: type[TrackingController], lab: bool, fraction: float, papers_law: float) -> None:
     """Measured with exact sensors: PID 0.15, LQR 0.22, sliding mode 0.48 mm RMS; with the tracker 0.70, 0.62 and 1.3 mm."""
     typical, worst = circle_error(rivals(rival, 1)[0].command, HEAVY, lab)

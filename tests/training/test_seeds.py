@@ -62,6 +62,7 @@ def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
     np.testing.assert_allclose([low, high], one.mean() + np.array([-1, 1]) * 1.96 * one.std() / 20, atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     law = evaluation("law", [2.0, 2.0, 2.0, 50.0], beyond=(3,))
     residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
@@ -159,6 +160,7 @@ def test_scores_are_of_policies_that_were_trained_with_their_sensors():
     assert names == {"circle", "circle_lab", "circle_pure"}
 
 
+@pytest.mark.slow
 def test_the_shipped_policy_of_the_circle_has_learned_weight_and_friction(monkeypatch):
     """Once round the circle each way instead of twice."""
     follow = inspection._follow

@@ -62,7 +62,7 @@ def test_nothing_is_found_on_the_page(chromium, server, theme, size):
         assert window.complaints == []
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_is_found_on_a_replay(chromium, tmp_path, theme):
     session = Session(Parameters())
     session.recorder = Recorder(session, tmp_path / "rest.rec")
