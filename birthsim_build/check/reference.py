@@ -9,10 +9,10 @@ import numpy as np
 
 from baselines.controller import Controller
 from baselines.registry import make_controller
+from baselines.staged import Driving, driving
 from birthsim_build.layout import LAYOUT
 from birthsim_env import Measurement, Parameters, Plant, Reference
-from birthsim_env.loop.rows import ASKED, IMPACT, OPENING, SEEN, WORLD, measurement_of
-from birthsim_env.loop.rows import REFERENCE as ASKS
+from birthsim_env.loop.rows import ASKED, IMPACT, OPENING, SEEN, WORLD
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.compiled.lanes import STATES, Array
 
@@ -31,27 +31,45 @@ def make_law(controller: str) -> Controller:
     return make_controller(kind, Parameters(), **({"policy": policy} if policy else {}))
 
 
-def loop_rows(
-    scenario: str, sensors: str, controller: str, periods: int = PERIODS, exchange: Any = None, **world: Any
-) -> Array:
-    """Rows of world and seen after each control period (periods, WORLD + SEEN) of the nominal scenario under a controller.
+class OneValve(Driving):
+    """A controller, called back, with one valve per cylinder: it gets half the difference of its chambers' openings."""
 
-    ``exchange`` {"at", "controller"} puts another controller in its place; ``world`` are arguments of the environment.
+    def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
+        opened = super().openings(plant, measurement, reference)
+        half = (opened[::2] - opened[1::2]) / 2
+        return np.stack([half[0], -half[0], half[1], -half[1]])
+
+
+def whole_rows(
+    scenario: str, sensors: str, controller: str, periods: int = PERIODS, exchange: Any = None,
+    valves: str = "two_valves", **world: Any,
+) -> Array:  # fmt: skip
+    """Rows of world and seen before the first control period and after each, (1 + periods, WORLD + SEEN).
+
+    The scenario is nominal. ``exchange`` {"at", "controller"} puts another controller in its place; ``world`` are arguments of
+    the environment.
     """
+
+    def drives(name: str) -> Driving:
+        return OneValve(make_law(name), name, {}) if valves == "one_valve" else driving(make_law(name), name)
+
     period = Parameters().electronics.control_period
-    env: Any = gymnasium.make_vec(environment_id(scenario), num_envs=1, sensors=sensors, policy_period=period, **world)
+    own = {"sensors": sensors, "policy_period": period, "actuation": drives(controller), **world}
+    env: Any = gymnasium.make_vec(environment_id(scenario), num_envs=1, **own)
     env.reset(seed=0)
-    law, simulation = make_law(controller), env.unwrapped.simulation
-    rows = np.empty((periods, WORLD + SEEN))
+    simulation, rows = env.unwrapped.simulation, np.empty((1 + periods, WORLD + SEEN))
     for k, row in enumerate(rows):
-        if exchange and exchange["at"] == k:
-            law = make_law(exchange["controller"])
-        opened = law.command(simulation.measurement, simulation.reference)
-        if simulation.actuation.size == 2:
-            opened = (opened[[0, 2]] - opened[[1, 3]]) / 2
-        simulation.step(np.ascontiguousarray(opened))
+        if k:
+            simulation.step(simulation.action)
         row[:] = np.concatenate(simulation.rows())[:, 0]
+        if exchange and exchange["at"] == k:
+            simulation.actuation = drives(exchange["controller"])
     return rows
+
+
+def loop_rows(*case: Any, **options: Any) -> Array:
+    """Rows of world and seen after each control period, (periods, WORLD + SEEN): arguments of ``whole_rows``."""
+    return whole_rows(*case, **options)[1:]
 
 
 def plant_states(periods: int = PERIODS) -> tuple[dict[str, Array], Array]:
@@ -68,13 +86,9 @@ def plant_states(periods: int = PERIODS) -> tuple[dict[str, Array], Array]:
 
 
 def law_openings(controller: str, sensors: str, periods: int = PERIODS) -> tuple[Array, Array]:
-    """A law alone on what it saw in a closed loop: what it sees (periods, ASKED) and the openings (periods, 4)."""
-    seen = loop_rows("circle", sensors, controller, periods)[:, WORLD : WORLD + ASKED]
-    law, openings = make_law(controller), np.empty((periods, 4))
-    for opened, now in zip(openings, seen, strict=True):
-        said: Measurement = measurement_of(now[:, None], sensors != "ideal", False)
-        opened[:] = law.command(said, Reference(now[ASKS:ASKED, None]))[:, 0]
-    return seen, openings
+    """What a law saw in a closed loop before each period (periods, ASKED), and the openings that it commanded (periods, 4)."""
+    seen = whole_rows("circle", sensors, controller, periods)[:, WORLD:]
+    return seen[:-1, :ASKED], seen[1:, OPENING : OPENING + 4]
 
 
 def as_inputs(seen: Array) -> dict[str, Array]:
