@@ -9,8 +9,10 @@ from baselines.backstepping.controller import BacksteppingController
 from baselines.controller import Controller
 from baselines.registry import make_controller
 from baselines.rivals.tracking import TrackingController
+from baselines.staged import Driving
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.settings import RESIDUAL
 
@@ -29,8 +31,7 @@ def has_damping(controller: Controller) -> bool:
     return isinstance(controller, DAMPED)
 
 
-def openings(controller: Controller, measurement: Measurement, reference: Reference, damping: float) -> Array:
+def openings(controller: Controller, plant: Plant, measurement: Measurement, reference: Reference, damping: float) -> Array:
     """Spool openings (4, 1) of one control period, ``damping`` times the least damped where the law has one."""
-    if isinstance(controller, DAMPED):
-        return controller.command(measurement, reference, damping_factor=np.array([damping]))
-    return controller.command(measurement, reference)
+    told = {"damping_factor": np.array([damping])} if has_damping(controller) else {}
+    return Driving(controller, None, told).openings(plant, measurement, reference)

@@ -62,14 +62,14 @@ def on_their_clock(stage: Stage, period: float, inputs: Array) -> list[Stage]:
 class Lane:
     """A rig that ``rig`` describes, the rows of its ``world``, of what is ``seen``, and of the ``inputs`` that act on it.
 
-    ``sampled`` says whether the last measurement was. What is exchanged acts from the next period on.
+    ``plant`` moves it. ``sampled`` says whether the last measurement was. What is exchanged acts from the next period on.
     """
 
     def __init__(self, rig: Parameters, seed: int, scenario: str, sensors: str, valves: str) -> None:
         self.rig, self.seed, self.period = rig, seed, rig.electronics.control_period
         self.world, self.seen = World(np.zeros((World.size, 1))), Seen(np.zeros((Seen.size, 1)))
         self.inputs = Inputs(FIRST[:, None].copy())
-        self._nominal, self._plant = parameter_column(rig), Plant(rig)
+        self._nominal, self.plant = parameter_column(rig), Plant(rig)
         self.sampled = False
         self._shown: Array = np.zeros((stages.SHOWN, 1))
         self._show = self._loop(Stage(stages.show, memory=self._shown))
@@ -141,8 +141,8 @@ class Lane:
             rows[:] = 0.0
         self._sensors.begin(0, stream(self.seed, 0, "sensors"))
         self._begin.run()
-        self._plant.lane_parameters[:], self._plant.state = self.world.rig, self.world.state
-        self.world.rig[:], self.world.motion.rows[:] = self._plant.lane_parameters, self._plant.end_effector()
+        self.plant.lane_parameters[:], self.plant.state = self.world.rig, self.world.state
+        self.world.rig[:], self.world.motion.rows[:] = self.plant.lane_parameters, self.plant.end_effector()
         self._look.run()
         self._sense.run()
         self.sampled = self._sensors.sampled
@@ -162,7 +162,7 @@ class Lane:
         asks = [enter, target, setpoints, force, leave]
         self._begin = self._loop(enter, target, setpoints, leave, Stage(stages.begin, self._nominal))
         self._look, self._sense = self._loop(*asks), self._loop(*senses)
-        self._step = self._loop(*self._valves, *board, plant_stage(self._plant, self.period), *asks, *senses)
+        self._step = self._loop(*self._valves, *board, plant_stage(self.plant, self.period), *asks, *senses)
 
     def _loop(self, *parts: Stage) -> Loop:
         return Loop(1, [(self.world.rows, 0)], [(self.seen.rows, 0)], parts)

@@ -172,7 +172,7 @@ class Session:
     def _advance_one(self) -> None:
         lane = self.lane
         try:
-            commanded = openings(self.controller, lane.measurement, lane.reference, self.settings.damping)
+            commanded = openings(self.controller, lane.plant, lane.measurement, lane.reference, self.settings.damping)
         except Exception as error:
             # Whatever a controller of the bench trips over, the page says it and waits.
             self.lost = f"{self.settings.controller} gives up: {error}"
