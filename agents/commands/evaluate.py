@@ -1,4 +1,4 @@
-"""birthsim-evaluate: controllers over seeded episodes, tables, JSON and figures."""
+"""birthsim evaluate: controllers over seeded episodes, tables, JSON and figures."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ from baselines.work.tasks import Result, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.values import near
 
 
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-evaluate",
+        prog="birthsim evaluate",
         description="Evaluate controllers: the same seeds, so the same worlds, for each of them. With --all on every "
         "environment, with every sensor model, on the rig as given and on rigs drawn at random, and how the stiffness feels.",
         epilog="Without --policy every named controller runs; with it the trained residual runs beside those named, or else "
@@ -59,7 +60,7 @@ def main() -> None:
     )
     parser.add_argument(
         "--policy",
-        help="for the controller 'residual': a folder that birthsim-train wrote, of one training seed or of several, or the "
+        help="for the controller 'residual': a folder that birthsim train wrote, of one training seed or of several, or the "
         "name of what comes with the package, such as circle (default: that of the scenario); not with --all",
     )
     parser.add_argument(
@@ -104,10 +105,8 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = load_parameters(arguments.parameters)
     if arguments.env not in [name for name in gymnasium.registry if name.startswith("BirthSIM/")]:
-        allowed = ", ".join(
-            sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
-        )
-        raise ValueError(f"--env {arguments.env!r}; allowed: {allowed}")
+        allowed = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
+        raise ValueError(f"--env {arguments.env!r}{near(arguments.env, allowed)}; allowed: {', '.join(allowed)}")
     names = list(arguments.controller)
     if "residual" in names and arguments.policy is None:
         arguments.policy = policy_of(arguments.env)
@@ -199,7 +198,3 @@ def _policies(path: str | None) -> tuple[list[Path], list[str], set[str]]:
     laws = dict.fromkeys(policy.settings.law for policy in policies)
     trained = {str(policy.training["sensors"]) for policy in policies if "sensors" in policy.training}
     return folders, [law for law in laws if law != NO_LAW], trained
-
-
-if __name__ == "__main__":
-    main()

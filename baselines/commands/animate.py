@@ -1,4 +1,4 @@
-"""birthsim-animate: two controllers in the same world beside each other, as an animated picture in real time."""
+"""birthsim animate: two controllers in the same world beside each other, as an animated picture in real time."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import near
 
 RATES = (10, 20, 25, 50)
 """Frames per second whose period is a whole number of the 10 ms that a GIF counts in."""
@@ -48,7 +49,7 @@ class Take:
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-animate",
+        prog="birthsim animate",
         description="Two controllers beside each other on the same rig under the same hand, in real time: linkage, magnifier "
         "(the same for both) and error from the compliant target.",
     )
@@ -143,7 +144,7 @@ def _animate(arguments: argparse.Namespace) -> None:
     rig = load_parameters(arguments.parameters)
     known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
     if arguments.env not in known:
-        raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(known)}")
+        raise ValueError(f"--env {arguments.env!r}{near(arguments.env, known)}; allowed: {', '.join(known)}")
     make = partial(
         gymnasium.make, arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
         policy_period=rig.electronics.control_period, **environment_parts(arguments),
@@ -168,7 +169,3 @@ def _animate(arguments: argparse.Namespace) -> None:
         rms, largest = 1e3 * np.sqrt(np.mean(np.square(one.errors))), 1e3 * np.max(one.errors)
         print(f"{name:28} error while it is shown: {rms:.2f} mm RMS, {largest:.2f} mm at most")
     print(f"written to {path}: {len(frames)} frames, {path.stat().st_size / 1e6:.2f} MB")
-
-
-if __name__ == "__main__":
-    main()

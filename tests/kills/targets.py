@@ -43,12 +43,12 @@ TARGETS = {
     target.name: target
     for target in (
         Target(
-            "evaluate", "birthsim-evaluate",
+            "evaluate", "birthsim evaluate",
             ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
         ),
         Target(
-            "compare", "birthsim-evaluate",
+            "compare", "birthsim evaluate",
             (
                 *("--all", "--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
                 *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
@@ -61,17 +61,17 @@ TARGETS = {
             older=("--seed", "7", "--sensors", "lab"),
         ),
         Target(
-            "tune", "birthsim-tune",
+            "tune", "birthsim tune",
             ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
             differ=("trials.journal",), alone=True, partway=True,
         ),
         Target(
-            "train", "birthsim-train",
+            "train", "birthsim train",
             ("--config", "{inputs}/train.toml", "--steps", "2048", "--seeds", "2", "--jobs", "2", "--out", "{out}"),
             differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
         ),
-        Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
-        Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),
+        Target("export", "birthsim export", ("circle", "--out", "{out}"), file="policy.onnx"),
+        Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
             "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
             costs=("cost", "sha256"),
@@ -81,7 +81,7 @@ TARGETS = {
             costs=("cost", "sha256"), alone=True,
         ),
         Target(
-            "animate", "birthsim-animate",
+            "animate", "birthsim animate",
             ("--begin", "0.5", "--end", "1.5", "--rate", "10", "--out", "{out}"), older=("--seed", "7"), file="pair.webp",
         ),
     )
