@@ -17,8 +17,10 @@ class _FoundError(Exception):
 def parser_of(package: str, module: str) -> argparse.ArgumentParser:
     """The parser of a command's module."""
 
-    def give(self: argparse.ArgumentParser, *_: object) -> None:
-        raise _FoundError(self)
+    def give(self: argparse.ArgumentParser, *_: object) -> tuple[argparse.Namespace, list[str]]:
+        if self.add_help:
+            raise _FoundError(self)
+        return argparse.Namespace(config=None), []  # what looks for --config only
 
     with mock.patch.object(argparse.ArgumentParser, "parse_known_args", give), mock.patch.object(sys, "argv", ["birthsim"]):
         try:

@@ -70,7 +70,7 @@ TARGETS = {
             ("--config", "{inputs}/train.toml", "--steps", "2048", "--seeds", "2", "--jobs", "2", "--out", "{out}"),
             differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
         ),
-        Target("export", "birthsim export", ("circle", "--out", "{out}"), file="policy.onnx"),
+        Target("export", "birthsim export", ("--to", "onnx", "circle", "--out", "{out}"), file="policy.onnx"),
         Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
             "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
@@ -92,5 +92,6 @@ TARGETS = {
 def program(command: str) -> str:
     """Python source that runs a command by the entry point that ``pyproject.toml`` gives it."""
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
-    module, _, function = scripts[command].partition(":")
-    return f"import sys; sys.argv[0] = {command!r}; from {module} import {function}; {function}()"
+    script, *words = command.split()
+    module, _, function = scripts[script].partition(":")
+    return f"import sys; sys.argv[:1] = {[script, *words]!r}; from {module} import {function}; {function}()"
