@@ -11,7 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, policy_of, run, seed_number
+from baselines.commands.shared import RANDOMIZE, check_environment, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_results
@@ -19,7 +19,6 @@ from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.physics.rig.values import near
 
 FIELDS = ("time", "position", "compliant_target", "tracking_error", "user_force")
 """What is kept of ``info``: s, m, m, m, N."""
@@ -47,9 +46,7 @@ def main() -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     rig = load_parameters(arguments.parameters)
-    known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
-    if arguments.env not in known:
-        raise ValueError(f"--env {arguments.env!r}{near(arguments.env, known)}; allowed: {', '.join(known)}")
+    check_environment(arguments.env)
     name = with_options([arguments.controller], arguments.set)[0]
     law = driving(make_controller(name, rig, **({"policy": policy_of(arguments.env)} if name == "residual" else {})), name)
     env = gymnasium.make(

@@ -15,7 +15,7 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, finite_number, policy_of, run, seed_number
+from baselines.commands.shared import RANDOMIZE, check_environment, finite_number, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file
@@ -24,7 +24,6 @@ from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from birthsim_env.physics.rig.values import near
 
 RATES = (10, 20, 25, 50)
 """Frames per second whose period is a whole number of the 10 ms that a GIF counts in."""
@@ -142,9 +141,7 @@ def _animate(arguments: argparse.Namespace) -> None:
     if path.suffix not in (".webp", ".gif"):
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
     rig = load_parameters(arguments.parameters)
-    known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
-    if arguments.env not in known:
-        raise ValueError(f"--env {arguments.env!r}{near(arguments.env, known)}; allowed: {', '.join(known)}")
+    check_environment(arguments.env)
     make = partial(
         gymnasium.make, arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
         policy_period=rig.electronics.control_period, **environment_parts(arguments),

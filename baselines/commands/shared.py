@@ -197,6 +197,13 @@ def shown_arguments(arguments: argparse.Namespace) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def check_environment(name: str) -> None:
+    """Raises ``ValueError`` for an id that is none of the experiments."""
+    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and "Residual" not in one)
+    if name not in known:
+        raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
+
+
 def check_world(environment: str, **arguments: Any) -> None:
     """Raises ``ValueError`` for arguments with which no episode of an environment begins, before anything else is done."""
     env: Any = gymnasium.make(environment, **arguments)

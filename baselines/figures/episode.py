@@ -18,8 +18,8 @@ def episode_figure(episode: dict[str, Array], title: str, folder: Path) -> list[
         figure, (path, error, force) = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
         for name, colour, style in (("compliant_target", MIDDLE, "--"), ("position", DARK, "-")):
             path.plot(*(millimetres * episode[name].T), color=colour, ls=style, lw=1.2, label=name.replace("_", " "))
-        path.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal", title=title)
-        path.title.set_fontsize(8)
+        path.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+        figure.suptitle(title, fontsize=9)
         path.legend()
         error.plot(time, millimetres * np.linalg.norm(episode["tracking_error"], axis=1), color=DARK, lw=1)
         error.set(xlabel="time (s)", ylabel="tracking error (mm)")
