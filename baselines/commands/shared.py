@@ -95,10 +95,9 @@ def _configure(parser: argparse.ArgumentParser, path: str, options: dict[str, ar
             allowed = ", ".join(known[2:] for known in options if known.startswith("--") and known != "--help")
             parser.error(f"--config {path!r}: {shown(name)}{near(option[2:], allowed.split(', '))}; allowed: {allowed}")
         action = options[option]
-        many, values = action.nargs not in (None, 0), value if isinstance(value, list) else [value]
-        fits = (
-            isinstance(value, bool) if action.nargs == 0 else (many or len(values) == 1) and not isinstance(value, bool | dict)
-        )
+        values = value if isinstance(value, list) else [value]
+        many, count = action.nargs not in (None, 0), 1 if action.nargs is None else action.nargs
+        fits = isinstance(value, bool) if count == 0 else not isinstance(value, bool | dict) and count in (len(values), "+")
         if not fits or (action.choices is not None and not {*map(str, values)} <= {*map(str, action.choices)}):
             allowed = "true or false" if action.nargs == 0 else ", ".join(map(str, action.choices or ["what the option takes"]))
             parser.error(f"--config {path!r}: {name} = {shown(value)}; allowed: {allowed}")

@@ -72,6 +72,10 @@ def test_options_come_from_toml_and_what_is_typed_counts_more(monkeypatch, capsy
     typed = call("run", monkeypatch, capsys, "--config", "own.toml", "--env", "BirthSIM/There-v1")[2]
     assert "--env 'BirthSIM/There-v1'" in typed
     assert not (tmp_path / "x").exists()
+    (tmp_path / "own.toml").write_text('controller = ["pid"]\n')
+    assert (
+        "controller = ['pid']; allowed: " in call("animate", monkeypatch, capsys, "--config", "own.toml", "--out", "x.gif")[2]
+    )
 
 
 @pytest.mark.parametrize(
