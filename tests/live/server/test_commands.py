@@ -24,7 +24,7 @@ def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path:
         try:
             assert process.stdout is not None
             line = next(line for line in process.stdout if "http://" in line)
-            address = line.split()[1]
+            address = next(word for word in line.split() if word.startswith("http:"))
             with connect(address.replace("http", "ws") + "/ws", open_timeout=PATIENCE) as ws:
                 assert json.loads(ws.recv())["type"] == "hello"
                 ws.send('{"type":"record","on":true}')
