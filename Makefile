@@ -85,18 +85,18 @@ run: $(BASE)
 	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
 	@echo "== 2 of 3: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
-	$(BIN)/birthsim-train --config circle_quick --seed 0 --out $(OUT)/policy
+	$(BIN)/birthsim train --config circle_quick --seed 0 --out $(OUT)/policy
 	@echo "== 3 of 3: the paper's law, the best law and the residual on 64 episodes that training never saw"
-	$(BIN)/birthsim-evaluate --controller backstepping admittance-backstepping residual --policy $(OUT)/policy \
+	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual --policy $(OUT)/policy \
 	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
 	@echo "== What to try next"
-	@echo "$(BIN)/birthsim-live                                       the rig in the browser, to be pulled with the mouse"
-	@echo "$(BIN)/birthsim-evaluate --controller backstepping examples/pd.py:PD --out $(OUT)/mine    a controller of your own"
-	@echo "$(BIN)/birthsim-evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
+	@echo "$(BIN)/birthsim live                                       the rig in the browser, to be pulled with the mouse"
+	@echo "$(BIN)/birthsim evaluate --controller backstepping examples/pd.py:PD --out $(OUT)/mine    a controller of your own"
+	@echo "$(BIN)/birthsim evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
 
 figure: $(BASE)
 	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
-	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+	$(BIN)/birthsim figure4 --out $(OUT)/figure4
 
 test: $(READY)
 	$(BIN)/python -m tests.warming
@@ -143,8 +143,8 @@ kills: $(READY)
 	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim_env baselines agents birthsim_build birthsim_live tests .ci
-	$(BIN)/ruff format --check birthsim_env baselines agents birthsim_build birthsim_live tests .ci
+	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live tests .ci
+	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/ruff check docs/conf.py docs/_generate
@@ -193,13 +193,13 @@ bench: $(READY)
 	$(BIN)/python -m birthsim_build.commands.targets --out $(OUT)/targets
 
 pictures: $(READY)
-	$(BIN)/birthsim-figure4 --out $(OUT)/figure4
+	$(BIN)/birthsim figure4 --out $(OUT)/figure4
 	cp $(OUT)/figure4/figure4.png $(OUT)/figure4/rig.png docs/
-	$(BIN)/birthsim-animate --seed 1 --out docs/forceps.webp
-	$(BIN)/birthsim-animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
-	$(BIN)/birthsim-animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
+	$(BIN)/birthsim animate --seed 1 --out docs/forceps.webp
+	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
+	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
 	  --out docs/vacuum.webp
-	$(BIN)/birthsim-evaluate --all --studies-only --out $(OUT)/studies
+	$(BIN)/birthsim evaluate --all --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
 	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
 	cp $(OUT)/robustness/map_0.png docs/robustness.png
@@ -207,9 +207,9 @@ pictures: $(READY)
 	cp $(OUT)/frequency/frequency_responses.png docs/
 
 compare: $(READY)
-	$(BIN)/birthsim-evaluate --all --episodes 100 --out $(OUT)/comparison
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim-evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
+	$(BIN)/birthsim evaluate --all --episodes 100 --out $(OUT)/comparison
+	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
+	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
 	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
 	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
@@ -219,24 +219,24 @@ compare: $(READY)
 # The student learns from teachers that are told the rig, which no controller can be.
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
-	  $(BIN)/birthsim-train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
-	$(BIN)/birthsim-train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
-	$(BIN)/python -m agents.commands.distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
+	  $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
+	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
+	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
 	  --out $(OUT)/training/$(STUDENT)
 	for name in $(LEARNED); do for seed in 0 1 2 3 4; do mkdir -p $(POLICIES)/$$name/seed_$$seed && \
 	  cp $(OUT)/training/$$name/seed_$$seed/policy.safetensors $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
 
 learned: $(READY)
-	$(BIN)/birthsim-evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
+	$(BIN)/birthsim evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
 	for id in Probe-v2 Forceps-v1 Dystocia-v1 Descent-v1; do name=$$(echo $${id%-*} | tr A-Z a-z); \
-	  $(BIN)/birthsim-evaluate --env BirthSIM/$$id --controller residual --policy $$name \
+	  $(BIN)/birthsim evaluate --env BirthSIM/$$id --controller residual --policy $$name \
 	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
-	$(BIN)/birthsim-evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
-	$(BIN)/birthsim-evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
-	$(BIN)/birthsim-evaluate --controller admittance-sensorless backstepping-force-first residual --policy $(STUDENT) --sensors honest $(HONEST_RIG) \
+	$(BIN)/birthsim evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
+	$(BIN)/birthsim evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
+	$(BIN)/birthsim evaluate --controller admittance-sensorless backstepping-force-first residual --policy $(STUDENT) --sensors honest $(HONEST_RIG) \
 	  --episodes 128 --seed 170000 --out $(OUT)/learned/$(STUDENT)
-	$(BIN)/birthsim-explain --policy probe --out $(OUT)/learned/explain_probe
-	$(BIN)/birthsim-explain --policy circle --no-pushes --out $(OUT)/learned/explain
+	$(BIN)/birthsim explain --policy probe --out $(OUT)/learned/explain_probe
+	$(BIN)/birthsim explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	$(call renew,learned,$(foreach name,$(LEARNED),printf "\n## $(name)\n\n"; cat $(OUT)/learned/$(name)/seeds.md; ) \
 	  printf "\n## Every metric\n\nEvery metric of law and residual: [learned.csv](data/learned.csv)\n")
 	{ echo policy,metric,unit,controller,value,q95,max; \
@@ -253,7 +253,7 @@ scratch: $(READY)
 	cp $(OUT)/scratch/scratch.png docs/
 
 moving: $(READY)
-	$(BIN)/birthsim-evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
+	$(BIN)/birthsim evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
 	$(call renew,moving,$(call tables,moving/comparison,moving))
 
 haptics: $(READY)

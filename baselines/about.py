@@ -1,4 +1,4 @@
-"""What each controller is, in a sentence: for the page of ``birthsim-live`` and for the documentation."""
+"""What each controller is, in a sentence: for the page of ``birthsim live`` and for the documentation."""
 
 from __future__ import annotations
 

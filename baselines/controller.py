@@ -93,7 +93,7 @@ def feedforward_rows(
 
 
 class Tunable(Protocol):
-    """A controller whose gains ``birthsim-tune`` finds: ``TUNABLE`` is gain -> (lowest, highest) to try, SI units."""
+    """A controller whose gains ``birthsim tune`` finds: ``TUNABLE`` is gain -> (lowest, highest) to try, SI units."""
 
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
 

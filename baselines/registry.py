@@ -20,7 +20,7 @@ from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, Sliding
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
 from birthsim_env.parts.own_parts import from_file
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_env.physics.rig.values import problem, shown
+from birthsim_env.physics.rig.values import near, problem, shown
 
 Factory = Callable[..., Controller]
 
@@ -58,13 +58,13 @@ SHORT_NAMES = {
 """Short name -> controller with options. Tables, trained policies and recordings have the short names."""
 
 LISTED = ("backstepping", *SHORT_NAMES, "pid", "lqr", "sliding-mode", "nonlinear-mpc")
-"""Controllers that ``birthsim-evaluate --all``, scores, the page and the stored bits compare."""
+"""Controllers that ``birthsim evaluate --all``, scores, the page and the stored bits compare."""
 
 UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
-"""What any controller should beat; ``birthsim-evaluate --all`` leaves them out."""
+"""What any controller should beat; ``birthsim evaluate --all`` leaves them out."""
 
 SLOW = frozenset({"nonlinear-mpc"})
-"""Controllers far from real time, which ``birthsim-evaluate --all`` leaves out unless they are named."""
+"""Controllers far from real time, which ``birthsim evaluate --all`` leaves out unless they are named."""
 
 
 def _others() -> list[str]:
@@ -123,7 +123,8 @@ def _factory(name: str) -> Factory:
             return factory
     if name.rpartition(":")[0].endswith(".py"):
         return partial(_own, name, from_file("controller", name))
-    raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(controller_names())}, or path/to/file.py:Class")
+    names = controller_names()
+    raise ValueError(f"controller = {shown(name)}{near(name, names)}; allowed: {', '.join(names)}, or path/to/file.py:Class")
 
 
 def known_options(name: str) -> list[str] | None:

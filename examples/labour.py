@@ -3,7 +3,7 @@
     python examples/labour.py labour.csv
 
 The file holds time, x, y and stiffness. A laboratory puts the output of its own biomechanical model there instead; the commands
-take it too: birthsim-evaluate --env BirthSIM/Descent-v1 --reference labour.csv --stiffness labour.csv ...
+take it too: birthsim evaluate --env BirthSIM/Descent-v1 --reference labour.csv --stiffness labour.csv ...
 """
 
 import sys

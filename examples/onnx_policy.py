@@ -1,7 +1,7 @@
 """An exported policy as a controller: the law at 1 kHz, the policy through onnxruntime every 10 ms. It needs no PyTorch.
 
-    birthsim-export circle --out policy.onnx
-    python examples/onnx_policy.py policy.onnx
+birthsim export --to onnx circle --out policy.onnx
+python examples/onnx_policy.py policy.onnx
 """
 
 import json

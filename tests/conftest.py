@@ -51,7 +51,7 @@ def small(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory, small):
-    """A folder of birthsim-train, and the process that made it."""
+    """A folder of birthsim train, and the process that made it."""
     folder = tmp_path_factory.mktemp("policies") / "deeper" / "policy"
     return folder, run("train", "--config", small, "--steps", 4096, "--seed", 3, "--authority", 60, "--out", folder)
 

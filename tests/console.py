@@ -13,17 +13,11 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-COMMANDS = {
-    **{
-        name: f"baselines.commands.{name}"
-        for name in ("figure4", "animate", "tune", "stability", "bench", "verify", "identify")
-    },
-    "haptics": "baselines.commands.haptics",
-    **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "sweep")},
-    "build": "birthsim_build.commands.build",
-    **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},
-    "fmu": "birthsim_build.commands.fmu",
+STUDIES = {
+    **{name: f"baselines.commands.{name}" for name in ("stability", "bench", "verify", "haptics")},
+    "sweep": "agents.commands.sweep",
 }
+"""Commands that are no part of ``birthsim`` -> their module."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long
 RESIDUAL = "BirthSIM/ProbeResidual-v2"
 
@@ -40,21 +34,28 @@ class Slam:
 """
 
 
+def words(command):
+    """What a process or ``sys.argv`` begins with."""
+    return [STUDIES[command]] if command in STUDIES else ["birthsim", command]
+
+
 def run(command, *arguments):
     """The finished process of a command, in the words of a shell."""
-    line = [sys.executable, "-m", COMMANDS[command], *map(str, arguments)]
+    line = [sys.executable, "-m", *words(command), *map(str, arguments)]
     return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
 def call(command, monkeypatch, capsys, *arguments):
     """Exit status, what was printed and what was complained about, of a command within this process."""
-    monkeypatch.setattr(sys, "argv", [command, *map(str, arguments)])
+    monkeypatch.setattr(sys, "argv", [*words(command), *map(str, arguments)])
     monkeypatch.setenv("NO_COLOR", "1")  # Python 3.14 colours what argparse says
+    monkeypatch.setattr("birthsim.door.answer_signals", lambda name: None)
+    main = importlib.import_module(STUDIES.get(command, "birthsim.door")).main
     status = 0
     try:
-        importlib.import_module(COMMANDS[command]).main()
+        main()
     except SystemExit as end:
-        status = end.code
+        status = end.code or 0
     printed, complained = capsys.readouterr()
     # The first process with an empty cache says that it compiles.
     return status, printed, re.sub(r"(?m)^BirthSIM: compiling .*\n", "", complained)
@@ -77,11 +78,7 @@ def assert_picture(folder, name):
 
 def interrupted(command, arguments, reached):
     """A command that gets Ctrl-C once ``reached()`` is true: the finished process's status and stdout."""
-    # A process that a script starts in the background would ignore Ctrl-C.
-    program = (
-        f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from {COMMANDS[command]} import main; main()"
-    )
-    line = [sys.executable, "-c", program, *map(str, arguments)]
+    line = [sys.executable, "-m", *words(command), *map(str, arguments)]
     # Files hold whatever the command says before anybody reads it; pipes would fill up.
     with tempfile.TemporaryFile("w+") as stdout, tempfile.TemporaryFile("w+") as stderr:
         with subprocess.Popen(line, cwd=ROOT, stdout=stdout, stderr=stderr) as process:

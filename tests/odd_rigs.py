@@ -72,7 +72,7 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
                 return "works", ""
             module = f"{'agents' if command in ('evaluate', 'train') else 'baselines'}.commands.{command}"
             place = out.with_suffix(".webp") if command == "animate" else out
-            argv = [f"birthsim-{command}", *lines[command], "--parameters", str(path), "--out", str(place)]
+            argv = [f"birthsim {command}", *lines[command], "--parameters", str(path), "--out", str(place)]
             with patch.object(sys, "argv", argv):
                 __import__(module)
                 sys.modules[module].main()

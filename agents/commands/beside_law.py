@@ -66,7 +66,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="agents.commands.beside_law", description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "--policy", required=True, metavar="NAME", help="a folder of birthsim-train or distill, or a shipped policy"
+        "--policy", required=True, metavar="NAME", help="a folder of birthsim train or distill, or a shipped policy"
     )
     parser.add_argument(
         "--beside", nargs="+", default=[], metavar="NAME", help=f"what else runs: one or more of {', '.join(LAWS)}, or policies"

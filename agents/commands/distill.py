@@ -1,6 +1,6 @@
 """Recurrent students learn from privileged policies to act without what those are told.
 
-python -m agents.commands.distill --teacher DIR --seeds 5 --out DIR, where DIR/seed_0 ... hold the teachers, one for each
+birthsim distill --teacher DIR --seeds 5 --out DIR, where DIR/seed_0 ... hold the teachers, one for each
 student. A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are
 not done.
 """
@@ -35,7 +35,7 @@ TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
 def main() -> None:
     """Entry point."""
     own = Lessons()
-    parser = argparse.ArgumentParser(prog="agents.commands.distill", description=(__doc__ or "").splitlines()[0])
+    parser = argparse.ArgumentParser(prog="birthsim distill", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--teacher", type=Path, required=True, metavar="DIR", help="privileged policies: seed_0 ... in it")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--hidden", type=whole_up_to(512), default=own.hidden, help="cells of memory (default: %(default)s)")
@@ -106,7 +106,3 @@ def _taught(
         "policy": best,
         "curve": curve,
     }
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""birthsim-explain: what a trained residual has learned, and what a hand feels of it."""
+"""birthsim explain: what a trained residual has learned, and what a hand feels of it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from baselines.work.files import make_folder, write_json, write_text
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-explain",
+        prog="birthsim explain",
         description="Look into a trained residual: its correction against the weight that the law leaves out and against "
         "friction, the frictionless circle, and the stiffness test per setpoint on rigs drawn at random.",
     )
     parser.add_argument(
         "--policy",
         default="circle",
-        help="a folder of birthsim-train, or a name that comes with the package (default: %(default)s)",
+        help="a folder of birthsim train, or a name that comes with the package (default: %(default)s)",
     )
     parser.add_argument("--no-pushes", action="store_true", help="leave out the stiffness test, which takes minutes")
     parser.add_argument(
@@ -89,7 +89,3 @@ def _explain(arguments: argparse.Namespace) -> None:
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
     write_json(folder / "residual.json", content)
     print(f"{text}\n\nwritten to {folder}/: correction.png and .svg, residual.md, residual.json")
-
-
-if __name__ == "__main__":
-    main()

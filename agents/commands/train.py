@@ -1,4 +1,4 @@
-"""birthsim-train: residual policies by reinforcement learning, several seeds in one command."""
+"""birthsim train: residual policies by reinforcement learning, several seeds in one command."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-train",
+        prog="birthsim train",
         description="Train residual policies on top of a control law, by PPO, SAC or TQC.",
         epilog="Options override what the configuration says, and have its values by default. The best policy on validation "
         "worlds is kept whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command "
@@ -131,7 +131,3 @@ def _report(
     print(f"{seconds} s per seed with validation; of the rest")
     for seed, result in zip(seeds, results, strict=True):
         print(f"seed {seed}: {told(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")
-
-
-if __name__ == "__main__":
-    main()

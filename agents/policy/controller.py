@@ -37,7 +37,7 @@ def observation_size(settings: ResidualSettings) -> int:
 class ResidualController(ResidualLaw):
     """The law with a policy on top: the policy is asked every policy period, the law at every call.
 
-    ``policy`` is a folder that ``birthsim-train`` wrote, or the name of a policy that comes with the package. Of several
+    ``policy`` is a folder that ``birthsim train`` wrote, or the name of a policy that comes with the package. Of several
     training seeds the one that did best in validation runs. Raises ``ValueError`` for a damaged or foreign one. ``policy`` may
     also be any ``PolicyFunction``. Then ``settings`` say what it may do; a folder has its own settings.
     """

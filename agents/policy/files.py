@@ -57,7 +57,7 @@ def save_policy(policy: Policy | bytes, folder: Path) -> None:
 def load_policy(folder: str | Path) -> Policy:
     """Read a policy folder; raises ``ValueError`` that says what is missing, damaged or foreign."""
     folder = Path(folder)
-    allowed = f"allowed: a folder that birthsim-train wrote, with {WEIGHTS}"
+    allowed = f"allowed: a folder that birthsim train wrote, with {WEIGHTS}"
     if not (folder / WEIGHTS).is_file():
         raise ValueError(f"policy = {str(folder)!r} has no {WEIGHTS}; {allowed}")
     try:

@@ -40,7 +40,7 @@ def policy_folders(path: str | Path) -> list[Path]:
     )
     if not found:
         raise ValueError(
-            f"policy = {str(path)!r} holds no policy; allowed: a folder that birthsim-train wrote, "
+            f"policy = {str(path)!r} holds no policy; allowed: a folder that birthsim train wrote, "
             f"or {', '.join(shipped_names())}"
         )
     return found
@@ -62,7 +62,7 @@ def _validation_error(folder: Path) -> float:
         return math.inf if error is None else float(error)
     except (KeyError, TypeError) as missing:
         raise ValueError(
-            f"policy = {str(folder)!r} does not say what it reached in validation; allowed: a folder that birthsim-train wrote"
+            f"policy = {str(folder)!r} does not say what it reached in validation; allowed: a folder that birthsim train wrote"
         ) from missing
 
 

@@ -40,7 +40,7 @@ def _learning_curve(file: Path) -> dict[str, Any]:
             float(steps["steps"])
         str(training["settings"]["environment"])
     except (LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"{str(file)!r} is damaged ({error!r}); allowed: a file that birthsim-train wrote") from error
+        raise ValueError(f"{str(file)!r} is damaged ({error!r}); allowed: a file that birthsim train wrote") from error
     return training
 
 

@@ -59,7 +59,7 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
     path = folder / NAME
     if not path.is_file():
         return None
-    allowed = "allowed: a checkpoint that birthsim-train wrote"
+    allowed = "allowed: a checkpoint that birthsim train wrote"
     try:
         arrays, about = unsealed(path.read_bytes(), FORMAT)
     except ValueError as error:

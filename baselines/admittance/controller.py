@@ -3,7 +3,7 @@
 The gains are what these commands found (with lab, then with ideal), with gain and bandwidth a tenth lower: then the rig as
 believed hunts less with lab sensors, and rigs of 1.5 kg with slow valves are stable with ideal ones, where oscillation was
 halved as well.
-    birthsim-tune --controller admittance-backstepping --trials 45 --seed 1 --sensors lab --start gains.json --out out/tune/lab
+    birthsim tune --controller admittance-backstepping --trials 45 --seed 1 --sensors lab --start gains.json --out out/tune/lab
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""birthsim-animate: two controllers in the same world beside each other, as an animated picture in real time."""
+"""birthsim animate: two controllers in the same world beside each other, as an animated picture in real time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, finite_number, policy_of, run, seed_number
+from baselines.commands.shared import RANDOMIZE, check_environment, finite_number, policy_of, run, seed_number
 from baselines.registry import controller_names, make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file
@@ -48,7 +48,7 @@ class Take:
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-animate",
+        prog="birthsim animate",
         description="Two controllers beside each other on the same rig under the same hand, in real time: linkage, magnifier "
         "(the same for both) and error from the compliant target.",
     )
@@ -141,9 +141,7 @@ def _animate(arguments: argparse.Namespace) -> None:
     if path.suffix not in (".webp", ".gif"):
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
     rig = load_parameters(arguments.parameters)
-    known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name)
-    if arguments.env not in known:
-        raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(known)}")
+    check_environment(arguments.env)
     make = partial(
         gymnasium.make, arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
         policy_period=rig.electronics.control_period, **environment_parts(arguments),
@@ -168,7 +166,3 @@ def _animate(arguments: argparse.Namespace) -> None:
         rms, largest = 1e3 * np.sqrt(np.mean(np.square(one.errors))), 1e3 * np.max(one.errors)
         print(f"{name:28} error while it is shown: {rms:.2f} mm RMS, {largest:.2f} mm at most")
     print(f"written to {path}: {len(frames)} frames, {path.stat().st_size / 1e6:.2f} MB")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""birthsim-evaluate --all: every controller under all conditions, and the studies of what a hand feels."""
+"""birthsim evaluate --all: every controller under all conditions, and the studies of what a hand feels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""birthsim-figure4: the experiment of the paper's Fig. 4 on the full plant, its figures and its picture."""
+"""birthsim figure4: the experiment of the paper's Fig. 4 on the full plant, its figures and its picture."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FIELDS = (
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim-figure4", description="Reproduce Fig. 4 of Herzig et al. (IROS 2015).")
+    parser = argparse.ArgumentParser(prog="birthsim figure4", description="Reproduce Fig. 4 of Herzig et al. (IROS 2015).")
     parser.add_argument(
         "--controller",
         default="backstepping",
@@ -124,7 +124,3 @@ def _figure4(arguments: argparse.Namespace) -> None:
         if isinstance(values, list):
             print(f"{name:44}{values[0]:10.3f}{values[1]:10.3f}")
     print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json, rig.png")
-
-
-if __name__ == "__main__":
-    main()

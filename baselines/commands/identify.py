@@ -1,4 +1,4 @@
-"""birthsim-identify: a laboratory's own rig from a log, and the experiment that makes such a log."""
+"""birthsim identify: a laboratory's own rig from a log, and the experiment that makes such a log."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DURATION = 12.0
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-identify",
+        prog="birthsim identify",
         description="Estimate friction, mass, valves, dead volume and latency of a rig from a log, with 95 % intervals, and "
         "write the rig as TOML. --propose writes an experiment that tells them, --simulate runs it on the simulator.",
     )
@@ -110,7 +110,3 @@ def _out(arguments: argparse.Namespace, suffixes: tuple[str, ...]) -> Path:
 def _bar(total: int | None, title: str, unit: str) -> Iterator[Callable[[], object]]:
     with tqdm(total=total, desc=title, unit=unit, leave=False) as bar:
         yield bar.update
-
-
-if __name__ == "__main__":
-    main()

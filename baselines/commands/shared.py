@@ -7,13 +7,14 @@ import math
 import os
 import signal
 import sys
+import tomllib
 from collections.abc import Callable
 from typing import Any, NoReturn
 
 import gymnasium
 
 from baselines.commands.start import endings
-from birthsim_env.physics.rig.values import shown
+from birthsim_env.physics.rig.values import near, shown
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
 """The option --randomize -> the environments' argument ``randomize``."""
@@ -32,7 +33,7 @@ def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], 
 
     SIGTERM and SIGHUP end a command as Ctrl-C does: what is complete is kept, and no process or half a file stays behind.
     """
-    arguments = parser.parse_args()
+    arguments = _parsed(parser)
     came: list[int] = []
     words, said = endings(), False
 
@@ -61,6 +62,48 @@ def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], 
         if not came:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _parsed(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    """What the command line says, over what ``--config`` says in TOML; an unknown option is asked about."""
+    options = {option: action for action in parser._actions for option in action.option_strings}
+    if "--config" not in options:  # a training's configuration is its own
+        parser.add_argument(
+            "--config", metavar="FILE", help="TOML file of options, as episodes = 64; what is typed counts more"
+        )
+        first = argparse.ArgumentParser(parser.prog, add_help=False, allow_abbrev=False)
+        first.add_argument("--config", nargs="?")
+        path = first.parse_known_args()[0].config
+        if path is not None:
+            _configure(parser, path, options)
+    arguments, unknown = parser.parse_known_args()
+    if unknown:
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}{near(unknown[0], options)}")
+    return arguments
+
+
+def _configure(parser: argparse.ArgumentParser, path: str, options: dict[str, argparse.Action]) -> None:
+    """Take the options of a TOML file as the parser's defaults."""
+    try:
+        with open(path, "rb") as file:
+            said = tomllib.load(file)
+    except (OSError, ValueError) as error:
+        parser.error(f"--config {path!r} cannot be read: {error}")
+    for name, value in said.items():
+        option = f"--{name.replace('_', '-')}"
+        if option not in options or option == "--help":
+            allowed = ", ".join(known[2:] for known in options if known.startswith("--") and known != "--help")
+            parser.error(f"--config {path!r}: {shown(name)}{near(option[2:], allowed.split(', '))}; allowed: {allowed}")
+        action = options[option]
+        values = value if isinstance(value, list) else [value]
+        many, count = action.nargs not in (None, 0), 1 if action.nargs is None else action.nargs
+        fits = isinstance(value, bool) if count == 0 else not isinstance(value, bool | dict) and count in (len(values), "+")
+        if not fits or (action.choices is not None and not {*map(str, values)} <= {*map(str, action.choices)}):
+            allowed = "true or false" if action.nargs == 0 else ", ".join(map(str, action.choices or ["what the option takes"]))
+            parser.error(f"--config {path!r}: {name} = {shown(value)}; allowed: {allowed}")
+        # argparse reads a default that is text as it reads the command line.
+        action.default = value if action.nargs == 0 else [*map(str, values)] if many else str(value)
+        action.required = False
 
 
 def _problem(error: Exception) -> str:
@@ -146,11 +189,18 @@ def add_processes(parser: argparse.ArgumentParser) -> None:
 
 def shown_arguments(arguments: argparse.Namespace) -> dict[str, Any]:
     """The arguments that results depend on, as JSON."""
-    without = ("out", "jobs", "cluster")
+    without = ("out", "jobs", "cluster", "config")
     return {
         key: value if value is None or isinstance(value, (bool, int, list)) else str(value)
         for key, value in vars(arguments).items() if key not in without
     }  # fmt: skip
+
+
+def check_environment(name: str) -> None:
+    """Raises ``ValueError`` for an id that is none of the experiments."""
+    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and "Residual" not in one)
+    if name not in known:
+        raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
 
 
 def check_world(environment: str, **arguments: Any) -> None:

@@ -1,4 +1,4 @@
-"""Entry point of every console command: chooses it by its name, and answers signals before it is loaded.
+"""How a command begins: it answers signals, then it is loaded.
 
 What a command imports takes seconds. This module imports next to nothing, so that Ctrl-C ends a command in one line from its
 first moment on.
@@ -16,23 +16,14 @@ from types import FrameType, ModuleType
 ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the terminal is gone"}
 """Signal -> what a command says last; the second one ends it at once."""
 
-_ABOVE = {
-    **dict.fromkeys(("evaluate", "explain", "export", "scores", "sweep", "train"), "agents"),
-    "build": "birthsim_build",
-    **dict.fromkeys(("live", "log", "replay"), "birthsim_live"),
-    "fmu": "birthsim_build",
-}
-"""Command -> the package that holds it, where that is not this one."""
-
 
 def endings() -> dict[int, str]:
     """Number of each signal of ``ENDINGS`` that this system knows -> what a command says last."""
     return {signal.Signals[name].value: said for name, said in ENDINGS.items() if name in signal.Signals.__members__}
 
 
-def command() -> None:
-    """Run the command that the process is called by: ``birthsim-train`` -> ``agents.commands.train``."""
-    name = Path(sys.argv[0]).stem
+def answer_signals(name: str) -> None:
+    """From now on a signal ends the process in one line, which ``name`` begins."""
     words = endings()
 
     def end(number: int, _: FrameType | None) -> None:
@@ -41,20 +32,37 @@ def command() -> None:
 
     for number in words:
         signal.signal(number, end)
+
+
+def perform(name: str, package: str, module: str, example: str = "") -> None:
+    """Run a command that is called by ``name``; its help ends with the example."""
+    sys.argv[0] = name
     try:
-        module = _module(name.removeprefix("birthsim-"))
-    except ImportError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    module.main()
+        _load(name, package, module).main()
+    except SystemExit as end:
+        if example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
+            print(f"\nexample: {example}")
+        raise
 
 
-def _module(name: str) -> ModuleType:
-    package = _ABOVE.get(name, "baselines")
-    if package == "agents":
+def _load(name: str, package: str, module: str) -> ModuleType:
+    """A command's module; what cannot be imported ends the process in one line, which ``name`` begins."""
+    try:
+        if package != "agents":
+            return import_module(f"{package}.{module}")
         # Other distributions have a package of that name too.
         from birthsim_env.learned import from_agents
 
-        module: ModuleType = from_agents(f"commands.{name}")
-        return module
-    return import_module(f"{package}.commands.{name}")
+        found: ModuleType = from_agents(module)
+        return found
+    except ImportError as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def command() -> None:
+    """Run the study that the process is called by: ``birthsim-scores`` -> ``agents.commands.scores``."""
+    name = Path(sys.argv[0]).stem
+    answer_signals(name)
+    study = name.removeprefix("birthsim-")
+    perform(name, "agents" if study in ("scores", "sweep") else "baselines", f"commands.{study}")

@@ -1,4 +1,4 @@
-"""birthsim-tune: find the gains of a controller by simulation, the same way for every controller.
+"""birthsim tune: find the gains of a controller by simulation, the same way for every controller.
 
 A controller says what may be tuned by a class attribute ``TUNABLE: dict[str, tuple[float, float]]``, gain -> (low, high), SI
 units; each is a keyword of its constructor. Where low is positive the gain is searched on a logarithmic scale, else on a
@@ -142,7 +142,7 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     path = folder / "trials.journal"
     try:
-        study = optuna.create_study(storage=open_journal(path), study_name="birthsim-tune", load_if_exists=True)
+        study = optuna.create_study(storage=open_journal(path), study_name="birthsim tune", load_if_exists=True)
         # The first run may have been killed before it came to all of them.
         known = {**({} if complete(study) else setting), **study.user_attrs}
         if all(known.get(key) == value for key, value in setting.items()):
@@ -155,7 +155,7 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     except Exception as error:
         # Damage trips Optuna in a dozen ways.
         raise ValueError(
-            f"{path} is no list of trials ({problem(error)}); allowed: what birthsim-tune wrote, or another --out"
+            f"{path} is no list of trials ({problem(error)}); allowed: what birthsim tune wrote, or another --out"
         ) from error
     key = next(key for key, value in setting.items() if known.get(key) != value)
     raise ValueError(f"{path} has {key} = {shown(known.get(key))}; allowed: {shown(setting[key])}, or another --out")
@@ -169,7 +169,7 @@ def complete(study: Study) -> list[FrozenTrial]:
 
 
 def listed(study: Study) -> list[dict[str, Any]]:
-    """The complete trials as JSON: gains, cost and its parts; ``ValueError`` for one that birthsim-tune did not write."""
+    """The complete trials as JSON: gains, cost and its parts; ``ValueError`` for one that birthsim tune did not write."""
     trials = []
     for trial in complete(study):
         parts = trial.user_attrs.get("parts")
@@ -208,7 +208,7 @@ def search(
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-tune",
+        prog="birthsim tune",
         description="Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on.",
     )
     parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
@@ -275,7 +275,3 @@ def _tune(arguments: argparse.Namespace) -> None:
     print(f"\nwritten to {arguments.out}/: gains.json, trials.json")
     if interrupt is not None:
         raise interrupt
-
-
-if __name__ == "__main__":
-    main()

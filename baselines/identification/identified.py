@@ -73,7 +73,7 @@ class Identified:
 
     def write(self, path: Path, source: str) -> None:
         """Write the rig as TOML; its head says what is from the log ``source`` and what is not."""
-        head = [f"Identified by birthsim-identify from {source}.", *self.words()]
+        head = [f"Identified by birthsim identify from {source}.", *self.words()]
         text = "".join(f"# {line}\n" for line in head)
         write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
 

@@ -124,7 +124,7 @@ def _check_openings(source: str, openings: Array) -> None:
     still = [name for name, values in zip(OPENINGS, openings, strict=True) if np.ptp(values) == 0]
     if still:
         raise ValueError(
-            f"{source}: {', '.join(still)} never changes; allowed: valves that move, as in birthsim-identify --propose"
+            f"{source}: {', '.join(still)} never changes; allowed: valves that move, as in birthsim identify --propose"
         )
 
 

@@ -7,10 +7,10 @@ and of u over ``RATE_TOLERANCE``. Tolerances are those at the end effector: leng
 cylinder 1. Its gains are scheduled with kappa at the reference pose. dF/dt goes to the valves as in the paper, with its
 regulation of the pneumatic stiffness.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna. The
+These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna. The
 second started from what the first had found:
-    birthsim-tune --controller lqr --trials 75 --seed 0 --sensors ideal --out out/first
-    birthsim-tune --controller lqr --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
+    birthsim tune --controller lqr --trials 75 --seed 0 --sensors ideal --out out/first
+    birthsim tune --controller lqr --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ within what the supply can give. F and the setpoint of the pneumatic stiffness (
     F = Pp Sp - Pn Sn,   K = k (Pp Sp/Lp + Pn Sn/Ln),
 and each chamber's flow is (6) solved for dP/dt = b (P* - P): proportional, with the piston's speed compensated.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna. The
+These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna. The
 second started from what the first had found:
-    birthsim-tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/first
-    birthsim-tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
+    birthsim tune --controller pid --trials 75 --seed 0 --sensors ideal --out out/first
+    birthsim tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ squares of its residuals within what the valves can give: one Gauss-Newton step 
 iteration), a quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their
 characteristic. Motion, friction and disturbances are those that the admittance law knows when it does not learn.
 
-These commands found the tolerances (with ideal, then with lab and 16 trials) by the search that birthsim-tune had before it
+These commands found the tolerances (with ideal, then with lab and 16 trials) by the search that birthsim tune had before it
 used Optuna. It was as short as its trials are long; the best was the same for both:
-    birthsim-tune --controller nonlinear-mpc --trials 9 --lanes 4 --seed 0 --sensors ideal --out out/tune
+    birthsim tune --controller nonlinear-mpc --trials 9 --lanes 4 --seed 0 --sensors ideal --out out/tune
 """
 
 from __future__ import annotations

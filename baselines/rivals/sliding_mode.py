@@ -9,8 +9,8 @@ make ds/dt = -h sat(s/layer): the layer is reached in (|s| - layer)/h, inside s 
 at the end effector (kappa s of cylinder 1). h must beat 3 r times the acceleration by which the model is wrong. dF/dt goes to
 the valves as in the paper, with its regulation of the pneumatic stiffness.
 
-These commands found the gains (with ideal, then with lab) by the search that birthsim-tune had before it used Optuna:
-    birthsim-tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
+These commands found the gains (with ideal, then with lab) by the search that birthsim tune had before it used Optuna:
+    birthsim tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class TrackingController(StagedController, ABC):
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         gains: those of ``TUNABLE``, SI units; what is not given is the value tuned for the sensors that the controller meets.
 
-    ``TUNABLE`` is what ``birthsim-tune`` reads: gain -> (lowest, highest) to try; ``TUNED`` holds what it found, for exact and
+    ``TUNABLE`` is what ``birthsim tune`` reads: gain -> (lowest, highest) to try; ``TUNED`` holds what it found, for exact and
     for sampled positions. All have ``friction_fraction``, how much believed Coulomb friction is fed forward with the sign
     of the reference speed, and ``dead_zone``, the error at the end effector, m, up to which nothing is integrated. The
     integrals start from the forces that the chambers hold (bumpless start). From sampled positions an observer estimates

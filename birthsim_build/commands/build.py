@@ -1,8 +1,9 @@
-"""birthsim-build: closed loops without Python, as WebAssembly, for C, or for a microcontroller."""
+"""birthsim export: closed loops without Python, as WebAssembly, for C, or for a microcontroller."""
 
 from __future__ import annotations
 
 import argparse
+import platform
 from pathlib import Path
 
 from baselines.commands.shared import run, seed_number
@@ -21,17 +22,17 @@ from birthsim_env.physics.rig.parameters import load_parameters
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-build",
+        prog="birthsim export",
         description="Compile closed loops, laws alone and the plant alone into code that needs no Python: a WebAssembly module "
         "with JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the laws alone.",
         epilog="Every target computes the same bits as Python. The files are described in docs/build.md.",
     )
-    parser.add_argument("target", metavar="TARGET", help=f"one of {', '.join(BUILT)}")
+    parser.add_argument("--to", choices=("c", *BUILT), required=True, help="the target; c: this processor")
     parser.add_argument("--env", nargs="+", help="environment ids (default: BirthSIM/Circle-v1); not for cortex-m7")
     parser.add_argument("--sensors", nargs="+", choices=tuple(SENSORS), help="default: ideal")
     parser.add_argument("--controller", nargs="+", metavar="NAME", help="compiled controllers (default: backstepping)")
     parser.add_argument(
-        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim-train wrote, or names of "
+        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim train wrote, or names of "
         "what comes with the package",
     )  # fmt: skip
     parser.add_argument("--all", action="store_true", help="all environments, sensors, compiled controllers and policies")
@@ -42,9 +43,7 @@ def main() -> None:
 
 
 def _build(arguments: argparse.Namespace) -> None:
-    target = arguments.target
-    if target not in BUILT:
-        raise ValueError(f"target = {target!r}; allowed: {', '.join(BUILT)}")
+    target = _this_processor() if arguments.to == "c" else arguments.to
     bundle = _bundle(arguments)
     require_llvm()
     if target != "cortex-m7":
@@ -66,7 +65,7 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
     named = [name for name in ("env", "sensors", "controller", "policy") if getattr(arguments, name)]
     if arguments.all and named:
         raise ValueError(f"--all with --{named[0]}; allowed: one of them")
-    alone = arguments.target == "cortex-m7"
+    alone = arguments.to == "cortex-m7"
     if alone and arguments.env:
         raise ValueError("--env with cortex-m7; allowed: without it, the object has the laws alone")
     rig = load_parameters(arguments.parameters)
@@ -79,6 +78,14 @@ def _bundle(arguments: argparse.Namespace) -> Bundle:
     if arguments.all:
         controllers = [name for name in LISTED if name not in SLOW]
     return make_bundle(rig, scenarios, sensors, controllers, policies, arguments.seed, alone)
+
+
+def _this_processor() -> str:
+    """The target of this machine."""
+    machine = platform.machine().lower()
+    if machine not in (names := {"x86_64": "x86-64", "amd64": "x86-64", "aarch64": "aarch64", "arm64": "aarch64"}):
+        raise ValueError(f"--to 'c' on the processor {machine!r}; allowed: on {', '.join(names)}")
+    return names[machine]
 
 
 def _shipped() -> list[str]:
@@ -102,7 +109,3 @@ def _show(report: Report) -> None:
             print(f"{name:60}{value:>12,} bytes")
         else:
             print(f"{name:60}{', '.join(value) or 'nothing' if isinstance(value, list) else value:>12}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""birthsim-fmu: the rig for tools that speak FMI, alone or under a law."""
+"""birthsim export: the rig for tools that speak FMI, alone or under a law."""
 
 from __future__ import annotations
 
@@ -18,20 +18,26 @@ from birthsim_env.physics.rig.parameters import load_parameters
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        prog="birthsim-fmu",
+        prog="birthsim export",
         description="Write a functional mock-up unit for co-simulation: the plant with its sensors, moved by spool openings "
         "and the hand's force, or with --controller the closed loop, moved by setpoints and that force. No Python is inside.",
         epilog="Variables, and what was tried in which tool: docs/fmu.md.",
     )
+    parser.add_argument("--to", choices=("fmu",), required=True, help="the form of the file")
     parser.add_argument("--controller", metavar="NAME", help="a compiled controller (default: none, the plant)")
-    parser.add_argument("--policy", help="a residual policy instead: a folder of birthsim-train, or a name that is shipped")
+    parser.add_argument("--policy", help="a residual policy instead: a folder of birthsim train, or a name that is shipped")
     parser.add_argument("--env", default="BirthSIM/Circle-v1", help="where the end effector begins (default: %(default)s)")
     parser.add_argument("--sensors", choices=tuple(SENSORS), default="ideal", help="default: %(default)s")
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
     parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help="version of the standard (default: %(default)s)")
     parser.add_argument(
-        "--target", nargs="+", choices=tuple(BINARIES), default=["x86-64"], help="processors (default: x86-64, Linux)"
+        "--target",
+        nargs="+",
+        metavar="PROCESSOR",
+        choices=tuple(BINARIES),
+        default=["x86-64"],
+        help=f"of {', '.join(BINARIES)} (default: x86-64, Linux)",
     )
     parser.add_argument("--out", type=Path, required=True, help="file, ending in .fmu")
     run(parser, _write)
@@ -56,7 +62,3 @@ def _write(arguments: argparse.Namespace) -> None:
     kinds = [one.causality for one in model.description.variables]
     counts = ", ".join(f"{kinds.count(kind)} {kind}s" for kind in ("parameter", "input", "output"))
     print(f"written to {arguments.out}: {arguments.out.stat().st_size:,} bytes, FMI {arguments.fmi}, {counts}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""What birthsim-live and birthsim-replay share: address, port, and the server's run."""
+"""What the page and a replay share: address, port, and the server's run."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ REQUEST_TIME = 10.0
 """s, assumed, in which a request must arrive."""
 
 
-def add_address(parser: argparse.ArgumentParser, port: int) -> None:
+def add_address(parser: argparse.ArgumentParser) -> None:
     """The options --port, --host and --request-time."""
-    parser.add_argument("--port", type=port_number, default=port, help="0 takes any that is free (default: %(default)s)")
+    parser.add_argument("--port", type=port_number, help="0 takes any that is free (default: 8000, with --replay 8001)")
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -91,7 +91,7 @@ def serve(
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
             if self.should_exit:
-                os.write(2, f"{title.split()[0]}: {endings()[sig]}\n".encode())
+                os.write(2, f"birthsim live: {endings()[sig]}\n".encode())
                 os._exit(128 + sig)
             super().handle_exit(sig, frame)
 

@@ -1,56 +1,66 @@
-"""Every console command of pyproject.toml with its options, from the parser that reads them."""
+"""Every command of ``birthsim`` with its options, from the parser that reads them."""
 
 import argparse
 import os
 import sys
-import tomllib
-from pathlib import Path
 from unittest import mock
 
-from baselines.commands.start import command
-
-PROJECT = Path(__file__).resolve().parent.parent.parent / "pyproject.toml"
+from baselines.commands.start import perform
+from birthsim.door import COMMANDS, GROUPS, overview
+from birthsim.export import FORMS
 
 
 class _FoundError(Exception):
     """Carries a command's parser out of it, before anything is done."""
 
 
-def parser_of(name: str) -> argparse.ArgumentParser:
-    """The parser of a console command such as ``birthsim-train``."""
+def parser_of(package: str, module: str) -> argparse.ArgumentParser:
+    """The parser of a command's module."""
 
-    def give(self: argparse.ArgumentParser, *_: object) -> None:
-        raise _FoundError(self)
+    def give(self: argparse.ArgumentParser, *_: object) -> tuple[argparse.Namespace, list[str]]:
+        if self.add_help:
+            raise _FoundError(self)
+        return argparse.Namespace(config=None), []  # what looks for --config only
 
-    with (
-        mock.patch.object(argparse.ArgumentParser, "parse_args", give),
-        mock.patch.object(sys, "argv", [name]),
-        mock.patch("signal.signal"),
-    ):
+    with mock.patch.object(argparse.ArgumentParser, "parse_known_args", give), mock.patch.object(sys, "argv", ["birthsim"]):
         try:
-            command()
+            perform("birthsim", package, module)
         except _FoundError as found:
             return found.args[0]
-    raise RuntimeError(f"{name} parsed no arguments")
+    raise RuntimeError(f"{package}.{module} parsed no arguments")
 
 
 def commands() -> str:
-    """A section for every command."""
-    names = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]["scripts"]
+    """A section for every command that parses options itself, and for every form of ``birthsim export``."""
     # argparse breaks its lines for a terminal, which may be none.
-    with mock.patch.dict(os.environ, COLUMNS="100"):
-        return "\n\n".join(_section(parser_of(name)) for name in sorted(names))
+    with mock.patch.dict(os.environ, COLUMNS="80"):
+        places = {
+            f"birthsim {name}": COMMANDS[name]
+            for group in GROUPS.values() for name in group if name not in ("export", "study")
+        }  # fmt: skip
+        sections = [_section(name, parser_of(one.package, one.module), one.example) for name, one in places.items()]
+        forms: dict[tuple[str, str], list[str]] = {}
+        for form, (package, module, *_) in FORMS.items():
+            forms.setdefault((package, module), []).append(form)
+        for (package, module), names in forms.items():
+            example = f"export --to {names[0]} {FORMS[names[0]][-1]}"
+            sections.append(
+                _section(f"birthsim export --to {', '.join(names)}", parser_of(package, f"commands.{module}"), example)
+            )
+        return "\n\n".join([f"```text\n{overview()}\n```", *sections])
 
 
-def _section(parser: argparse.ArgumentParser) -> str:
+def _section(name: str, parser: argparse.ArgumentParser, example: str) -> str:
     formatter = parser._get_formatter()
     lines = [
-        f"## `{parser.prog}`",
+        f"## `{name}`",
         "",
         _plain(parser.description),
         "",
         "```text",
         parser.format_usage().rstrip(),
+        "",
+        f"example: birthsim {example}",
         "```",
         "",
     ]

@@ -1,4 +1,4 @@
-"""What the page of ``birthsim-live`` says where something is chosen or shown: the same sentences, as tables."""
+"""What the page of ``birthsim live`` says where something is chosen or shown: the same sentences, as tables."""
 
 from baselines import about
 from birthsim_live.server.words import CHOICES, FIGURES

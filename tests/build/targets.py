@@ -42,7 +42,7 @@ def need_linker():
 def build(target, folder, *options):
     """The command, in this process."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["birthsim-build", target, *options, "--out", str(folder)])
+        patch.setattr(sys, "argv", ["birthsim export", "--to", target, *options, "--out", str(folder)])
         main()
 
 

@@ -1,4 +1,4 @@
-"""Bad input of birthsim-build: one line that names it, and nothing written."""
+"""Bad input of birthsim export: one line that names it, and nothing written."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import pytest
 from tests.console import call
 
 CASES = [
-    (("riscv",), "target = 'riscv'; allowed: wasm, x86-64, aarch64, cortex-m7"),
+    (("riscv",), "--to 'riscv'; allowed: onnx, wasm, c, x86-64, aarch64, cortex-m7"),
     (("wasm", "--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1"),
     (("wasm", "--controller", "nonlinear-mpc"), "controller = 'nonlinear-mpc'; allowed: a compiled one: backstepping"),
     (("wasm", "--controller", "limited:pid"), "controller = 'limited:pid'; allowed: a compiled one: backstepping"),
@@ -25,9 +25,9 @@ CASES = [
 @pytest.mark.parametrize(("options", "said"), CASES)
 def test_bad_input_is_named(tmp_path, monkeypatch, capsys, options, said):
     out = tmp_path / "out"
-    status, printed, complained = call("build", monkeypatch, capsys, *options, "--out", out)
+    status, printed, complained = call("export", monkeypatch, capsys, "--to", *options, "--out", out)
     assert (status, printed) == (2, "")
-    assert complained.startswith("birthsim-build: error: ")
+    assert complained.startswith("birthsim export: error: ")
     assert said in complained
     assert len(complained.splitlines()) == 1
     assert not out.exists()
@@ -35,9 +35,9 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, options, said):
 
 def test_an_old_llvm_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (20, 1, 8))
-    status, _, complained = call("build", monkeypatch, capsys, "wasm", "--out", tmp_path / "out")
+    status, _, complained = call("export", monkeypatch, capsys, "--to", "wasm", "--out", tmp_path / "out")
     assert (status, complained) == (
-        2, "birthsim-build: error: llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50\n"
+        2, "birthsim export: error: llvmlite has LLVM 20.1.8; allowed: 22 or later, llvmlite 0.50\n"
     )  # fmt: skip
     assert not (tmp_path / "out").exists()
 
@@ -45,7 +45,7 @@ def test_an_old_llvm_is_refused(tmp_path, monkeypatch, capsys):
 def test_without_a_linker_it_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("birthsim_build.code.compiler.llvm_version_info", (22, 1, 0))
     monkeypatch.setattr("birthsim_build.code.compiler.find_spec", lambda _: None)
-    status, _, complained = call("build", monkeypatch, capsys, "wasm", "--out", tmp_path / "out")
+    status, _, complained = call("export", monkeypatch, capsys, "--to", "wasm", "--out", tmp_path / "out")
     assert status == 2
     assert "pip install 'birthsim[build]'" in complained
     assert not (tmp_path / "out").exists()

@@ -96,7 +96,7 @@ def written(tmp_path_factory):
         if options not in made:
             with pytest.MonkeyPatch.context() as patch:
                 path = folder / f"{len(made)}.fmu"
-                patch.setattr(sys, "argv", ["birthsim-fmu", *map(str, options), "--out", str(path)])
+                patch.setattr(sys, "argv", ["birthsim export", "--to", "fmu", *map(str, options), "--out", str(path)])
                 main()
                 made[options] = path
         return made[options]
@@ -328,9 +328,9 @@ def test_impossible_parameters_are_refused(written, unit):
 def test_bad_input_is_refused_in_a_line(options, complaint, monkeypatch, capsys, tmp_path):
     need_linker()
     monkeypatch.chdir(tmp_path)
-    status, _, complained = call("fmu", monkeypatch, capsys, *options)
+    status, _, complained = call("export", monkeypatch, capsys, "--to", "fmu", *options)
     assert status == 2
-    assert complained.startswith(f"birthsim-fmu: error: {complaint}")
+    assert complained.startswith(f"birthsim export: error: {complaint}")
     assert not list(tmp_path.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""birthsim-animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
+"""birthsim animate: both runs are those of the environments, at the same instants, and what is written plays in real time."""
 
 import re
 

@@ -5,65 +5,123 @@ from __future__ import annotations
 import math
 import re
 import shutil
-from importlib.metadata import entry_points
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import policy_folders
-from baselines.commands import start
 from baselines.work.files import write_json
-from tests.console import COMMANDS, OWN, RESIDUAL, call, run, strict
+from birthsim.door import COMMANDS
+from birthsim.export import FORMS
+from tests.console import OWN, RESIDUAL, ROOT, assert_picture, call, run, strict, words
+
+HELP = [(name,) for name in COMMANDS] + [("export", "--to", form) for form in FORMS]
 
 
-def test_the_scripts_of_the_package_are_these_commands():
-    scripts = {point.name: point for point in entry_points(group="console_scripts") if point.name.startswith("birthsim-")}
-    for command, module in COMMANDS.items():
-        assert scripts[f"birthsim-{command}"].value == "baselines.commands.start:command"
-        assert start._module(command).__name__ == module
-    assert all(callable(point.load()) for point in scripts.values())
+@pytest.mark.parametrize("words", HELP, ids=" ".join)
+def test_help_fits_80_columns_and_ends_with_an_example(words, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    status, printed, complained = call(words[0], monkeypatch, capsys, *words[1:], "--help")
+    assert (status, complained) == (0, "")
+    lines = printed.rstrip().splitlines()
+    assert printed.startswith(f"usage: birthsim {words[0]}")
+    assert [line for line in lines if len(line) > 80] == []
+    assert [line for line in lines if line.startswith("example: ")] == lines[-1:]
+    assert lines[-1].startswith(f"example: birthsim {' '.join(words)}")
+    # What the example names is an option of the command; those of export are its forms'.
+    for option in re.findall(r"(?<= )--[a-z-]+", lines[-1]) if words != ("export",) else ():
+        assert option in "\n".join(lines[:-1])
+
+
+def test_help_of_all_fits_80_columns_and_names_every_command_at_once():
+    """Nothing heavy is imported for it."""
+    program = "import sys; from birthsim.door import main; main(); print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    *printed, modules = done.stdout.splitlines()
+    assert [line for line in printed if len(line) > 80] == []
+    assert [name for name in COMMANDS if not any(line.startswith(f"  {name} ") for line in printed)] == []
+    assert {"numpy", "numba", "gymnasium", "argparse"} & set(modules.split()) == set()
 
 
 @pytest.mark.parametrize(
-    ("command", "options"),
+    ("line", "asked"),
     [
-        (
-            "evaluate",
-            (
-                *(
-                    "all",
-                    "env",
-                    "controller",
-                    "policy",
-                    "episodes",
-                    "seed",
-                    "sensors",
-                    "randomize",
-                    "parameters",
-                    "jobs",
-                    "cluster",
-                ),
-                *("reference", "stiffness", "user-force", "set", "no-studies", "studies-only", "out"),
-            ),
-        ),
-        ("figure4", ("controller", "set", "sensors", "parameters", "out")),
-        ("sweep", ("jobs", "cluster", "out")),
-        (
-            "train",
-            (
-                *("config", "env", "algorithm", "law", "impedance", "steps", "until", "seed", "seeds", "jobs", "sensors"),
-                *("randomize", "authority", "parameters", "out"),
-            ),
-        ),
+        (("evalute",), "command = 'evalute' (did you mean 'evaluate'?); allowed: run, live, "),
+        (("export", "--to", "fmux"), "--to 'fmux' (did you mean 'fmu'?); allowed: onnx, wasm, "),
+        (("export",), "--to is missing; allowed: onnx, wasm, "),
+        (("evaluate", "--episods", "3", "--out", "x"), "--episods 3 (did you mean '--episodes'?)"),
+        (("evaluate", "--controller", "backsteping", "--out", "x"), "'backsteping' (did you mean 'backstepping'?); allowed: "),
+        (("run", "--env", "BirthSIM/Forcep-v1", "--out", "x"), "(did you mean 'BirthSIM/Forceps-v1'?); allowed: "),
     ],
 )
-def test_help_names_every_option_and_touches_nothing(command, options, monkeypatch, capsys):
-    status, printed, complained = call(command, monkeypatch, capsys, "--help")
-    assert (status, complained) == (0, "")
-    assert printed.startswith(f"usage: birthsim-{command}")
-    for option in options:
-        assert f"--{option}" in printed, option
-    assert printed.count("\n  --") == len(options)
+def test_what_is_mistyped_is_asked_about(line, asked, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    status, printed, complained = call(line[0], monkeypatch, capsys, *line[1:])
+    assert (status, printed) == (2, "")
+    assert asked in complained.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_options_come_from_toml_and_what_is_typed_counts_more(monkeypatch, capsys, tmp_path):
+    (tmp_path / "own.toml").write_text('env = "BirthSIM/Nowhere-v1"\nout = "x"\n')
+    monkeypatch.chdir(tmp_path)
+    assert "--env 'BirthSIM/Nowhere-v1'" in call("run", monkeypatch, capsys, "--config", "own.toml")[2]
+    typed = call("run", monkeypatch, capsys, "--config", "own.toml", "--env", "BirthSIM/There-v1")[2]
+    assert "--env 'BirthSIM/There-v1'" in typed
+    assert not (tmp_path / "x").exists()
+    (tmp_path / "own.toml").write_text('controller = ["pid"]\n')
+    assert (
+        "controller = ['pid']; allowed: " in call("animate", monkeypatch, capsys, "--config", "own.toml", "--out", "x.gif")[2]
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("episods = 3", "'episods' (did you mean 'episodes'?); allowed: all, env, "),
+        ("episodes = 0", "--episodes: '0'; allowed: a whole number >= 1"),
+        ("episodes = [1, 2]", "episodes = [1, 2]; allowed: "),
+        ('sensors = "perfect"', "sensors = 'perfect'; allowed: ideal, lab, honest"),
+        ("all = 1", "all = 1; allowed: true or false"),
+        ("episodes =", "cannot be read: "),
+    ],
+)
+def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_path):
+    (tmp_path / "own.toml").write_text(content)
+    status, _, complained = call("evaluate", monkeypatch, capsys, "--config", tmp_path / "own.toml", "--out", tmp_path / "x")
+    assert status == 2
+    assert said in complained.splitlines()[-1]
+
+
+def test_an_episode_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
+    status, printed, _ = call("run", monkeypatch, capsys, "--env", "BirthSIM/Probe-v2", "--out", tmp_path / "out")
+    assert status == 0
+    assert_picture(tmp_path / "out", "episode")
+    rows = [line.split() for line in printed.splitlines() if re.match(r" +\d+ to +\d+ ", line)]
+    # The push of the stiffness test is seen, and the end effector gives way to it and not otherwise.
+    assert max(float(row[3]) for row in rows) > 5
+    assert all(0 <= float(row[4]) <= float(row[5]) for row in rows)
+    assert max(float(row[5]) for row in rows) == float(printed.splitlines()[-3].split()[-1])
+
+
+def test_doctor_names_what_is_missing(monkeypatch, capsys):
+    monkeypatch.setattr("birthsim.doctor.found", lambda name: None if name == "optuna" else "1.0")
+    status, printed, _ = call("doctor", monkeypatch, capsys)
+    assert status == 0
+    extras = {line.split()[0]: line for line in printed.partition("extras\n")[2].splitlines()}
+    assert [name for name, line in extras.items() if not line.endswith("works")] == ["tune"]
+    assert extras["tune"].endswith("pip install 'birthsim[tune]'")
+    assert max(map(len, printed.splitlines())) <= 80 + len(str(Path.cwd()))
+
+
+def test_studies_come_with_a_clone(monkeypatch, capsys):
+    monkeypatch.setattr("birthsim.study.find_spec", lambda name: None)
+    status, printed, complained = call("study", monkeypatch, capsys, "status")
+    assert (status, printed) == (2, "")
+    assert "allowed: in a clone of the project" in complained
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +147,7 @@ BAD = [
     ),
     ("evaluate", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
     ("evaluate", ("--controller", "residual", "--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that"),
-    ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim-train wrote"),
+    ("evaluate", ("--policy", "{tmp}/none"), "none' holds no policy; allowed: a folder that birthsim train wrote"),
     (
         "evaluate",
         ("--controller", "residual", "--policy", "{damaged}"),
@@ -170,7 +228,9 @@ def test_bad_input_ends_with_status_2_and_one_line_that_says_what_is_allowed(
     assert status == 2
     assert printed == ""
     lines = complained.strip().splitlines()
-    assert lines[-1].startswith(f"birthsim-{command}: error: ")
+    assert lines[-1].startswith(
+        f"birthsim {command}: error: " if words(command)[0] == "birthsim" else f"birthsim-{command}: error: "
+    )
     assert message in lines[-1]
     # Before the line there is nothing but the usage that argparse shows.
     assert len(lines) == 1 or lines[0].startswith("usage: ")

@@ -14,13 +14,13 @@ from tests.console import PATIENCE, ROOT
 
 LOADING = """
 import sys, time
-sys.argv[0] = "/somewhere/birthsim-tune"
-from baselines.commands import start
-def load(name):
-    print("loading", name, flush=True)
+sys.argv = ["birthsim", "tune"]
+from birthsim import door
+def load(*_):
+    print("loading tune", flush=True)
     time.sleep(600)
-start._module = load
-start.command()
+door.perform = load
+door.main()
 """
 
 LEAVING = """
@@ -61,7 +61,7 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
             complained = process.communicate(timeout=PATIENCE)[1]
         finally:
             process.kill()
-    expected = f"birthsim-tune: {said}\n" if program == LOADING else "birthsim-x: terminated\n"
+    expected = f"birthsim tune: {said}\n" if program == LOADING else "birthsim-x: terminated\n"
     assert (process.returncode, complained) == (128 + number, expected)
 
 

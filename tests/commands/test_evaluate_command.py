@@ -1,4 +1,4 @@
-"""birthsim-evaluate: tables, strict JSON and figures, a controller from a file, --all by pieces, and Ctrl-C."""
+"""birthsim evaluate: tables, strict JSON and figures, a controller from a file, --all by pieces, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path
     status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
-    assert "birthsim-evaluate: error: 1 of 2 pieces failed, the first cells/" in complained
+    assert "birthsim evaluate: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
     assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
 
@@ -235,7 +235,7 @@ def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monke
     monkeypatch.setattr("agents.commands.evaluate.run_tasks", interrupt)
     status, _, complained = call("evaluate", monkeypatch, capsys, "--out", tmp_path)
     assert status == 130
-    assert complained == "birthsim-evaluate: interrupted\n"
+    assert complained == "birthsim evaluate: interrupted\n"
 
 
 def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):

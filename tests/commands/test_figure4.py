@@ -28,7 +28,7 @@ LIMITS = {2000: 2.5, 4000: 1.2}
 
 @pytest.fixture(scope="module")
 def command(tmp_path_factory):
-    """What birthsim-figure4 leaves: its folder, its record of the paper's law with ideal sensors, what it printed."""
+    """What birthsim figure4 leaves: its folder, its record of the paper's law with ideal sensors, what it printed."""
     records, printed, out = [], io.StringIO(), tmp_path_factory.mktemp("figure4") / "out"
 
     def kept(*arguments):
@@ -37,7 +37,7 @@ def command(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
         patch.setattr(figure4_command, "record_run", kept)
-        patch.setattr(sys, "argv", ["birthsim-figure4", "--out", str(out)])
+        patch.setattr(sys, "argv", ["birthsim figure4", "--out", str(out)])
         figure4_command.main()
     return out, records[0], printed.getvalue()
 

@@ -1,4 +1,4 @@
-"""birthsim-train: a policy that birthsim-evaluate runs, resuming, several seeds side by side, and Ctrl-C."""
+"""birthsim train: a policy that birthsim evaluate runs, resuming, several seeds side by side, and Ctrl-C."""
 
 from __future__ import annotations
 

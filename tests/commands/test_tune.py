@@ -1,4 +1,4 @@
-"""birthsim-tune: its search on costs that are known, its files, its costs on the plant, plain errors."""
+"""birthsim tune: its search on costs that are known, its files, its costs on the plant, plain errors."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_an_interrupt_before_the_first_trial_ends_with_status_130(own, tmp_path,
     status, printed, complained = call("tune", monkeypatch, capsys, "--controller", own, "--out", tmp_path / "out")
     assert status == 130
     assert printed.startswith("rigs drawn: ")
-    assert complained.endswith("birthsim-tune: interrupted\n")
+    assert complained.endswith("birthsim tune: interrupted\n")
     assert not (tmp_path / "out" / "gains.json").exists()
 
 

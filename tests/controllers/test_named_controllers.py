@@ -108,7 +108,10 @@ def test_options_that_a_law_in_cartesian_coordinates_lacks_are_refused():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("backsteping", r"controller = 'backsteping'; allowed: backstepping, admittance, .*path/to/file\.py:Class"),
+        (
+            "backsteping",
+            r"controller = 'backsteping' \(did you mean 'backstepping'\?\); allowed: backstepping, .*path/to/file\.py:Class",
+        ),
         ("", r"controller = ''; allowed: backstepping"),
         ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
         ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),

@@ -17,7 +17,7 @@ MODULES = {
     **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "stability", "bench", "identify")},
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "explain", "scores")},
     "build": "birthsim_build.commands.build",
-    **{name: f"birthsim_live.commands.{name}" for name in ("live", "log", "replay")},
+    **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},
 }
 ODD = (
     *(
@@ -103,7 +103,8 @@ def _commands(_: Path) -> dict[str, tuple[Any, list[str]]]:
 def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, case: Case) -> None:
     name = list(known)[rng.integers(len(known))]
     module, options = known[name]
-    line = ["wasm"] if name == "build" else [str(folder / "none.rec")] if name in ("log", "replay") else []
+    forms = {"build": ["--to", "wasm"], "export": ["--to", "onnx"], "log": ["--to", "mcap", str(folder / "none.rec")]}
+    line = forms.get(name, [])
     for option in dict.fromkeys(["--out", *(option for option in options if rng.random() < 0.3)]):
         if option in options:
             line += [option, str(folder / "out") if option in ("--out", "--record-dir") else str(ODD[rng.integers(len(ODD))])]

@@ -1,4 +1,4 @@
-"""birthsim-identify as a user runs it: an experiment, its log, the rig; what is wrong in one line; Ctrl-C."""
+"""birthsim identify as a user runs it: an experiment, its log, the rig; what is wrong in one line; Ctrl-C."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     assert found.mechanics.mass == pytest.approx(3.6, rel=5e-3)
     assert found.electronics.pressure_noise == pytest.approx(500, rel=0.05)
     assert f"# mechanics.mass = {found.mechanics.mass:.5g} kg, 95 % interval " in out.read_text()
-    assert out.read_text().startswith("# Identified by birthsim-identify from log.parquet.\n")
+    assert out.read_text().startswith("# Identified by birthsim identify from log.parquet.\n")
     names = ["intervals.png", "intervals.svg", "report.md", "residuals.png", "residuals.svg"]
     assert sorted(path.name for path in report.iterdir()) == names
     text = (report / "report.md").read_text()
@@ -75,7 +75,7 @@ def test_what_is_wrong_is_named_in_one_line(
     monkeypatch.chdir(tmp_path)
     status, printed, complained = call("identify", monkeypatch, capsys, *given)
     assert (status, printed) == (2, "")
-    assert complained.startswith("birthsim-identify: error: ")
+    assert complained.startswith("birthsim identify: error: ")
     assert complained.count("\n") == 1
     assert words in complained
     assert list(tmp_path.iterdir()) == []
@@ -98,5 +98,5 @@ def test_ctrl_c_is_one_line_and_leaves_nothing(
     monkeypatch.setattr(identify, "read_trial", lambda *_: part(trial(), 0, 2100))
     status, printed, complained = call("identify", monkeypatch, capsys, "log.csv", "--out", tmp_path / "rig.toml")
     assert (status, printed) == (130, "")
-    assert complained.endswith("birthsim-identify: interrupted\n")
+    assert complained.endswith("birthsim identify: interrupted\n")
     assert list(tmp_path.iterdir()) == []

@@ -118,7 +118,7 @@ BAD: dict[str, tuple[Callable[[Rows], None], str]] = {
     "gap": (gap, "row 1000: 51 ms after the row before, others 1 ms; allowed: evenly spaced rows"),
     "volts": (scaled(5.0, "openings", shift=5.0), "they look like V: an opening is (V - 5) / 5 where 5 V is shut"),
     "percent": (scaled(100.0, "openings"), "they look like percent: an opening is percent / 100"),
-    "valve": (still("openings_N2"), "openings_N2 never changes; allowed: valves that move, as in birthsim-identify --propose"),
+    "valve": (still("openings_N2"), "openings_N2 never changes; allowed: valves that move, as in birthsim identify --propose"),
     "bar": (scaled(1e-5, "pressures"), "they look like bar, allowed: absolute pressures in Pa"),
     "kPa": (scaled(1e-3, "pressures"), "they look like kPa, allowed: absolute pressures in Pa"),
     "gauge": (scaled(1.0, "pressures", shift=-101300.0), "they look like gauge pressures, allowed: absolute pressures in Pa"),

@@ -1,4 +1,4 @@
-"""The target that does not end by itself: a recording of ``birthsim-live`` that a program makes as the page does."""
+"""The target that does not end by itself: a recording of ``birthsim live`` that a program makes as the page does."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class _Live:
     """A server, and a program in front of it that acts as the page."""
 
     def __init__(self, folder: Path, place: Path, label: str = "run") -> None:
-        self.running = Running("birthsim-live", ["--port", "0", "--record-dir", str(folder)], place, label)
+        self.running = Running("birthsim live", ["--port", "0", "--record-dir", str(folder)], place, label)
         until = time.monotonic() + PATIENCE
         while "http://" not in (said := self.running.stdout()):
             if self.running.ended() or time.monotonic() > until:

@@ -43,12 +43,12 @@ TARGETS = {
     target.name: target
     for target in (
         Target(
-            "evaluate", "birthsim-evaluate",
+            "evaluate", "birthsim evaluate",
             ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
         ),
         Target(
-            "compare", "birthsim-evaluate",
+            "compare", "birthsim evaluate",
             (
                 *("--all", "--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
                 *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
@@ -61,17 +61,17 @@ TARGETS = {
             older=("--seed", "7", "--sensors", "lab"),
         ),
         Target(
-            "tune", "birthsim-tune",
+            "tune", "birthsim tune",
             ("--controller", "pid", "--lanes", "2", "--sensors", "ideal", "--trials", "3", "--out", "{out}"),
             differ=("trials.journal",), alone=True, partway=True,
         ),
         Target(
-            "train", "birthsim-train",
+            "train", "birthsim train",
             ("--config", "{inputs}/train.toml", "--steps", "2048", "--seeds", "2", "--jobs", "2", "--out", "{out}"),
             differ=("checkpoint.safetensors", "events.*"), costs=("seconds", "environment_fraction", "split"), alone=True,
         ),
-        Target("export", "birthsim-export", ("circle", "--out", "{out}"), file="policy.onnx"),
-        Target("figure4", "birthsim-figure4", ("--out", "{out}"), older=("--controller", "pid")),
+        Target("export", "birthsim export", ("--to", "onnx", "circle", "--out", "{out}"), file="policy.onnx"),
+        Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
             "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
             costs=("cost", "sha256"),
@@ -81,7 +81,7 @@ TARGETS = {
             costs=("cost", "sha256"), alone=True,
         ),
         Target(
-            "animate", "birthsim-animate",
+            "animate", "birthsim animate",
             ("--begin", "0.5", "--end", "1.5", "--rate", "10", "--out", "{out}"), older=("--seed", "7"), file="pair.webp",
         ),
     )
@@ -92,5 +92,6 @@ TARGETS = {
 def program(command: str) -> str:
     """Python source that runs a command by the entry point that ``pyproject.toml`` gives it."""
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
-    module, _, function = scripts[command].partition(":")
-    return f"import sys; sys.argv[0] = {command!r}; from {module} import {function}; {function}()"
+    script, *words = command.split()
+    module, _, function = scripts[script].partition(":")
+    return f"import sys; sys.argv[:1] = {[script, *words]!r}; from {module} import {function}; {function}()"

@@ -119,7 +119,7 @@ class Server:
     """``birthsim-live`` or ``birthsim-replay`` as a process of its own; ``arguments`` are those of the command."""
 
     def __init__(self, command, *arguments, port=0):
-        line = [sys.executable, "-m", f"birthsim_live.commands.{command}", *map(str, arguments), "--port", str(port)]
+        line = [sys.executable, "-m", "birthsim", *command.split(), *map(str, arguments), "--port", str(port)]
         self._process = subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         said = []
         # It names its address once it listens; a process that fails closes the pipe.

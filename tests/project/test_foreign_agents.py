@@ -11,9 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 MAKE = "import gymnasium, birthsim_env; gymnasium.make{}('BirthSIM/CircleResidual-v1')"
-COMMAND = (
-    "import sys; sys.argv = ['/somewhere/birthsim-train', '--help']; from baselines.commands.start import command; command()"
-)
+COMMAND = "import sys; sys.argv = ['birthsim', 'train', '--help']; from birthsim.door import main; main()"
 
 
 def run(script, folder):
@@ -53,5 +51,5 @@ def test_a_foreign_package_is_named(script, content, tmp_path):
 
 
 def test_the_command_is_chosen_by_its_name(tmp_path):
-    done = run(COMMAND.replace("train", "export"), tmp_path)
-    assert done.stdout.startswith("usage: birthsim-export")
+    done = run(COMMAND.replace("train", "explain"), tmp_path)
+    assert done.stdout.startswith("usage: birthsim explain")

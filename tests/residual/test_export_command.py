@@ -1,4 +1,4 @@
-"""``birthsim-export``: where it writes, what it says, and what it refuses in one line."""
+"""``birthsim export``: where it writes, what it says, and what it refuses in one line."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ def folder(tmp_path):
 
 def refused(monkeypatch, capsys, *arguments):
     """What the command complained about, in one line and with exit status 2."""
-    status, printed, complaint = call("export", monkeypatch, capsys, *arguments)
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", *arguments)
     assert (status, printed) == (2, "")
-    assert complaint.startswith("birthsim-export: error: ")
+    assert complaint.startswith("birthsim export: error: ")
     assert complaint.count("\n") == 1
     return complaint
 
 
 def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_path, monkeypatch, capsys):
-    status, printed, complaint = call("export", monkeypatch, capsys, folder)
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder)
     assert (status, complaint) == (0, "")
     written = folder / "policy.onnx"
     assert f"{written}: {written.stat().st_size} bytes, 36 observation entries to 4 actions" in printed
     assert "over 3000 observations" in printed
     assert re.search(r": \S+ from PyTorch, \S+ from NumPy; allowed: 1.19209e-07\n", printed)
     elsewhere = tmp_path / "new" / "folder" / "mine.onnx"
-    status, printed, complaint = call("export", monkeypatch, capsys, folder, "--format", "onnx", "--out", elsewhere)
+    status, printed, complaint = call("export", monkeypatch, capsys, "--to", "onnx", folder, "--out", elsewhere)
     assert (status, complaint) == (0, "")
     assert str(elsewhere) in printed
     assert elsewhere.read_bytes() == written.read_bytes()
@@ -47,7 +47,6 @@ def test_the_command_writes_beside_the_policy_or_where_it_is_told(folder, tmp_pa
 
 
 def test_what_a_user_can_mend_is_said_in_one_line(folder, tmp_path, monkeypatch, capsys):
-    assert "--format 'tflite'; allowed: onnx" in refused(monkeypatch, capsys, folder, "--format", "tflite")
     assert f"has no {WEIGHTS}" in refused(monkeypatch, capsys, tmp_path / "nowhere")
     assert "is a folder; allowed: the name of a file" in refused(monkeypatch, capsys, folder, "--out", tmp_path)
     (tmp_path / "file").write_text("")
@@ -70,8 +69,8 @@ def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
 
 
 def test_help_names_every_option():
-    line = [sys.executable, "-W", "error", "-m", "agents.commands.export", "--help"]
+    line = [sys.executable, "-W", "error", "-m", "birthsim", "export", "--to", "onnx", "--help"]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("usage: birthsim-export")
-    assert all(word in done.stdout for word in ("POLICY", "--format", "--out"))
+    assert done.stdout.startswith("usage: birthsim export")
+    assert all(word in done.stdout for word in ("POLICY", "--to", "--out"))

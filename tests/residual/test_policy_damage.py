@@ -58,7 +58,7 @@ def test_a_folder_without_a_policy_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "empty").mkdir()
     for name in ("file", "empty", "nowhere"):
-        assert_refused(tmp_path / name, rf"has no {WEIGHTS}; allowed: a folder that birthsim-train wrote, with {WEIGHTS}")
+        assert_refused(tmp_path / name, rf"has no {WEIGHTS}; allowed: a folder that birthsim train wrote, with {WEIGHTS}")
 
 
 @pytest.mark.parametrize("policy", [POLICY, REMEMBERS], ids=["forward", "with a memory"])
@@ -75,7 +75,7 @@ def test_every_flipped_bit_is_noticed(folder, policy):
             unsealed(bytes(flipped), FORMAT)
     (folder / WEIGHTS).write_bytes(flipped)
     assert_refused(
-        folder, f"{WEIGHTS} is damaged: its checksum is of another content; allowed: a folder that birthsim-train wrote"
+        folder, f"{WEIGHTS} is damaged: its checksum is of another content; allowed: a folder that birthsim train wrote"
     )
 
 
@@ -92,7 +92,7 @@ def test_a_file_that_is_cut_off_or_longer_is_noticed(folder, policy):
 def test_what_is_said_about_other_arrays_is_refused(folder, text):
     for metadata in (None, {"other": text}, {"birthsim": text}):
         (folder / WEIGHTS).write_bytes(save({"mean": np.zeros(3)}, metadata))
-        assert_refused(folder, f"{WEIGHTS} is no {FORMAT} or damaged; allowed: a folder that birthsim-train wrote")
+        assert_refused(folder, f"{WEIGHTS} is no {FORMAT} or damaged; allowed: a folder that birthsim train wrote")
 
 
 @pytest.mark.parametrize("form", ["other-1", "birthsim-residual-4", "birthsim-checkpoint-1", 3, None, ["birthsim"]])
@@ -125,7 +125,7 @@ def test_another_format_is_called_foreign(folder, form):
 )
 def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, changes):
     rewrite(folder, **changes)
-    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim-train wrote")
+    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
 @pytest.mark.parametrize("squashed", ["false", 3, []])
@@ -169,7 +169,7 @@ def shape(*sizes, fill=0.1, dtype=np.float32):
 )
 def test_arrays_that_are_no_network_are_refused(folder, changes):
     replace_arrays(folder, **changes)
-    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim-train wrote")
+    assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_arrays_that_are_no_network_are_refused(folder, changes):
 )
 def test_arrays_that_are_no_memory_are_refused(remembers, changes):
     replace_arrays(remembers, **changes)
-    assert_refused(remembers, r"is damaged \(.+\); allowed: a folder that birthsim-train wrote")
+    assert_refused(remembers, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
 
 
 @pytest.mark.parametrize(("inputs", "outputs"), [(22, 2), (INPUTS, 4), (INPUTS - 1, 3)])

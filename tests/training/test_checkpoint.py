@@ -172,7 +172,7 @@ class Trap:
 
 
 def assert_damaged(folder, model, env, words="(no birthsim-checkpoint-1 or )?damaged"):
-    with pytest.raises(ValueError, match=f"(?s) is {words}.*; allowed: a checkpoint that birthsim-train wrote$") as caught:
+    with pytest.raises(ValueError, match=f"(?s) is {words}.*; allowed: a checkpoint that birthsim train wrote$") as caught:
         load_checkpoint(folder, model, env, SETTINGS)
     assert repr(str(folder / NAME)) in str(caught.value)
     return str(caught.value)

@@ -20,7 +20,7 @@ from agents.training import trainer as training
 from agents.training.checkpoint import NAME, save_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
-from tests.console import COMMANDS, PATIENCE, ROOT, run, strict
+from tests.console import PATIENCE, ROOT, run, strict
 
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
 TINY = TrainingSettings(
@@ -171,7 +171,7 @@ def test_a_process_that_is_killed_ends_with_the_same_policy(tmp_path):
     done = run("train", "--config", tmp_path / "tiny.toml", "--out", tmp_path / "whole")
     assert done.returncode == 0, done.stderr
     options = ("--config", tmp_path / "tiny.toml", "--out", tmp_path / "out")
-    line, path = [sys.executable, "-m", COMMANDS["train"], *map(str, options)], tmp_path / "out" / "seed_0" / NAME
+    line, path = [sys.executable, "-m", "birthsim", "train", *map(str, options)], tmp_path / "out" / "seed_0" / NAME
     for _ in range(3):
         before = path.read_bytes() if path.is_file() else b""
         with subprocess.Popen(line, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:

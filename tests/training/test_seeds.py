@@ -95,7 +95,7 @@ def test_a_learning_curve_over_seeds_ends_with_the_shortest():
 )
 def test_a_damaged_learning_curve_is_named(tmp_path, text):
     (tmp_path / "training.json").write_bytes(text.encode("latin-1"))
-    with pytest.raises(ValueError, match=r"training\.json' is damaged \(.*\); allowed: a file that birthsim-train wrote"):
+    with pytest.raises(ValueError, match=r"training\.json' is damaged \(.*\); allowed: a file that birthsim train wrote"):
         learning_curves([tmp_path])
     assert learning_curves([tmp_path / "nowhere"]) == []
     assert len(learning_curves(policy_folders("circle"))) == 5
@@ -148,7 +148,7 @@ def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_pat
 
     monkeypatch.setattr(command, "run_tasks", refused)
     arguments = ("--policy", "circle_honest_student", "--sensors", sensors, "--episodes", "1", "--out", str(tmp_path))
-    monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
+    monkeypatch.setattr(sys, "argv", ["birthsim evaluate", *arguments])
     with pytest.raises(SystemExit):
         command.main()
     told = "the policy was trained with honest sensors; here they are lab"
@@ -195,7 +195,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
 
     monkeypatch.setattr(command, "run_tasks", computed)
     arguments = ("--env", "BirthSIM/Probe-v2", "--controller", "residual", "--episodes", "4", "--out", str(tmp_path))
-    monkeypatch.setattr(sys, "argv", ["birthsim-evaluate", *arguments])
+    monkeypatch.setattr(sys, "argv", ["birthsim evaluate", *arguments])
     command.main()
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]
     assert "residual, 5 seeds " in capsys.readouterr().out

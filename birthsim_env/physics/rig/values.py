@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import sys
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
@@ -23,6 +25,12 @@ def shown(value: Any) -> str:
     except Exception as error:
         return f"{type(value).__name__} ({type(error).__name__})"
     return in_line(text)
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """The question that an error asks where ``word`` is like one that is known, else nothing."""
+    found = difflib.get_close_matches(word, list(known), 1, 0.8)
+    return f" (did you mean {found[0]!r}?)" if found else ""
 
 
 def in_line(text: str) -> str:

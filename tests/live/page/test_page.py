@@ -219,7 +219,7 @@ def test_a_recording_is_saved_played_and_searched(chromium, window, tmp_path, pi
     download.value.save_as(file)
     recording = load_recording(file)
     pulled = recording.interval * float(np.argmax(recording.rows[:, SLICES["drag_force"]][:, 0]))
-    with Server("replay", file) as replay, Window(chromium, replay.url) as viewer:
+    with Server("live", "--replay", file) as replay, Window(chromium, replay.url) as viewer:
         assert viewer.value("birthsim.state.duration") == pytest.approx(recording.duration)
         assert recording.duration > 1.4
         assert not viewer.page.locator("#settings").is_visible()

@@ -58,7 +58,9 @@ def rows_of(log: Log, name: str) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
 def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
-    status, printed, complained = call("log", monkeypatch, capsys, files[kind], "--out", tmp_path / "a.parquet")
+    status, printed, complained = call(
+        "export", monkeypatch, capsys, "--to", "parquet", files[kind], "--out", tmp_path / "a.parquet"
+    )
     assert (status, complained) == (0, "")
     log, table = reading.read_log(files[kind]), pq.read_table(tmp_path / "a.parquet")
     assert printed.startswith(f"written to {tmp_path / 'a.parquet'}: {table.num_rows} rows of {len(log.columns)} columns")
@@ -77,7 +79,7 @@ def test_parquet_gives_every_number_back(kind: str, files: dict[str, Path], tmp_
 @pytest.mark.parametrize("kind", ["recording", "evaluation", "piece"])
 def test_mcap_gives_every_finite_number_back(kind: str, files: dict[str, Path], tmp_path: Path, monkeypatch, capsys) -> None:
     reader = pytest.importorskip("mcap.reader", reason=MISSING)
-    assert call("log", monkeypatch, capsys, files[kind], "--out", tmp_path / "a.mcap")[0] == 0
+    assert call("export", monkeypatch, capsys, "--to", "mcap", files[kind], "--out", tmp_path / "a.mcap")[0] == 0
     log = reading.read_log(files[kind])
     messages: dict[str, list[tuple[int, dict]]] = {}
     with (tmp_path / "a.mcap").open("rb") as file:
@@ -134,7 +136,7 @@ BAD = [
     ("bad.json", "a.parquet", "bad.json' is damaged or foreign (JSONDecodeError"),
     ("list.json", "a.parquet", "list.json' is damaged or foreign (TypeError"),
     ("short.json", "a.parquet", "short.json' is damaged or foreign (ValueError: episodes of pid are not as many"),
-    ("evaluation.json", "a.csv", "a.csv'; allowed: a file that ends in .parquet or .mcap"),
+    ("evaluation.json", "a.csv", "a.csv'; allowed: a file that ends in .parquet"),
     ("evaluation.json", "none/a.parquet", "none/a.parquet': No such file or directory"),
 ]
 
@@ -149,9 +151,10 @@ def test_what_is_wrong_is_named_in_one_line(name, out, words, files, tmp_path, m
         (tmp_path / bad).write_text("{")
     (tmp_path / "list.json").write_text("[1]")
     before = sorted(tmp_path.iterdir())
-    status, printed, complained = call("log", monkeypatch, capsys, tmp_path / name, "--out", tmp_path / out)
+    form = "mcap" if out.endswith("mcap") else "parquet"
+    status, printed, complained = call("export", monkeypatch, capsys, "--to", form, tmp_path / name, "--out", tmp_path / out)
     assert (status, printed) == (2, "")
-    assert complained.startswith("birthsim-log: error: ")
+    assert complained.startswith("birthsim export: error: ")
     assert complained.count("\n") == 1
     assert words in complained
     assert sorted(tmp_path.iterdir()) == before
@@ -168,9 +171,9 @@ def test_a_log_is_written_whole_or_not_at_all(suffix: str, files: dict[str, Path
         raise OSError(28, "No space left on device")
 
     monkeypatch.setitem(writing.WRITERS, suffix, half)
-    status, _, complained = call("log", monkeypatch, capsys, files["recording"], "--out", path)
+    status, _, complained = call("export", monkeypatch, capsys, "--to", suffix[1:], files["recording"], "--out", path)
     assert status == 2
-    assert complained == f"birthsim-log: error: {str(path)!r}: No space left on device\n"
+    assert complained == f"birthsim export: error: {str(path)!r}: No space left on device\n"
     assert path.read_bytes() == b"before"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -178,7 +181,9 @@ def test_a_log_is_written_whole_or_not_at_all(suffix: str, files: dict[str, Path
 @pytest.mark.parametrize(("suffix", "package"), [(".parquet", "pyarrow"), (".mcap", "mcap.writer")])
 def test_without_the_extra_it_says_how_to_get_it(suffix, package, files, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    status, _, complained = call("log", monkeypatch, capsys, files["recording"], "--out", tmp_path / f"a{suffix}")
+    status, _, complained = call(
+        "export", monkeypatch, capsys, "--to", suffix[1:], files["recording"], "--out", tmp_path / f"a{suffix}"
+    )
     assert status == 2
     assert "pip install 'birthsim[log]'" in complained
     assert list(tmp_path.iterdir()) == []

@@ -73,5 +73,5 @@ def test_what_is_no_policy_is_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     status, _, complained = call("live", monkeypatch, capsys, "--port", "0", "--policy", "circle", "nowhere", *where)
     assert status == 2
-    assert complained.strip().splitlines()[-1].startswith("birthsim-live: error: policy = 'nowhere'")
+    assert complained.strip().splitlines()[-1].startswith("birthsim live: error: policy = 'nowhere'")
     assert not (tmp_path / "page").exists()

@@ -19,12 +19,12 @@ from tests.console import PATIENCE, call
 def test_the_command_serves_and_finishes_its_recording_at_an_interrupt(tmp_path: Path) -> None:
     from websockets.sync.client import connect
 
-    command = [sys.executable, "-m", "birthsim_live.commands.live", "--port", "0", "--record-dir", str(tmp_path)]
+    command = [sys.executable, "-m", "birthsim", "live", "--port", "0", "--record-dir", str(tmp_path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
             assert process.stdout is not None
             line = next(line for line in process.stdout if "http://" in line)
-            address = line.split()[1]
+            address = next(word for word in line.split() if word.startswith("http:"))
             with connect(address.replace("http", "ws") + "/ws", open_timeout=PATIENCE) as ws:
                 assert json.loads(ws.recv())["type"] == "hello"
                 ws.send('{"type":"record","on":true}')
@@ -48,7 +48,7 @@ def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
 ) -> None:
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     monkeypatch.setattr("birthsim_live.rig.session.Session", None)
-    for command, arguments in (("live", []), ("replay", ["pull.rec"])):
+    for command, arguments in (("live", []), ("live", ["--replay", "pull.rec"])):
         status, _, complained = call(command, monkeypatch, capsys, *arguments)
         assert status == 2
         assert "pip install 'birthsim[live]'" in complained
@@ -67,11 +67,11 @@ def test_commands_refuse_in_one_line(
         ):
             status, _, complained = call("live", monkeypatch, capsys, *arguments)
             assert status == 2
-            assert complained.strip().splitlines()[-1].startswith("birthsim-live: error: ")
+            assert complained.strip().splitlines()[-1].startswith("birthsim live: error: ")
             assert words in complained
-    status, _, complained = call("replay", monkeypatch, capsys, "--port", "0", tmp_path / "none.rec")
+    status, _, complained = call("live", monkeypatch, capsys, "--port", "0", "--replay", tmp_path / "none.rec")
     assert status == 2
-    assert complained.strip().splitlines()[-1].startswith("birthsim-replay: error: ")
+    assert complained.strip().splitlines()[-1].startswith("birthsim live: error: ")
     assert "none.rec' cannot be read" in complained
 
 

@@ -1,0 +1,1 @@
+"""The command ``birthsim``: one door to what a user runs, above all other packages."""

@@ -1,0 +1,80 @@
+"""``birthsim doctor``: what works on this machine, and what to install for the rest."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import shutil
+from importlib.metadata import PackageNotFoundError, requires, version
+
+from baselines.commands.shared import run
+
+ABOUT = {
+    "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
+    "build": "export --to wasm, c, fmu", "log": "export --to parquet, mcap", "tune": "tune", "video": "films of episodes",
+    "mpc": "the controller nonlinear-mpc", "control": "linear models for python-control", "cluster": "--cluster ray",
+    "sweep": "sweeps of trainings",
+}  # fmt: skip
+"""Extra -> what it is for."""
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "chromium-headless-shell")
+
+
+def main() -> None:
+    """Entry point."""
+    run(
+        argparse.ArgumentParser(
+            prog="birthsim doctor", description="Say what works on this machine, and what to install for the rest."
+        ),
+        _doctor,
+    )
+
+
+def _doctor(_: argparse.Namespace) -> None:
+    from birthsim_env.physics.compiled.compilation import cache_folder
+
+    print(f"{'Python':12}{platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} processors")
+    for name in ("birthsim", "gymnasium", "numpy", "numba", "llvmlite", "scipy", "torch"):
+        print(f"{name:12}{found(name) or 'missing'}")
+    folder = cache_folder()
+    held = 0 if folder is None else sum(1 for _ in folder.rglob("*.nbc"))
+    print(
+        f"{'kernels':12}"
+        + ("no writable folder; mend: set NUMBA_CACHE_DIR" if folder is None else f"{held} compiled, in {folder}")
+    )
+    print(f"{'browser':12}{next(filter(None, map(shutil.which, BROWSERS)), 'none found; mend: any browser shows the page')}")
+    print(f"{'GPU':12}{graphics()}")
+    print("\nextras")
+    for extra, missing in extras().items():
+        mend = f"pip install 'birthsim[{extra}]'"
+        print(f"{extra:12}{ABOUT.get(extra, ''):38}" + ("works" if not missing else mend))
+
+
+def found(name: str) -> str | None:
+    """The version of a distribution that is installed, else None."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def extras() -> dict[str, list[str]]:
+    """Every extra that a user may want -> the distributions of it that are missing."""
+    needed: dict[str, list[str]] = {extra: [] for extra in ABOUT}
+    for line in requires("birthsim") or []:
+        extra = re.search(r"extra == '(\w+)'", line)
+        name = re.split(r"[^\w.-]", line, maxsplit=1)[0]
+        if extra and extra[1] in needed and found(name) is None:
+            needed[extra[1]].append(name)
+    return needed
+
+
+def graphics() -> str:
+    """What PyTorch finds; no command of BirthSIM needs a GPU."""
+    if found("torch") is None:
+        return "not looked for, PyTorch is missing; no command needs one"
+    import torch
+
+    return torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none; no command needs one"

@@ -1,0 +1,49 @@
+"""``birthsim export --to FORM``: what leaves BirthSIM, each form by the command that writes it."""
+
+from __future__ import annotations
+
+import sys
+
+from baselines.commands.start import perform
+from birthsim_env.physics.rig.values import near, shown
+
+FORMS: dict[str, tuple[str, str, str, str]] = {
+    "onnx": ("agents", "export", "a trained policy, for ONNX runtimes", "circle --out policy.onnx"),
+    "wasm": ("birthsim_build", "build", "closed loops, as WebAssembly with JavaScript", "--out out/wasm"),
+    "c": ("birthsim_build", "build", "closed loops, as a library for this processor", "--out out/c"),
+    "x86-64": ("birthsim_build", "build", "closed loops, as a library with a C header", "--out out/x86-64"),
+    "aarch64": ("birthsim_build", "build", "closed loops, as a library with a C header", "--out out/aarch64"),
+    "cortex-m7": ("birthsim_build", "build", "laws alone, as an object for a microcontroller", "--out out/cortex-m7"),
+    "fmu": ("birthsim_build", "fmu", "the rig or a closed loop, for Simulink and its like", "--out rig.fmu"),
+    "parquet": ("birthsim_live", "log", "a recording or an evaluation, as a table", "run.rec --out run.parquet"),
+    "mcap": ("birthsim_live", "log", "a recording or an evaluation, for PlotJuggler", "run.rec --out run.mcap"),
+}
+"""Form -> package and command that writes it, what it is, and an example's arguments."""
+
+
+def main() -> None:
+    """Run the command that ``--to`` names, with all arguments."""
+    arguments = sys.argv[1:]
+    form = _form(arguments)
+    if form in FORMS:
+        package, module, _, example = FORMS[form]
+        perform("birthsim export", package, f"commands.{module}", f"birthsim export --to {form} {example}")
+    elif form is None and {"-h", "--help"} & set(arguments):
+        forms = (f"  {name:10} {what}" for name, (_, _, what, _) in FORMS.items())
+        lines = ["usage: birthsim export --to FORM ...", "", "forms:", *forms]
+        print("\n".join([*lines, "", "birthsim export --to FORM --help has a form's options."]))
+        raise SystemExit(0)
+    else:
+        said = "is missing" if form is None else f"{shown(form)}{near(form, FORMS)}"
+        print(f"birthsim export: error: --to {said}; allowed: {', '.join(FORMS)}", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def _form(arguments: list[str]) -> str | None:
+    """What ``--to FORM`` or ``--to=FORM`` says."""
+    for k, argument in enumerate(arguments):
+        if argument.startswith("--to="):
+            return argument.removeprefix("--to=")
+        if argument == "--to" and k + 1 < len(arguments):
+            return arguments[k + 1]
+    return None

@@ -1,0 +1,38 @@
+"""``birthsim warmup``: compile ahead what commands need first, so that the first one starts at once."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+import gymnasium
+from tqdm import tqdm
+
+from baselines.commands.shared import run
+from baselines.registry import LISTED, SLOW, make_controller
+from baselines.staged import NO_ACTION, driving
+from birthsim_env.physics.rig.parameters import Parameters
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim warmup", description="Compile the kernels of every controller that is not slow; they stay in the cache."
+    )
+    run(parser, _warm)
+
+
+def _warm(_: argparse.Namespace) -> None:
+    rig, began = Parameters(), time.perf_counter()
+    names = [name for name in LISTED if name not in SLOW]
+    with tqdm(names, desc="compiling", unit=" controllers", leave=False) as bar:
+        for name in bar:
+            env: Any = gymnasium.make(
+                "BirthSIM/Circle-v1", sensors="lab", policy_period=rig.electronics.control_period,
+                actuation=driving(make_controller(name, rig), name),
+            )  # fmt: skip
+            env.reset(seed=0)
+            env.step(NO_ACTION)
+            env.close()
+    print(f"{len(names)} controllers are compiled: {time.perf_counter() - began:.1f} s")
