@@ -12,7 +12,7 @@
 # make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
-# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm, and installs axe-core too
+# make prose reads the documentation for words that the glossary replaces and for long sentences; it needs npm
 # make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
@@ -268,7 +268,7 @@ fuzz: $(READY)
 	$(BIN)/python -m tests.fuzz --cases 5000 --out $(OUT)/fuzz.json
 
 # A warning fails it: a page that no list names, a link or an anchor that leads nowhere, a cell that fails.
-docs: $(READY)
+docs: $(READY) $(NPM)/.ready
 	rm -rf $(OUT)/docs
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs $(OUT)/docs
 	@echo "open $(OUT)/docs/index.html"

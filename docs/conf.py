@@ -29,7 +29,7 @@ highlight_language = "none"
 # Two hyphens begin an option.
 smartquotes = False
 
-myst_enable_extensions = ["colon_fence", "deflist"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 
 # Every notebook runs at every build, in a folder of its own, and a failing cell fails the build.
@@ -41,9 +41,13 @@ nb_merge_streams = True
 # Progress bars, and the word that kernels compile.
 nb_output_stderr = "remove"
 
+# Equations are drawn by a file of the site itself, which npm brings (make docs); numbers in brackets are the paper's.
+MATHJAX = HERE.parent / "out" / "npm" / "node_modules" / "mathjax" / "es5" / "tex-svg.js"
+mathjax_path = MATHJAX.name
+
 html_theme = "furo"
 html_title = "BirthSIM"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
 html_js_files = ["access.js", "tables.js", "data.js"]
 html_copy_source = False
