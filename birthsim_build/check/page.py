@@ -52,7 +52,7 @@ def page(results: Mapping[str, tuple[Report, list[Line]]], every: Report, wide: 
         _firmware(results["cortex-m7"][0]),
         BREAKS,
         "## All loops",
-        "`birthsim-build wasm` with all scenarios, sensors and compiled controllers and one policy takes "
+        "`birthsim export --to wasm` with all scenarios, sensors and compiled controllers and one policy takes "
         f"{sum(every['bytes'].values()) / 1e3:,.0f} kB. {len(wide)} loops ran in Node: every controller on the Circle, and "
         f"every scenario with every sensor model. {equal} of them have the bits of Python.",
         _table(("loop", "bits", "speed"), wide),

@@ -28,4 +28,4 @@ TARGETS = {
 Cortex-M7 with double precision. No target fuses a product with a sum: the code does not allow it, and LLVM then does not."""
 
 BUILT = ("wasm", "x86-64", "aarch64", "cortex-m7")
-"""Targets of ``birthsim-build``; Windows has its FMUs only."""
+"""Targets of ``birthsim export``; Windows has its FMUs only."""

@@ -49,7 +49,7 @@ def model_description(model: Description, version: int) -> bytes:
         fmiVersion="3.0" if three else "2.0",
         modelName=model.name,
         description=model.about,
-        generationTool=f"birthsim-build {__version__}",
+        generationTool=f"birthsim export {__version__}",
         variableNamingConvention="structured",
         license="MIT",
     )

@@ -54,8 +54,8 @@ def read_log(path: Path) -> Log:
         # Damage trips json, NumPy and dictionaries in a dozen ways.
         problem = f"{type(error).__name__}: {error}".splitlines()[0]
         raise ValueError(
-            f"file = {str(path)!r} is damaged or foreign ({problem}); allowed: a recording of birthsim-live ({SUFFIX}), "
-            "evaluation.json of birthsim-evaluate, or a piece of one, which holds traces"
+            f"file = {str(path)!r} is damaged or foreign ({problem}); allowed: a recording of birthsim live ({SUFFIX}), "
+            "evaluation.json of birthsim evaluate, or a piece of one, which holds traces"
         ) from error
 
 

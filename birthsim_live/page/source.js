@@ -36,7 +36,7 @@ export class Source {
       const recording = await readRecording(file);
       const hello = this.known.get("hello");
       if (!hello) throw new Error("no rig is here yet to draw a recording with; allowed: once one is");
-      if (!isDrawn(recording, hello)) throw new Error(`recording = '${file.name}' is of a rig of another shape; allowed: birthsim-replay FILE`);
+      if (!isDrawn(recording, hello)) throw new Error(`recording = '${file.name}' is of a rig of another shape; allowed: birthsim live --replay FILE`);
       this.connection.send({ type: "release" });
       this.player?.stop();
       this.player = new Player(recording, hello, this.handlers);

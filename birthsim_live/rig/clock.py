@@ -93,7 +93,7 @@ class Clock(threading.Thread):
     """
 
     def __init__(self, source: Source, on_frame: Callable[[dict[str, Any]], None]) -> None:
-        super().__init__(name="birthsim-live clock", daemon=True)
+        super().__init__(name="birthsim live clock", daemon=True)
         self.paused, self.speed = False, 1.0
         self._source, self._on_frame = source, on_frame
         self._asked: deque[Callable[[], None]] = deque()

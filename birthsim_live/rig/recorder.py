@@ -55,7 +55,7 @@ class Recorder:
         self._file: FileIO | None = None
         self._first = b""
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._write_on, name="birthsim-live recorder", daemon=True)
+        self._thread = threading.Thread(target=self._write_on, name="birthsim live recorder", daemon=True)
         self.take(session)
 
     @property

@@ -88,7 +88,7 @@ def load_recording(path: str | Path) -> Recording:
     except Exception as error:
         # Damage trips struct, zlib, json and NumPy in a dozen ways.
         raise ValueError(
-            f"recording = {str(path)!r} is damaged or foreign ({error}); allowed: what birthsim-live wrote"
+            f"recording = {str(path)!r} is damaged or foreign ({error}); allowed: what birthsim live wrote"
         ) from error
 
 

@@ -41,7 +41,7 @@ SEED = 0
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
 
-WITHOUT = "only with birthsim-live"
+WITHOUT = "only with birthsim live"
 """What the page says of a controller that is not compiled."""
 
 

@@ -8,7 +8,7 @@ from tests.build.targets import BUILT, build, need_linker
 
 
 def _once(tmp_path_factory, target, *options):
-    """A folder of birthsim-build, made by the first worker that asks for it."""
+    """A folder of birthsim export, made by the first worker that asks for it."""
     need_linker()
     root = tmp_path_factory.getbasetemp()
     root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root

@@ -116,7 +116,7 @@ def missing():
 
 
 class Server:
-    """``birthsim-live`` or ``birthsim-replay`` as a process of its own; ``arguments`` are those of the command."""
+    """``birthsim live`` or ``birthsim live --replay`` as a process of its own; ``arguments`` are those of the command."""
 
     def __init__(self, command, *arguments, port=0):
         line = [sys.executable, "-m", "birthsim", *command.split(), *map(str, arguments), "--port", str(port)]

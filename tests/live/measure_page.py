@@ -1,7 +1,7 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
 ``python -m tests.live.measure_page`` starts a server, drags the end effector around for some seconds, several times, and
-prints a table; ``--static FOLDER`` does so with a folder of ``birthsim-live --static``, ``--compare CONTROLLER`` with two rigs;
+prints a table; ``--static FOLDER`` does so with a folder of ``birthsim live --static``, ``--compare CONTROLLER`` with two rigs;
 ``--picture FILE`` also writes the screenshot of docs/live.md.
 """
 

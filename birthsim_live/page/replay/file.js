@@ -17,7 +17,7 @@ export async function readRecording(file) {
     if (!chunks.length) throw new Error("no chunk is whole");
     return { name: file.name, ...checked(chunks) };
   } catch (error) {
-    throw new Error(`recording = '${file.name}' is damaged or foreign (${error.message}); allowed: what birthsim-live wrote`);
+    throw new Error(`recording = '${file.name}' is damaged or foreign (${error.message}); allowed: what birthsim live wrote`);
   }
 }
 

@@ -1,4 +1,4 @@
-// Plays a recording in this window, with the face of a connection: the messages are those of birthsim-replay.
+// Plays a recording in this window, with the face of a connection: the messages are those of birthsim live --replay.
 
 import { FIELDS, frameOf } from "../frame.js";
 

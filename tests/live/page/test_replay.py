@@ -105,7 +105,10 @@ def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
         "foreign": (b"PK this is no recording", "is damaged or foreign"),
         "checksum": (whole[:400] + bytes([whole[400] ^ 1]) + whole[401:], "has another checksum"),
         "large": (2**27 + 1, "allowed: up to 134217728"),
-        "shape": (record(tmp_path, Parameters().replace({"geometry.d6": 0.26})).read_bytes(), "allowed: birthsim-replay FILE"),
+        "shape": (
+            record(tmp_path, Parameters().replace({"geometry.d6": 0.26})).read_bytes(),
+            "allowed: birthsim live --replay FILE",
+        ),
     }[damage]
     drop(window, content, f"{damage}.rec")
     window.wait(f"{NOTICES}.includes({words!r}) && {NOTICES}.includes('{damage}.rec')")

@@ -174,7 +174,7 @@ DAMAGES = {
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_what_is_foreign_is_refused_by_name(damage: str, file: tuple[Path, Any], tmp_path: Path) -> None:
     copy = rewritten(file[0], tmp_path, DAMAGES[damage])
-    with pytest.raises(ValueError, match=r"changed.rec' is damaged or foreign .*; allowed: what birthsim-live wrote"):
+    with pytest.raises(ValueError, match=r"changed.rec' is damaged or foreign .*; allowed: what birthsim live wrote"):
         load_recording(copy)
 
 

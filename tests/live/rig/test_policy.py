@@ -1,4 +1,4 @@
-"""A policy of one's own on the page: ``birthsim-live --policy``."""
+"""A policy of one's own on the page: ``birthsim live --policy``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RIG = Parameters()
 
 @pytest.fixture
 def mine(tmp_path: Path) -> str:
-    """A folder as birthsim-train leaves it."""
+    """A folder as birthsim train leaves it."""
     return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
 
 

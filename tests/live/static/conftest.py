@@ -23,7 +23,7 @@ def _built(tmp_path_factory, patch):
 
     folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
     own = shutil.copytree(seeds.SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
-    patch.setattr(sys, "argv", ["birthsim-live", "--static", str(folder), "--policy", str(own)])
+    patch.setattr(sys, "argv", ["birthsim live", "--static", str(folder), "--policy", str(own)])
     with contextlib.redirect_stdout(io.StringIO()) as said:
         main()
     assert f"written to {folder}" in said.getvalue()

@@ -1,4 +1,4 @@
-// Takes a session down and makes the file that birthsim-replay plays (birthsim_live/rig/recording.py has the format).
+// Takes a session down and makes the file that birthsim live --replay plays (birthsim_live/rig/recording.py has the format).
 
 import { crc32 } from "../crc32.js";
 import { NO_ROW, rowOf } from "./frames.js";
