@@ -126,7 +126,7 @@ oldest: $(READY)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m tests.processors here
 
 verify: $(READY)
-	$(BIN)/birthsim-verify --out $(OUT)/verify
+	$(BIN)/birthsim study accuracy --out $(OUT)/verify
 	$(BIN)/python -m tests.verification accuracy $(OUT)/verify
 	$(BIN)/python -m tests.verification balances
 	$(BIN)/python -m tests.verification report
@@ -143,8 +143,8 @@ kills: $(READY)
 	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
 
 lint: $(READY)
-	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live tests .ci
-	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live tests .ci
+	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci
+	$(BIN)/ruff format --check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/ruff check docs/conf.py docs/_generate
@@ -189,8 +189,8 @@ lint-workflows: $(TOOLS)/.ready
 	$(TOOLS)/bin/zizmor --offline --quiet .github
 
 bench: $(READY)
-	$(BIN)/birthsim-bench --out $(OUT)/bench
-	$(BIN)/python -m birthsim_build.commands.targets --out $(OUT)/targets
+	$(BIN)/birthsim study speed --out $(OUT)/bench
+	$(BIN)/birthsim study targets --out $(OUT)/targets
 
 pictures: $(READY)
 	$(BIN)/birthsim figure4 --out $(OUT)/figure4
@@ -201,7 +201,7 @@ pictures: $(READY)
 	  --out docs/vacuum.webp
 	$(BIN)/birthsim evaluate --all --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
-	$(BIN)/birthsim-sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
+	$(BIN)/birthsim study sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
 	cp $(OUT)/robustness/map_0.png docs/robustness.png
 	$(BIN)/python examples/frequency_responses.py --out $(OUT)/frequency
 	cp $(OUT)/frequency/frequency_responses.png docs/
@@ -210,7 +210,7 @@ compare: $(READY)
 	$(BIN)/birthsim evaluate --all --episodes 100 --out $(OUT)/comparison
 	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
 	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
-	$(BIN)/birthsim-stability --sensors lab --out $(OUT)/stability
+	$(BIN)/birthsim study stability --sensors lab --out $(OUT)/stability
 	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
 	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
 	  echo; echo "## Probe"; $(call tables,bound-probe/comparison,bound_probe))
@@ -244,7 +244,7 @@ learned: $(READY)
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
 scores: $(READY)
-	$(BIN)/birthsim-scores --out $(OUT)/scores
+	$(BIN)/birthsim study scores --out $(OUT)/scores
 	cp $(OUT)/scores/scores.json birthsim_env/
 	$(call renew,scores,$(call tables,scores/scores,scores))
 
@@ -257,11 +257,11 @@ moving: $(READY)
 	$(call renew,moving,$(call tables,moving/comparison,moving))
 
 haptics: $(READY)
-	$(BIN)/birthsim-haptics --out $(OUT)/haptics --page docs/haptics.md
+	$(BIN)/birthsim study haptics --out $(OUT)/haptics --page docs/haptics.md
 	cp $(OUT)/haptics/*.png docs/
 
 targets: $(READY)
-	$(BIN)/python -m birthsim_build.commands.targets --out $(OUT)/targets --page docs/targets.md
+	$(BIN)/birthsim study targets --out $(OUT)/targets --page docs/targets.md
 
 fuzz: $(READY)
 	mkdir -p $(OUT)

@@ -1,6 +1,6 @@
 """Reference scores: what an episode of an environment pays with shut valves, under the laws, and with a learned policy.
 
-``birthsim-scores`` measures them and writes the file that lies beside this module.
+``birthsim study scores`` measures them and writes the file that lies beside this module.
 """
 
 from __future__ import annotations

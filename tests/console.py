@@ -13,11 +13,8 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-STUDIES = {
-    **{name: f"baselines.commands.{name}" for name in ("stability", "bench", "verify", "haptics")},
-    "sweep": "agents.commands.sweep",
-}
-"""Commands that are no part of ``birthsim`` -> their module."""
+STUDIES = {"stability", "speed", "accuracy", "haptics", "sweep", "scores"}
+"""Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long
 RESIDUAL = "BirthSIM/ProbeResidual-v2"
 
@@ -36,7 +33,7 @@ class Slam:
 
 def words(command):
     """What a process or ``sys.argv`` begins with."""
-    return [STUDIES[command]] if command in STUDIES else ["birthsim", command]
+    return ["birthsim", "study", command] if command in STUDIES else ["birthsim", command]
 
 
 def run(command, *arguments):
@@ -50,7 +47,7 @@ def call(command, monkeypatch, capsys, *arguments):
     monkeypatch.setattr(sys, "argv", [*words(command), *map(str, arguments)])
     monkeypatch.setenv("NO_COLOR", "1")  # Python 3.14 colours what argparse says
     monkeypatch.setattr("birthsim.door.answer_signals", lambda name: None)
-    main = importlib.import_module(STUDIES.get(command, "birthsim.door")).main
+    main = importlib.import_module("birthsim.door").main
     status = 0
     try:
         main()

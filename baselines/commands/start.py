@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 from importlib import import_module
-from pathlib import Path
 from types import FrameType, ModuleType
 
 ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "the terminal is gone"}
@@ -58,11 +57,3 @@ def _load(name: str, package: str, module: str) -> ModuleType:
     except ImportError as error:
         print(f"{name}: error: {error}", file=sys.stderr)
         raise SystemExit(2) from None
-
-
-def command() -> None:
-    """Run the study that the process is called by: ``birthsim-scores`` -> ``agents.commands.scores``."""
-    name = Path(sys.argv[0]).stem
-    answer_signals(name)
-    study = name.removeprefix("birthsim-")
-    perform(name, "agents" if study in ("scores", "sweep") else "baselines", f"commands.{study}")

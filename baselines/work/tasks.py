@@ -23,14 +23,14 @@ from baselines.work.files import finite, later_signals, write_json
 from baselines.work.side_by_side import side_by_side
 
 _ROOT = Path(__file__).resolve().parent.parent.parent
-_PACKAGES = ("birthsim_env", "baselines", "agents")
+_PACKAGES = ("birthsim_env", "baselines", "agents", "studies")
 _SHOWN_ONLY = (
     *("birthsim_env/drawing", "birthsim_env/drawing/rendering.py", "baselines/commands", "baselines/figures/runs.py"),
     *("baselines/bench/statistics.py", "baselines/bench/comparison_tables.py", "baselines/figures/comparison.py"),
     *("baselines/figures/studies.py", "birthsim_env/scores.json"),
-    *("baselines/figures/haptics.py", "baselines/figures/identification.py", "baselines/bench/haptics/tables.py"),
+    *("studies/haptics/figures.py", "baselines/figures/identification.py", "studies/haptics/tables.py"),
     *("agents/commands", "agents/reports", "agents/policies", "agents/training"),
-    *("agents/sweep/maps.py", "agents/sweep/report.py", "agents/sweep/search.py", "agents/sweep/plan.py"),
+    *("studies/sweeps/maps.py", "studies/sweeps/report.py", "studies/sweeps/search.py", "studies/sweeps/plan.py"),
 )
 """Sources that show results and do not make them: pieces outlive a change of theirs."""
 
@@ -54,7 +54,8 @@ class Task:
     def code(self) -> dict[str, str]:
         """The ``code_stamp`` of what it runs."""
         module = getattr(self.work, "func", self.work).__module__
-        return code_stamp("agents" if module.startswith("agents") else "baselines")
+        package = module.partition(".")[0]
+        return code_stamp(package if package in ("agents", "studies") else "baselines")
 
     def file(self) -> str:
         """Its file's name: the task's and a hash of code and settings, so that other code or settings have another file."""

@@ -33,7 +33,7 @@ def metrics() -> str:
         f"a push held for {HELD:g} s. Positions are means over {WINDOW:g} s, so hunting does not enter.",
         f"- Stuck: slower than {1e3 * STUCK:g} mm/s. Restarted: faster than {1e3 * RUNNING:g} mm/s after that.",
         "- Bandwidth and energy are not metrics of an episode; [What a hand feels](../haptics.md) defines what "
-        "`birthsim-haptics` measures.",
+        "`birthsim study haptics` measures.",
     ])  # fmt: skip
 
 

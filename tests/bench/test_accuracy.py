@@ -8,13 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from baselines.bench.accuracy import errors as accuracy
-from baselines.bench.accuracy import tables as accuracy_tables
-from baselines.bench.accuracy.motions import MOTIONS, smooth, stick_slip, strong
-from baselines.figures.accuracy import accuracy_figure
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.accuracy import errors as accuracy
+from studies.accuracy import tables as accuracy_tables
+from studies.accuracy.figure import accuracy_figure
+from studies.accuracy.motions import MOTIONS, smooth, stick_slip, strong
 from tests.console import call
 
 
@@ -121,9 +121,9 @@ def test_tables_show_the_plants_row_and_what_is_unstable(found: dict, tmp_path) 
 
 
 def test_the_command_refuses_plainly(monkeypatch, capsys, tmp_path) -> None:
-    status, _, complained = call("verify", monkeypatch, capsys, "--rigs", "0", "--out", tmp_path)
+    status, _, complained = call("accuracy", monkeypatch, capsys, "--rigs", "0", "--out", tmp_path)
     assert status == 2
     assert "'0'; allowed: a whole number >= 1" in complained
-    status, _, complained = call("verify", monkeypatch, capsys, "--parameters", "none.toml", "--out", tmp_path)
+    status, _, complained = call("accuracy", monkeypatch, capsys, "--parameters", "none.toml", "--out", tmp_path)
     assert status == 2
     assert "'none.toml' cannot be read" in complained

@@ -1,4 +1,4 @@
-"""birthsim-bench: what it measures in processes of their own, and what it says where something is missing."""
+"""birthsim study speed: what it measures in processes of their own, and what it says where something is missing."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import shutil
 import pytest
 
 from agents.residual.settings import LAWS
-from baselines.bench.speed import speeds as speed
-from baselines.commands import bench
+from studies.speed import command as bench
+from studies.speed import speeds as speed
 from tests.console import call
 
 
@@ -23,7 +23,7 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
     monkeypatch.setattr(speed, "LANES", ())
     monkeypatch.setattr(bench, "_rows", lambda budget: [("plant", 1.0, "policy steps/s")])
     out = tmp_path / "out"
-    status, printed, complained = call("bench", monkeypatch, capsys, "--seconds", "0.02", "--beside", tmp_path, "--out", out)
+    status, printed, complained = call("speed", monkeypatch, capsys, "--seconds", "0.02", "--beside", tmp_path, "--out", out)
     assert (status, complained) == (0, "")
     plant, single, one, two, ratio = json.loads((out / "bench.json").read_text())
     assert plant == {"what": "plant", "value": 1.0, "unit": "policy steps/s"}
@@ -35,10 +35,10 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
 
 
 def test_a_folder_without_the_project_is_named_at_once(tmp_path, monkeypatch, capsys):
-    status, _, complained = call("bench", monkeypatch, capsys, "--beside", tmp_path)
+    status, _, complained = call("speed", monkeypatch, capsys, "--beside", tmp_path)
     assert status == 2
     assert complained == (
-        f"birthsim-bench: error: --beside {str(tmp_path)!r} has no birthsim_env; allowed: a checkout of the project\n"
+        f"birthsim study speed: error: --beside {str(tmp_path)!r} has no birthsim_env; allowed: a checkout of the project\n"
     )
 
 

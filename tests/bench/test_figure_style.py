@@ -16,8 +16,8 @@ from agents.reports.learning_curves import draw_learning_curves
 from baselines.figures import runs as figures
 from baselines.figures.comparison import CONDITIONS, draw_comparison
 from baselines.figures.runs import COLOURS, look, save
-from baselines.figures.stability import stability_figure
 from baselines.figures.studies import draw_studies
+from studies.stability.figure import stability_figure
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 
-from agents.reports.score_tables import Scored, data, overview
 from baselines.bench.measures import DISCOUNTS
 from birthsim_env.scores import ROLES
+from studies.scores.tables import Scored, data, overview
 
 
 def row(paid, error):

@@ -11,9 +11,16 @@ import pytest
 from matplotlib import pyplot as plt
 from scipy.integrate import solve_ivp
 
-from baselines.bench import stability
 from baselines.bench.pieces import controller_settings
-from baselines.bench.stability import (
+from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.physics.compiled.lanes import STATES, Array
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+from studies.stability import maps as stability
+from studies.stability.figure import _border, _edges, _places, stability_figure
+from studies.stability.maps import (
     MAPS,
     MOST_FORCE,
     MOST_MOTION,
@@ -29,13 +36,6 @@ from baselines.bench.stability import (
     stability_tasks,
     stable_up_to,
 )
-from baselines.figures.stability import _border, _edges, _places, stability_figure
-from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import STATES, Array
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry
-from birthsim_env.physics.plant import Plant
-from birthsim_env.physics.rig.parameters import Parameters
 from tests.console import call, strict
 
 RIG = Parameters()

@@ -1,4 +1,4 @@
-"""``agents.commands.beside_law``: several seeds of a policy beside their law, in the same worlds."""
+"""``studies.residual.beside_law``: several seeds of a policy beside their law, in the same worlds."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from agents.commands import beside_law
 from agents.policy.seeds import SHIPPED
+from studies.residual import beside_law
 
 
 def told(monkeypatch, capsys, *arguments):

@@ -1,4 +1,4 @@
-"""``baselines.commands.honest``: a row per law and kind of sensors, a column per hand."""
+"""``studies.honest.command``: a row per law and kind of sensors, a column per hand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from baselines.bench.comparison import MOVING
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
-from baselines.commands import honest
+from studies.honest import command as honest
 
 
 def test_moving_hands_have_columns_of_their_own(monkeypatch, tmp_path):

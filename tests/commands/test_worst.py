@@ -1,4 +1,4 @@
-"""``baselines.commands.worst``: the worst drawn worlds, and what one of them owes to each of its figures."""
+"""``studies.honest.worst``: the worst drawn worlds, and what one of them owes to each of its figures."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from baselines.bench.evaluation import evaluate
-from baselines.commands import worst
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.honest import worst
 
 SEED = 300
 

@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.bench.haptics.release import measure_release
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import load_parameters
+from studies.haptics.release import measure_release
 
 RIG = load_parameters("examples/acceleration_sensor_rig.toml")
 

@@ -8,8 +8,6 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
-from baselines.bench.haptics.worlds import no_hand, resting
-from baselines.bench.rig_port import RigPort
 from birthsim_env import ForceProfile, Hold, Parameters, StiffnessSchedule
 from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
@@ -18,6 +16,8 @@ from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
+from studies.haptics.worlds import no_hand, resting
+from studies.stability.rig_port import RigPort
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from baselines.bench.haptics import backdriving, release
-from baselines.bench.haptics.backdriving import beyond_spring, guiding_hand
-from baselines.bench.haptics.impedance import (
+from baselines.impedance import mass_spring_damper
+from birthsim_env.physics.compiled.lanes import Array
+from studies.haptics import backdriving, release
+from studies.haptics.backdriving import beyond_spring, guiding_hand
+from studies.haptics.impedance import (
     bandwidth,
     last_before,
     noticeable_differences,
@@ -17,7 +19,7 @@ from baselines.bench.haptics.impedance import (
     port_damping,
     unnoticed_up_to,
 )
-from baselines.bench.haptics.multisine import (
+from studies.haptics.multisine import (
     FREQUENCIES,
     FUNDAMENTAL,
     SECONDS,
@@ -26,13 +28,11 @@ from baselines.bench.haptics.multisine import (
     measured_part,
     multisine_hand,
 )
-from baselines.bench.haptics.own_error import declared_offset, error_size, pure_spring_offset
-from baselines.bench.haptics.recording import Recording, record
-from baselines.bench.haptics.release import PULL, flight, pulling_hand
-from baselines.bench.haptics.worlds import resting
-from baselines.bench.stability import push_and_release
-from baselines.impedance import mass_spring_damper
-from birthsim_env.physics.compiled.lanes import Array
+from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
+from studies.haptics.recording import Recording, record
+from studies.haptics.release import PULL, flight, pulling_hand
+from studies.haptics.worlds import resting
+from studies.stability.maps import push_and_release
 from tests.oracles.ideal_ports import IdealPort, impedance, stiffest
 
 MASS, STIFFNESS = 3.0, 2000.0

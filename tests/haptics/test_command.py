@@ -1,4 +1,4 @@
-"""birthsim-haptics: files, tables and figures, what is refused, and pages that carry the tables."""
+"""birthsim study haptics: files, tables and figures, what is refused, and pages that carry the tables."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.bench import stability
-from baselines.bench.haptics import backdriving, coupled, rendering
-from baselines.bench.haptics.coupled import measure_hands, measure_z_width, stable_up_to
-from baselines.bench.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
-from baselines.figures import haptics as figures
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.haptics import backdriving, coupled, rendering
+from studies.haptics import figures as figures
+from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
+from studies.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
+from studies.stability import maps as stability
 from tests.console import call, strict
 
 SETTINGS: dict[str, Any] = {

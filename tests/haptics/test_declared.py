@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from baselines.backstepping.impedance import joint_impedance
-from baselines.bench.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
-from baselines.bench.haptics.recording import record
-from baselines.bench.haptics.worlds import Condition, resting, uses_force
-from baselines.bench.rig_port import RigPort
 from baselines.impedance import declared_by, mass_spring_damper, matrix_root
 from baselines.registry import LISTED, UNCONTROLLED, make_controller
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
+from studies.haptics.recording import record
+from studies.haptics.worlds import Condition, resting, uses_force
+from studies.stability.rig_port import RigPort
 
 RIG = Parameters()
 SLIDING = RIG.replace({f"cylinder{i}.coulomb_friction": 0.0 for i in (1, 2)})

@@ -56,7 +56,7 @@ TARGETS = {
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
         ),
         Target(
-            "stability", "birthsim-stability",
+            "stability", "birthsim study stability",
             ("--controller", "backstepping", "--map", "rig", "--points", "2", "--out", "{out}"),
             older=("--seed", "7", "--sensors", "lab"),
         ),
@@ -73,11 +73,11 @@ TARGETS = {
         Target("export", "birthsim export", ("--to", "onnx", "circle", "--out", "{out}"), file="policy.onnx"),
         Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
-            "sweep", "birthsim-sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
+            "sweep", "birthsim study sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
             costs=("cost", "sha256"),
         ),
         Target(
-            "search", "birthsim-sweep", ("{inputs}/search.toml", "--out", "{out}"), differ=("trials.journal",),
+            "search", "birthsim study sweep", ("{inputs}/search.toml", "--out", "{out}"), differ=("trials.journal",),
             costs=("cost", "sha256"), alone=True,
         ),
         Target(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.bench.haptics.worlds import resting
-from baselines.bench.rig_port import RigPort
 from baselines.limiter.air_spring import AirSpring
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Measurement
+from studies.haptics.worlds import resting
+from studies.stability.rig_port import RigPort
 
 RIG = Parameters()
 PLACE = (0.5, 0.0)

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from baselines.bench.haptics.worlds import resting
-from baselines.bench.stability import Cases, judge
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import bare_name, known_options, make_controller
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Measurement
+from studies.haptics.worlds import resting
+from studies.stability.maps import Cases, judge
 
 RIG = Parameters()
 T = RIG.electronics.control_period

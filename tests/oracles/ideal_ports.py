@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from baselines.bench.rig_port import Hand
 from birthsim_env.physics.compiled.lanes import Array
+from studies.stability.rig_port import Hand
 
 PERIOD, ANSWERS = 1e-3, 4
 STEP = PERIOD / ANSWERS

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.bench.accuracy import second_model
-from baselines.bench.accuracy.second_model import SecondModel
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.accuracy import second_model
+from studies.accuracy.second_model import SecondModel
 from tests.physics.test_second_model import DEMANDING_RIG, OTHER_RIG
 
 LAWS = ("lugre", "coulomb", "elasto_plastic")

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.bench.accuracy.second_model import SecondModel, rates
 from birthsim_env import Parameters, Plant, balanced_pressures, linearize
 from birthsim_env.physics import control_model, geometry, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linear.model import LinearModel
+from studies.accuracy.second_model import SecondModel, rates
 from tests.physics.test_second_model import ELASTO_PLASTIC, OTHER_RIG
 
 COULOMB = {"friction.law": "coulomb"}

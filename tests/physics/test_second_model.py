@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.bench.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
-from baselines.bench.accuracy.second_model import SecondModel
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.accuracy.motions import PERIOD, PERIODS, Motion, stick_slip, strong
+from studies.accuracy.second_model import SecondModel
 
 OTHER_RIG = {
     **{"geometry.gamma3": 1.3, "geometry.d3": 0.4, "geometry.d6": 0.22, "geometry.k1": 0.44, "geometry.k2": 0.55},

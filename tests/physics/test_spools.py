@@ -6,13 +6,13 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.bench.accuracy.motions import PERIOD, PERIODS, strong
-from baselines.bench.accuracy.second_model import SecondModel
 from birthsim_env.physics import spools
 from birthsim_env.physics.compiled.lanes import DEADBAND, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.accuracy.motions import PERIOD, PERIODS, strong
+from studies.accuracy.second_model import SecondModel
 
 CIRCLE = "BirthSIM/Circle-v1"
 WORN = {"valves.deadband": 0.05, "valves.hysteresis": 0.04, "valves.opening_limit": 0.7}

@@ -12,11 +12,11 @@ from pathlib import Path
 import gymnasium
 import pytest
 
-from agents.reports import score_tables
 from baselines.bench import comparison_tables, evaluation_data
 from baselines.bench.metrics import UNITS
 from birthsim.door import COMMANDS
 from birthsim_env import Parameters
+from studies.scores import tables as score_tables
 from tests.live import axe, browser
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -7,8 +7,8 @@ import tracemalloc
 
 import pytest
 
-from agents.sweep.plan import HeatMap, Range, load_sweep
 from agents.training.configuration import TrainingSettings, override
+from studies.sweeps.plan import HeatMap, Range, load_sweep
 
 WHOLE = """
 [base]

@@ -1,4 +1,4 @@
-"""birthsim-sweep: grids, draws, searches and trainings, kept pieces, and the same bytes however many processes work."""
+"""birthsim study sweep: grids, draws, searches and trainings, kept pieces, and the same bytes however many processes work."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
-from agents.sweep.plan import load_sweep
-from agents.sweep.work import tasks_of
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import Parameters
+from studies.sweeps.plan import load_sweep
+from studies.sweeps.work import tasks_of
 from tests.console import call
 
 GRID = """

@@ -13,7 +13,6 @@ import pytest
 from scipy import stats
 
 from agents.commands import evaluate as command
-from agents.commands.scores import _contestants
 from agents.policy.controller import observation_size
 from agents.policy.files import load_policy, save_policy
 from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
@@ -25,6 +24,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.scores.command import _contestants
 
 
 def evaluation(name, error, lost=(), beyond=()):

@@ -3,7 +3,7 @@
 python -m tests.verification balances                # a quarter of a minute
 python -m tests.verification mutation REPORT.json    # what tests.mutation --out wrote
 python -m tests.verification coverage                # minutes
-python -m tests.verification accuracy FOLDER         # what birthsim-verify --out wrote
+python -m tests.verification accuracy FOLDER         # what birthsim study accuracy --out wrote
 python -m tests.verification report                  # docs/verification.md from what is stored
 """
 
@@ -17,10 +17,10 @@ from pathlib import Path
 from tests.verification import balances, mutants, reached, report, sources
 
 ACCURACY = (
-    *("baselines/bench/accuracy/errors.py", "baselines/bench/accuracy/motions.py", "baselines/bench/accuracy/second_model.py"),
+    *("studies/accuracy/errors.py", "studies/accuracy/motions.py", "studies/accuracy/second_model.py"),
     *("birthsim_env/parts/drawn/randomization.py", *(path for path in balances.SOURCES if path.startswith("birthsim_env"))),
 )
-"""Files that decide the figures of ``birthsim-verify``."""
+"""Files that decide the figures of ``birthsim study accuracy``."""
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
     chosen.add_parser("coverage", help="measure the coverage, uncompiled")
     chosen.add_parser("report", help="write docs/verification.md")
     chosen.add_parser("mutation", help="take a report of tests.mutation").add_argument("file", type=Path)
-    chosen.add_parser("accuracy", help="take what birthsim-verify wrote").add_argument("folder", type=Path)
+    chosen.add_parser("accuracy", help="take what birthsim study accuracy wrote").add_argument("folder", type=Path)
     options = parser.parse_args()
     if options.what == "balances":
         keep("balances", balances.measure(), balances.SOURCES)

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from baselines.bench.accuracy import tables as accuracy_tables
+from studies.accuracy import tables as accuracy_tables
 from tests.verification import mutants, sources
 
 PAGE = sources.ROOT / "docs" / "verification.md"
@@ -27,8 +27,8 @@ Numbers in brackets are the paper's. Each equation is computed in one place and 
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim-verify` compares it with a second model of the rig. That
-model has other coordinates and other states, and SciPy's DOP853 integrates it with a tolerance of 1e-11.
+The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim study accuracy` compares it with a second model of the
+rig. That model has other coordinates and other states, and SciPy's DOP853 integrates it with a tolerance of 1e-11.
 
 - The rigs are the nominal one, two extreme corners of the ranges of randomisation, random corners, and random draws.
 - Two motions of 0.5 s are measured. In the first, short puffs of air make both pistons stick and slip. In the second, valves

@@ -56,7 +56,7 @@ def test_the_files_are_those_of_joblibs_processes(cluster, tmp_path):
 
 def test_a_sweep_has_the_same_bytes(cluster, tmp_path):
     (tmp_path / "sweep.toml").write_text(SWEEP)
-    command = [str(Path(sys.executable).with_name("birthsim-sweep")), str(tmp_path / "sweep.toml"), "--out"]
+    command = [sys.executable, "-m", "studies", "sweep", str(tmp_path / "sweep.toml"), "--out"]
     for name, workers in (("joblib", ("--jobs", "2")), ("ray", ("--cluster", cluster))):
         subprocess.run([*command, str(tmp_path / name), *workers], check=True, capture_output=True)
     for name in ("episodes.parquet", "sweep.json", "sweep.md"):

@@ -40,7 +40,7 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
 _ROOT = Path(__file__).resolve().parents[3]
-_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live")
+_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
 _DIGEST = hashlib.sha256().digest_size
 
 

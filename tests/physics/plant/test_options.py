@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.bench.accuracy import second_model
-from baselines.bench.accuracy.motions import PERIOD, strong
-from baselines.bench.accuracy.second_model import SCALES, SecondModel
 from birthsim_env.parts.drawn.randomization import checked_ranges, documented_ranges
 from birthsim_env.physics import options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters, field_of
+from studies.accuracy import second_model
+from studies.accuracy.motions import PERIOD, strong
+from studies.accuracy.second_model import SCALES, SecondModel
 
 CIRCLE = "BirthSIM/Circle-v1"
 LINE = {"air.supply_conductance": 4e-9, "air.supply_volume": 1e-4}

@@ -1,0 +1,1 @@
+"""Studies: what the project measures of itself and of its controllers; not in the wheel."""

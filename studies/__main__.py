@@ -1,0 +1,59 @@
+"""``birthsim study NAME``: what the project measures of itself and of its controllers; it comes with a clone."""
+
+from __future__ import annotations
+
+import sys
+from typing import NamedTuple
+
+from baselines.commands.start import perform
+from birthsim_env.physics.rig.values import near, shown
+
+
+class Study(NamedTuple):
+    """Where a study's command is, and what it measures."""
+
+    module: str
+    measures: str
+
+
+STUDIES = {
+    "accuracy": Study("accuracy.command", "the error of the plant's integrator, against a second model"),
+    "beside-law": Study("residual.beside_law", "policies of several seeds beside the controller that they correct"),
+    "haptics": Study("haptics.command", "what a hand feels"),
+    "honest": Study("honest.command", "what honest sensors cost"),
+    "pools": Study("pools", "what other processes and hosts cost"),
+    "recovery": Study("recovery.command", "how well identification finds rigs that are known"),
+    "scores": Study("scores.command", "what every environment pays to whom"),
+    "speed": Study("speed.command", "speeds, beside what they are to be compared with"),
+    "stability": Study("stability.command", "maps of where a controller is stable"),
+    "stiffest": Study("stability.stiffest", "the stiffest setpoints at which the paper's controller rests"),
+    "sweep": Study("sweeps.command", "grids, random draws and searches, from a TOML file"),
+    "targets": Study("targets.command", "built code of every target, against Python"),
+    "worst": Study("honest.worst", "the worst worlds, and what each owes to its figures"),
+}
+
+
+def overview() -> str:
+    """The help: one line a study."""
+    width = max(map(len, STUDIES))
+    lines = [f"  {name:{width}}  {study.measures}" for name, study in STUDIES.items()]
+    return "\n".join(["usage: birthsim study NAME ...", "", *lines, "", "example: birthsim study speed --out out/speed"])
+
+
+def main(arguments: list[str]) -> None:
+    """Run the study that the first argument names; the others are its own."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(overview())
+        raise SystemExit(0 if arguments else 2)
+    name, *rest = arguments
+    if name not in STUDIES:
+        print(
+            f"birthsim study: error: NAME = {shown(name)}{near(name, STUDIES)}; allowed: {', '.join(STUDIES)}", file=sys.stderr
+        )
+        raise SystemExit(2)
+    sys.argv = ["", *rest]
+    perform(f"birthsim study {name}", "studies", STUDIES[name].module)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

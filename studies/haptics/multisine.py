@@ -1,0 +1,76 @@
+"""Multisine hand forces, and the impedance that they meet.
+
+A multisine is a sum of sines at whole multiples of one frequency. Over whole periods of a steady response the discrete Fourier
+transform gives force and motion at each line without leakage. Only odd multiples are used: squares of the motion, as of the
+geometry, then fall between the lines (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 2 and 4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.impedance import Complex
+from birthsim_env.physics.compiled.lanes import Array
+from studies.haptics.recording import Recording
+from studies.stability.rig_port import Hand
+
+FUNDAMENTAL = 0.2
+"""Hz: 5 s a period."""
+
+MULTIPLES = (1, 3, 5, 7, 11, 15, 21, 29, 39, 51, 67, 87, 113, 149)
+"""Odd, about 1.3 times the one before from 1 Hz on: 0.2 to 29.8 Hz."""
+
+FREQUENCIES: Array = FUNDAMENTAL * np.array(MULTIPLES, dtype=np.float64)
+"""Hz, (F,)."""
+
+SETTLING, MEASURED = 1, 2
+"""Periods that die away, and that are measured; assumed."""
+
+FADE = 0.5
+"""s over which the force comes in; assumed, so that no valve saturates from the start."""
+
+DRAWS = 300
+"""Sets of random phases of which the one with the lowest peak is taken."""
+
+SECONDS = (SETTLING + MEASURED) / FUNDAMENTAL
+
+
+def phases(seed: int) -> Array:
+    """Phases (F,), rad, of equal sines with a low peak: the best of ``DRAWS`` random sets."""
+    drawn = np.random.default_rng(seed).uniform(0, 2 * np.pi, (DRAWS, len(MULTIPLES)))
+    time = np.arange(0, 1 / FUNDAMENTAL, 4e-3)
+    peaks = [np.abs(_sum(time, one)).max() for one in drawn]
+    return np.asarray(drawn[int(np.argmin(peaks))])
+
+
+def multisine_hand(direction: Array, peak: Array, seed: int) -> Hand:
+    """A hand that pushes and pulls along unit vectors ``direction`` (2, N) with at most ``peak`` (N,), N."""
+    chosen = phases(seed)
+    largest = np.abs(_sum(np.arange(0, 1 / FUNDAMENTAL, 1e-3), chosen)).max()
+    force = direction * peak / largest
+
+    def hand(now: float, position: Array, velocity: Array) -> Array:
+        return np.asarray(force * min(now / FADE, 1.0) * _sum(np.array([now]), chosen)[0])
+
+    return hand
+
+
+def measured_part(recording: Recording) -> Recording:
+    """The whole periods that are measured."""
+    return recording.part(SETTLING / FUNDAMENTAL, SECONDS)
+
+
+def impedance_felt(recording: Recording, direction: Array) -> Complex:
+    """Z(jw) = Fu/(x - xt) along ``direction`` (2, N), N/m, (F, N), from the measured part of a recording.
+
+    The target rests, so that it changes no line.
+    """
+    part = measured_part(recording)
+    turns = np.exp(-2j * np.pi * FREQUENCIES[:, None] * part.time)
+    motion, force = (np.einsum("tin,in->tn", rows, direction) for rows in (part.position - part.position[0], part.force))
+    return np.asarray((turns @ force) / (turns @ motion))
+
+
+def _sum(time: Array, angles: Array) -> Array:
+    """Sum of unit sines at times (T,), (T,)."""
+    return np.asarray(np.sin(2 * np.pi * FREQUENCIES * time[:, None] + angles).sum(axis=1))

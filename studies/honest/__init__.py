@@ -1,0 +1,1 @@
+"""What sensors that err as data sheets say cost."""

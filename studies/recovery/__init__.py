@@ -1,0 +1,1 @@
+"""How well identification finds rigs that are known."""

@@ -1,0 +1,276 @@
+"""birthsim study speed: how fast things are here, each figure beside what it is to be compared with, in one run."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import tempfile
+import time
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numba
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import birthsim_env
+from baselines.bench.comparison import default_controllers
+from baselines.commands.shared import finite_number, run
+from baselines.registry import make_controller
+from baselines.staged import driving
+from baselines.work.files import make_folder, write_json
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.compiled.lanes import Array
+from studies.speed import speeds as speed
+from studies.speed.stopwatch import seconds_per_call
+from studies.speed.twin import Twin, has_compiler
+
+POLICY_PERIOD = 0.01
+PERIODS = 50
+"""Control periods from which a controller's signals are taken: twelve samples of the laboratory's tracker."""
+STEPS_PER_PERIOD = round(POLICY_PERIOD / dynamics.INTEGRATION_STEP)
+
+Row = tuple[str, float, str]
+"""A row of the table: what, how much (NaN where it cannot be had), and its unit or why it cannot be had."""
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim study speed", description="Measure the speed of plant, environments and law."
+    )
+    parser.add_argument("--seconds", type=finite_number, default=1.0, help="time per measurement (default: %(default)s)")
+    parser.add_argument("--out", type=Path, help="folder for bench.json")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--beside", type=Path, metavar="TREE", help="a checkout of another commit to measure in turns with this one"
+    )
+    instead.add_argument(
+        "--compile", action="store_true", help="measure instead how long first steps take, compiled and cached"
+    )
+    run(parser, _bench)
+
+
+def packed_fraction() -> tuple[int, int]:
+    """Divisions and square roots of doubles in the integrator's machine code: (packed, scalar) instructions; x86 only."""
+    # Machine code from the cache cannot be inspected, so the integrator is compiled once more.
+    advance: Any = dynamics.advance
+    compiled = numba.njit(error_model="numpy", nogil=True)(advance.py_func)
+    compiled.compile(advance.signatures[0])
+    code = "\n".join(compiled.inspect_asm().values())
+    return len(re.findall(r"\bv?(?:div|sqrt)pd\b", code)), len(re.findall(r"\bv?(?:div|sqrt)sd\b", code))
+
+
+def _kernel(lanes: int, budget: float) -> float:
+    plant = birthsim_env.Plant(num_envs=lanes)
+    command = np.random.default_rng(0).uniform(-0.05, 0.05, (4, lanes))
+    forces, start = np.zeros((10, 2, lanes)), plant.state.copy()
+
+    def policy_step() -> None:
+        plant.state[:] = start
+        plant.advance_unchecked(command, forces, POLICY_PERIOD)
+
+    return lanes / seconds_per_call(policy_step, budget)
+
+
+def _against_c(lanes: int, budget: float) -> tuple[float, float]:
+    """Policy steps/s of the kernel and of its twin in C, by CPU time and in turns; NaN for the twin without a compiler."""
+    plant = birthsim_env.Plant(num_envs=lanes)
+    command = np.random.default_rng(0).uniform(-0.05, 0.05, (4, lanes))
+    forces, start = np.zeros((1, 2, lanes)), plant.state.copy()
+    advances: list[Any] = [dynamics.advance]
+    if has_compiler():
+        with tempfile.TemporaryDirectory() as folder:
+            advances.append(Twin(Path(folder)).advance)
+    spent: list[list[float]] = [[] for _ in advances]
+    until = time.process_time() + budget
+    while time.process_time() < until or len(spent[0]) < 4:
+        for advance, times in zip(advances, spent, strict=True):
+            plant.state[:] = start
+            started = time.process_time()
+            advance(
+                plant.state, command, forces, plant.lane_parameters, STEPS_PER_PERIOD, dynamics.INTEGRATION_STEP, plant.impacts
+            )
+            times.append(time.process_time() - started)
+    speeds = [lanes / float(np.median(times[1:])) for times in spent]
+    return speeds[0], speeds[1] if has_compiler() else float("nan")
+
+
+def _single(budget: float) -> float:
+    env = gymnasium.make("BirthSIM/Circle-v1")
+    env.reset(seed=0)
+    actions = cycle(_random_openings().astype(np.float32))
+
+    def step() -> None:
+        _, _, terminated, truncated, _ = env.step(next(actions))
+        if terminated or truncated:
+            env.reset()
+
+    return 1 / seconds_per_call(step, budget)
+
+
+def _random_openings() -> Array:
+    """Openings (100, 4) that keep the air moving and the pistons away from the end stops for a second."""
+    return np.random.default_rng(0).uniform(-0.3, 0.3, (100, 4))
+
+
+def _scipy(budget: float) -> float:
+    plant, force = birthsim_env.Plant(), np.zeros((2, 1))
+    openings, start = cycle(_random_openings()), plant.state.copy()
+    scale = np.repeat([1e-9, 1e-6, 1e-2, 1e-3], [4, 2, 8, 4])
+    scale[6:14] = np.tile([1e-1, 1e-4], 4)
+
+    def policy_step() -> None:
+        command = next(openings)[:, None]
+
+        def rates(_: float, state: Array) -> Array:
+            return plant.derivatives(state[:, None], command, force)[:, 0]
+
+        solution = solve_ivp(rates, (0.0, POLICY_PERIOD), plant.state[:, 0], rtol=1e-6, atol=scale)
+        plant.state[:, 0] = solution.y[:, -1]
+        if np.abs(plant.piston).max() > 0.08:
+            plant.state[:] = start
+
+    return 1 / seconds_per_call(policy_step, budget)
+
+
+def _vector(environment: str, lanes: int, budget: float) -> float:
+    env = gymnasium.make_vec(environment, num_envs=lanes, num_threads=1)
+    env.reset(seed=0)
+    actions = np.zeros(env.action_space.shape or (), dtype=np.float32)
+    return lanes / seconds_per_call(lambda: env.step(actions), budget)
+
+
+def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
+    """us per lane and call of a controller on what it met in the first ``PERIODS`` control periods of its own run."""
+    rig = birthsim_env.Parameters()
+    law = make_controller(name, rig)
+    env: Any = gymnasium.make_vec(
+        "BirthSIM/Circle-v1", num_envs=lanes, policy_period=rig.electronics.control_period, sensors=sensors,
+        actuation=driving(make_controller(name, rig), name),
+    )  # fmt: skip
+    env.reset(seed=0)
+    met = []
+    for _ in range(PERIODS):
+        met.append((env.measurement, env.reference))
+        env.step(np.zeros((lanes, 0)))
+    signals = cycle(met)
+    return seconds_per_call(lambda: law.command(*next(signals)), budget) / lanes * 1e6
+
+
+def _frames(environment: str, budget: float) -> float:
+    """Frames per second, each of them after another step."""
+    # CartPole looks for a screen and a loudspeaker, and says so where there are none.
+    os.environ.update(SDL_VIDEODRIVER="dummy", SDL_AUDIODRIVER="dummy", PYGAME_HIDE_SUPPORT_PROMPT="1")
+    env = gymnasium.make(environment, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    env.render()
+    spent: list[float] = []
+    while sum(spent) < budget:
+        _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+        if terminated or truncated:
+            env.reset()
+        started = time.perf_counter()
+        env.render()
+        spent.append(time.perf_counter() - started)
+    env.close()
+    return 1 / float(np.median(spent))
+
+
+def _bench(arguments: argparse.Namespace) -> None:
+    budget = arguments.seconds
+    if not budget > 0:
+        raise ValueError(f"--seconds {budget!r}; allowed: a positive number")
+    if arguments.beside:
+        speed.Process(arguments.beside).close()  # says at once what is wrong with it
+    machine = f"{platform.machine()}, Python {platform.python_version()}"
+    if arguments.compile:
+        print(f"{machine}; CPU time of new processes to the end of their first steps, one after another\n")
+        results = [_shown((name, seconds, "s")) for name, seconds in speed.first_steps()]
+    else:
+        rows = _rows(budget)
+        print(f"{machine}, one thread; medians over {budget:g} s each\n")
+        results = [_shown(row) for row in rows]
+        print(f"\nenvironments, CPU time, {speed.ROUNDS} processes\n")
+        results += _environments(arguments.beside, budget)
+    if arguments.out is not None:
+        write_json(make_folder(arguments.out) / "bench.json", results)
+
+
+def _shown(row: Row, **more: float) -> dict[str, Any]:
+    """Prints a row, the values ``more`` behind its own, and returns it as JSON takes it."""
+    name, value, unit = row
+    numbers = "".join(f"{n:>14,.0f}" if n >= 1000 else f"{n:>14,.4g}" for n in (value, *more.values()))
+    print(f"{name:56}{numbers}  {unit}", flush=True)
+    return {"what": name.strip(), "value": value, "unit": unit, **more}
+
+
+def _environments(beside: Path | None, budget: float) -> list[dict[str, Any]]:
+    """Rows of the environments, each with that of another checkout and how many times as fast this one is, if one is given."""
+    trees = (speed.HERE, *((beside,) if beside else ()))
+    seconds = speed.measured((*speed.SHARED, *speed.LANES, *speed.THREADS), trees, budget)
+    if beside:
+        versions = "".join(f"{speed.version_of(tree):>14}" for tree in trees)
+        print(f"{'':56}{versions}{'times as fast':>14}")
+    results = []
+    for job in speed.SHARED:
+        ours = seconds[speed.HERE, job.name]
+        value, unit = job.in_unit(ours)
+        more = {}
+        if beside:
+            theirs = seconds[beside, job.name]
+            more = {"beside": job.in_unit(theirs)[0], "times_as_fast": theirs / ours}
+        results.append(_shown((job.name, value, unit), **more))
+    alone = [(job.name, *job.in_unit(seconds[speed.HERE, job.name])) for job in (*speed.LANES, *speed.THREADS)]
+    one, two = (seconds[speed.HERE, job.name] for job in speed.THREADS)
+    return [*results, *map(_shown, [*alone, ("  ratio: two threads to one", one / two, "times")])]
+
+
+def _rows(budget: float) -> list[Row]:
+    """Rows of plant, environments, laws and frames, measured in this process."""
+    kernel, lane = _kernel(1024, budget), _kernel(1, budget)
+    packed, scalar = packed_fraction()
+    numba_speed, c_speed = _against_c(256, budget)
+    single, reference = _single(budget), _scipy(budget)
+    ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
+    return [
+        ("plant, 1024 lanes, one core", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
+        ("  per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
+        ("plant, 1 lane", lane, "policy steps/s"),
+        ("  ratio: a lane among 1024 to a lane alone", kernel / lane, "times"),
+        (
+            "  packed divisions and roots in the machine code",
+            packed,
+            f"instructions, beside {scalar} scalar ones for remainders",
+        ),
+        ("plant, 256 lanes, CPU time", numba_speed, "policy steps/s"),
+        (
+            "  the same equations in C by hand, gcc -O3 -ffast-math",
+            c_speed,
+            "policy steps/s" if has_compiler() else "no C compiler",
+        ),
+        ("  ratio: kernel to C", numba_speed / c_speed, "times"),
+        ("gym.make step, valve mode", single, "policy steps/s"),
+        ("  the same plant through solve_ivp (RK45, rtol 1e-6)", reference, "policy steps/s"),
+        ("  ratio", single / reference, "times"),
+        ("gym.make_vec step, 128 lanes", _vector("BirthSIM/Circle-v1", 128, budget), "policy steps/s"),
+        ("gym.make_vec step, 1024 lanes", _vector("BirthSIM/Circle-v1", 1024, budget), "policy steps/s"),
+        ("backstepping, 1 lane", _control("backstepping", "ideal", 1, budget), "us per call"),
+        *(
+            (f"{name}, {sensors} sensors, batch of 256", _control(name, sensors, 256, budget), "us per lane and call")
+            for name in default_controllers()
+            for sensors in ("ideal", "lab")
+        ),
+        ("rgb_array frame, 640 x 480", ours, "frames/s"),
+        ("  Gymnasium's CartPole-v1, 600 x 400", theirs, "frames/s"),
+        ("  ratio", ours / theirs, "times"),
+    ]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Where controllers are stable, over rigs and hands."""

@@ -1,0 +1,1 @@
+"""Built code of every target, against Python."""
