@@ -40,7 +40,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "identify": Command("baselines", "commands.identify", "a laboratory's own rig, from its log",
             "identify log.csv --out rig.toml"),
         "study": Command("birthsim", "study", "studies of the project, in a clone",
-            "study status"),
+            "study speed"),
     },
     "learn": {
         "train": Command("agents", "commands.train", "residual policies by PPO, SAC or TQC",

@@ -37,7 +37,7 @@ def overview() -> str:
     """The help: one line a study."""
     width = max(map(len, STUDIES))
     lines = [f"  {name:{width}}  {study.measures}" for name, study in STUDIES.items()]
-    return "\n".join(["usage: birthsim study NAME ...", "", *lines, "", "example: birthsim study speed --out out/speed"])
+    return "\n".join(["usage: birthsim study NAME ...", "", *lines])
 
 
 def main(arguments: list[str]) -> None:

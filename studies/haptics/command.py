@@ -34,7 +34,7 @@ def main() -> None:
         help="names, or path/to/file.py:Class (default: " + " ".join(LAWS) + ")",
     )  # fmt: skip
     parser.add_argument("--sensors", action="append", choices=tuple(SENSORS), help="may be repeated (default: ideal and lab)")
-    parser.add_argument("--subject", action="append", choices=SUBJECTS, help="may be repeated (default: all)")
+    parser.add_argument("--subject", action="append", choices=SUBJECTS, metavar="NAME", help="may be repeated (default: all)")
     parser.add_argument("--rigs", type=whole_up_to(1000), default=RIGS, help="rigs drawn at random (default: %(default)s)")
     parser.add_argument("--nominal", action="store_true", help="the rig as the laws believe it, instead of rigs drawn")
     parser.add_argument("--no-force-sensor", action="store_true", help="show the laws a hand's force of zero")

@@ -41,7 +41,9 @@ def main() -> None:
     parser.add_argument("--controller", nargs="+", required=True, metavar="NAME", help="laws of the registry")
     parser.add_argument("--sensors", action="append", choices=tuple(SENSORS), help="may be repeated (default: honest)")
     parser.add_argument("--drawn", action="store_true", help="draw the figures of honest sensors too")
-    parser.add_argument("--metric", choices=tuple(UNITS), default="stiffness_error", help="default: %(default)s")
+    parser.add_argument(
+        "--metric", choices=tuple(UNITS), default="stiffness_error", metavar="NAME", help="default: %(default)s"
+    )
     parser.add_argument("--limit", type=finite_number, default=15.0, help="worlds above it are counted (default: %(default)s)")
     parser.add_argument("--rest", type=finite_number, default=PROBE_REST, help="s before the push (default: %(default)s)")
     parser.add_argument(

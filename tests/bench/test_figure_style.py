@@ -103,10 +103,10 @@ def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_pa
 @pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
 def test_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
     drawn = []
-    for module in ("comparison", "studies", "stability"):
-        monkeypatch.setattr(f"baselines.figures.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
-    for module in ("learning_curves", "correction_figure"):
-        monkeypatch.setattr(f"agents.reports.{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
+    drawing = ("baselines.figures.comparison", "baselines.figures.studies", "studies.stability.figure",
+               "agents.reports.learning_curves", "agents.reports.correction_figure")  # fmt: skip
+    for module in drawing:
+        monkeypatch.setattr(f"{module}.save", lambda figure, folder, name: drawn.append(figure) or [])
     draw(tmp_path)
     assert len(drawn) == len(names)
     for figure in drawn:

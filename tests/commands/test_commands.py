@@ -228,9 +228,7 @@ def test_bad_input_ends_with_status_2_and_one_line_that_says_what_is_allowed(
     assert status == 2
     assert printed == ""
     lines = complained.strip().splitlines()
-    assert lines[-1].startswith(
-        f"birthsim {command}: error: " if words(command)[0] == "birthsim" else f"birthsim-{command}: error: "
-    )
+    assert lines[-1].startswith(f"{' '.join(words(command))}: error: ")
     assert message in lines[-1]
     # Before the line there is nothing but the usage that argparse shows.
     assert len(lines) == 1 or lines[0].startswith("usage: ")
