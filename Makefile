@@ -199,7 +199,7 @@ pictures: $(READY)
 	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
 	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
 	  --out docs/vacuum.webp
-	$(BIN)/birthsim evaluate --all --studies-only --out $(OUT)/studies
+	$(BIN)/birthsim study comparison --studies-only --out $(OUT)/studies
 	cp $(OUT)/studies/*.png docs/
 	$(BIN)/birthsim study sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
 	cp $(OUT)/robustness/map_0.png docs/robustness.png
@@ -207,9 +207,9 @@ pictures: $(READY)
 	cp $(OUT)/frequency/frequency_responses.png docs/
 
 compare: $(READY)
-	$(BIN)/birthsim evaluate --all --episodes 100 --out $(OUT)/comparison
-	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim evaluate --all --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
+	$(BIN)/birthsim study comparison --episodes 100 --out $(OUT)/comparison
+	$(BIN)/birthsim study comparison --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
+	$(BIN)/birthsim study comparison --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
 	$(BIN)/birthsim study stability --sensors lab --out $(OUT)/stability
 	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
 	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
@@ -253,7 +253,7 @@ scratch: $(READY)
 	cp $(OUT)/scratch/scratch.png docs/
 
 moving: $(READY)
-	$(BIN)/birthsim evaluate --all --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
+	$(BIN)/birthsim study comparison --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
 	$(call renew,moving,$(call tables,moving/comparison,moving))
 
 haptics: $(READY)

@@ -19,6 +19,7 @@ class Study(NamedTuple):
 STUDIES = {
     "accuracy": Study("accuracy.command", "the error of the plant's integrator, against a second model"),
     "beside-law": Study("residual.beside_law", "policies of several seeds beside the controller that they correct"),
+    "comparison": Study("comparison.command", "every controller under all conditions, and how the stiffness feels"),
     "haptics": Study("haptics.command", "what a hand feels"),
     "honest": Study("honest.command", "what honest sensors cost"),
     "pools": Study("pools", "what other processes and hosts cost"),

@@ -12,7 +12,6 @@ from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
 from baselines.bench.evaluation_data import data
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
-from baselines.commands.evaluate_all import evaluate_all
 from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
 from baselines.commands.shared import (
     EPISODES,
@@ -39,16 +38,12 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim evaluate",
-        description="Evaluate controllers: the same seeds, so the same worlds, for each of them. With --all on every "
-        "environment, with every sensor model, on the rig as given and on rigs drawn at random, and how the stiffness feels.",
+        description="Evaluate controllers: the same seeds, so the same worlds, for each of them.",
         epilog="Without --policy every named controller runs; with it the trained residual runs beside those named, or else "
         "beside the paper's law and the one that it sits on. What the output folder holds of the same settings, rig and "
         "code is kept, so that an interrupted run goes on.",
     )
-    parser.add_argument(
-        "--all", action="store_true", help="compare under all conditions; --env, --sensors, --randomize narrow them"
-    )
-    parser.add_argument("--env", help="environment id (default: BirthSIM/Circle-v1, with --all every one)")
+    parser.add_argument("--env", default="BirthSIM/Circle-v1", help="environment id (default: %(default)s)")
     parser.add_argument(
         "--controller",
         "--controllers",
@@ -56,53 +51,38 @@ def main() -> None:
         metavar="NAME",
         help=f"one or more of {', '.join(controller_names())}, with options as in 'admittance[learn=false]', or "
         "path/to/file.py:Class (default: backstepping, with --policy "
-        "residual, with --all every one of the registry that is not slow)",
+        "residual)",
     )
     parser.add_argument(
         "--policy",
         help="for the controller 'residual': a folder that birthsim train wrote, of one training seed or of several, or the "
-        "name of what comes with the package, such as circle (default: that of the scenario); not with --all",
+        "name of what comes with the package, such as circle (default: that of the scenario)",
     )
-    parser.add_argument(
-        "--episodes", type=whole_up_to(EPISODES), default=32, help="per controller, with --all per cell (default: %(default)s)"
-    )
+    parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=32, help="per controller (default: %(default)s)")
     parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
-    parser.add_argument("--sensors", choices=tuple(SENSORS), help="default: ideal, with --all ideal and lab")
+    parser.add_argument("--sensors", choices=tuple(SENSORS), default="ideal", help="default: %(default)s")
     parser.add_argument(
         "--randomize",
         choices=tuple(RANDOMIZE),
+        default="all",
         help="what differs between episodes: the plant, the scenario, both (default) or nothing; sensors: the scenario and the "
-        "figures of honest sensors; with --all the default is the scenario, then both, then sensors where they are honest",
+        "figures of honest sensors",
     )
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
     add_parts(parser)
     add_set(parser)
     add_processes(parser)
-    studies = parser.add_mutually_exclusive_group()
-    studies.add_argument("--no-studies", action="store_true", help="with --all: leave out the studies of the stiffness felt")
-    studies.add_argument("--studies-only", action="store_true", help="with --all: nothing but these studies, some minutes")
     parser.add_argument(
         "--out",
         type=Path,
         required=True,
-        help="folder for evaluation.json, .md and .csv, with --all comparison.*, and figures",
+        help="folder for evaluation.json, .md and .csv, and figures",
     )
     run(parser, _evaluate)
 
 
 def _evaluate(arguments: argparse.Namespace) -> None:
-    if arguments.all:
-        if arguments.policy is not None:
-            raise ValueError("--policy with --all; allowed: without it, --all compares controllers that need no policy")
-        if environment_parts(arguments):
-            raise ValueError("--reference or --user-force with --all; allowed: without it, --all has its own moving hands")
-        evaluate_all(arguments)
-        return
-    if arguments.no_studies or arguments.studies_only:
-        raise ValueError("--no-studies and --studies-only; allowed: with --all")
-    arguments.env = arguments.env or "BirthSIM/Circle-v1"
     arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
-    arguments.sensors, arguments.randomize = arguments.sensors or "ideal", arguments.randomize or "all"
     rig = load_parameters(arguments.parameters)
     if not (arguments.env.startswith("BirthSIM/") and arguments.env in gymnasium.registry):  # one with a law inside may be
         check_environment(arguments.env)

@@ -26,8 +26,8 @@ _ROOT = Path(__file__).resolve().parent.parent.parent
 _PACKAGES = ("birthsim_env", "baselines", "agents", "studies")
 _SHOWN_ONLY = (
     *("birthsim_env/drawing", "birthsim_env/drawing/rendering.py", "baselines/commands", "baselines/figures/runs.py"),
-    *("baselines/bench/statistics.py", "baselines/bench/comparison_tables.py", "baselines/figures/comparison.py"),
-    *("baselines/figures/studies.py", "birthsim_env/scores.json"),
+    *("baselines/bench/statistics.py", "studies/comparison/tables.py", "studies/comparison/figure.py"),
+    *("studies/comparison/stiffness_figures.py", "birthsim_env/scores.json"),
     *("studies/haptics/figures.py", "baselines/figures/identification.py", "studies/haptics/tables.py"),
     *("agents/commands", "agents/reports", "agents/policies", "agents/training"),
     *("studies/sweeps/maps.py", "studies/sweeps/report.py", "studies/sweeps/search.py", "studies/sweeps/plan.py"),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.bench.comparison import MOVING
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import number, penalize_lost, quantile
 from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
@@ -20,6 +19,7 @@ from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.comparison.grid import MOVING
 from studies.honest.sensor_floor import probe_floor
 
 CONDITIONS = ("ideal", "lab", "honest", "honest, drawn")

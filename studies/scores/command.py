@@ -11,7 +11,6 @@ import numpy as np
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
-from baselines.bench.comparison import ENVIRONMENTS, default_controllers
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
@@ -21,6 +20,7 @@ from baselines.work.files import make_folder, whole_results, write_json, write_t
 from baselines.work.tasks import Result, Task, code_stamp, run_tasks
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import RIGS, ROLES, SENSORS
+from studies.comparison.grid import ENVIRONMENTS, default_controllers
 from studies.scores.tables import Scored, data, overview
 
 Rows = dict[str, dict[str, Any]]

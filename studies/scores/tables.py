@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.bench.comparison_tables import markdown
 from baselines.bench.measures import DISCOUNTS
 from baselines.bench.statistics import number
 from birthsim_env.scores import BEST, ROLES, SHUT
+from studies.comparison.tables import markdown
 
 DATA = (
     *("scenario", "sensors", "rig", "controller", "score", "error, mm", "success, %", "lost, %"),

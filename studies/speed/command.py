@@ -18,13 +18,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
-from baselines.bench.comparison import default_controllers
 from baselines.commands.shared import finite_number, run
 from baselines.registry import make_controller
 from baselines.staged import driving
 from baselines.work.files import make_folder, write_json
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
+from studies.comparison.grid import default_controllers
 from studies.speed import speeds as speed
 from studies.speed.stopwatch import seconds_per_call
 from studies.speed.twin import Twin, has_compiler

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from baselines.bench.comparison_tables import markdown
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
 from baselines.work.tasks import Result
+from studies.comparison.tables import markdown
 from studies.sweeps.plan import Point
 
 SHOWN_POINTS = 500

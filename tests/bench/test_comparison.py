@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from baselines.bench import comparison, evaluation
-from baselines.bench.comparison import (
+from baselines.bench import evaluation
+from baselines.bench.pieces import controller_settings, file_stem
+from birthsim_env import Parameters
+from studies.comparison import figure as comparison_figures
+from studies.comparison import grid as comparison
+from studies.comparison.grid import (
     ENVIRONMENTS,
     METRICS,
     MOVING,
@@ -26,10 +30,7 @@ from baselines.bench.comparison import (
     run_cell,
     statistics,
 )
-from baselines.bench.comparison_tables import OWN_HAND, data, losses, overview
-from baselines.bench.pieces import controller_settings, file_stem
-from baselines.figures import comparison as comparison_figures
-from birthsim_env import Parameters
+from studies.comparison.tables import OWN_HAND, data, losses, overview
 from tests.controllers.test_named_controllers import OWN
 
 RIG = Parameters()

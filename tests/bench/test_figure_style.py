@@ -14,9 +14,9 @@ from PIL import Image
 from agents.reports.correction_figure import draw_corrections
 from agents.reports.learning_curves import draw_learning_curves
 from baselines.figures import runs as figures
-from baselines.figures.comparison import CONDITIONS, draw_comparison
 from baselines.figures.runs import COLOURS, look, save
-from baselines.figures.studies import draw_studies
+from studies.comparison.figure import CONDITIONS, draw_comparison
+from studies.comparison.stiffness_figures import draw_studies
 from studies.stability.figure import stability_figure
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -103,7 +103,7 @@ def test_every_figure_is_a_png_and_an_svg_that_do_not_change(draw, names, tmp_pa
 @pytest.mark.parametrize(("draw", "names"), DRAWINGS.values(), ids=DRAWINGS)
 def test_every_axis_says_its_unit(draw, names, tmp_path, monkeypatch):
     drawn = []
-    drawing = ("baselines.figures.comparison", "baselines.figures.studies", "studies.stability.figure",
+    drawing = ("studies.comparison.figure", "studies.comparison.stiffness_figures", "studies.stability.figure",
                "agents.reports.learning_curves", "agents.reports.correction_figure")  # fmt: skip
     for module in drawing:
         monkeypatch.setattr(f"{module}.save", lambda figure, folder, name: drawn.append(figure) or [])

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from baselines.bench import studies
 from baselines.bench.pneumatic_range import pneumatic_range, pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult
-from baselines.bench.studies import (
+from birthsim_env import Parameters
+from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
+from birthsim_env.physics.equilibrium import balanced_state
+from birthsim_env.physics.geometry import inverse_geometry, joint_force
+from birthsim_env.physics.plant import Plant
+from studies.comparison import stiffness as studies
+from studies.comparison import stiffness_figures as study_figures
+from studies.comparison.stiffness import (
     COUPLED,
     STUDIES,
     disturbance_study,
@@ -21,12 +27,6 @@ from baselines.bench.studies import (
     stiffness_study,
     study_tasks,
 )
-from baselines.figures import studies as study_figures
-from birthsim_env import Parameters
-from birthsim_env.physics.compiled.lanes import PRESSURES, V1, V2
-from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.geometry import inverse_geometry, joint_force
-from birthsim_env.physics.plant import Plant
 
 RIG = Parameters()
 SMOOTH = frictionless(RIG)

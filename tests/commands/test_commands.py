@@ -81,17 +81,18 @@ def test_options_come_from_toml_and_what_is_typed_counts_more(monkeypatch, capsy
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("episods = 3", "'episods' (did you mean 'episodes'?); allowed: all, env, "),
+        ("episods = 3", "'episods' (did you mean 'episodes'?); allowed: env, "),
         ("episodes = 0", "--episodes: '0'; allowed: a whole number >= 1"),
         ("episodes = [1, 2]", "episodes = [1, 2]; allowed: "),
         ('sensors = "perfect"', "sensors = 'perfect'; allowed: ideal, lab, honest"),
-        ("all = 1", "all = 1; allowed: true or false"),
+        ("no-studies = 1", "no-studies = 1; allowed: true or false"),
         ("episodes =", "cannot be read: "),
     ],
 )
 def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_path):
     (tmp_path / "own.toml").write_text(content)
-    status, _, complained = call("evaluate", monkeypatch, capsys, "--config", tmp_path / "own.toml", "--out", tmp_path / "x")
+    options = ("--config", tmp_path / "own.toml", "--out", tmp_path / "x")
+    status, _, complained = call("comparison", monkeypatch, capsys, *options)
     assert status == 2
     assert said in complained.splitlines()[-1]
 
@@ -135,7 +136,7 @@ def damaged(tmp_path_factory):
     return folder
 
 
-ALL = ("--all", "--controllers", "backstepping")
+ALL = ("--controller", "backstepping")
 BAD = [
     ("evaluate", ("--env", "BirthSIM/Square-v1"), "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v1, "),
     ("evaluate", ("--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1, "),
@@ -162,23 +163,20 @@ BAD = [
     ("evaluate", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("evaluate", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 and"),
     ("evaluate", ("--out", "{tmp}/own.py"), "own.py'"),
-    ("evaluate", ("--no-studies",), "--no-studies and --studies-only; allowed: with --all"),
     ("evaluate", ("--cluster", "slurm"), "--cluster: 'slurm'; allowed: ray, or ray:ADDRESS of a running cluster"),
     ("evaluate", ("--cluster", "ray:"), "--cluster: 'ray:'; allowed: ray, or ray:ADDRESS of a running cluster"),
     ("sweep", ("nowhere.toml",), "sweep = 'nowhere.toml' cannot be read: "),
     ("sweep", ("{tmp}/own.py",), "own.py' is no TOML: "),
     ("sweep", ("{tmp}/rig.toml",), "rig.toml': 'mechanics'; allowed: [base], [grid], [draw], [search] and [[map]]"),
-    ("evaluate", ("--all", "--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
-    ("evaluate", (*ALL, "--env", "CartPole-v1"), "--env 'CartPole-v1' with --all; allowed: BirthSIM/Circle-v1, "),
-    ("evaluate", (*ALL, "--env", RESIDUAL), f"--env '{RESIDUAL}' with --all; allowed: BirthSIM/Circle-v1, "),
-    ("evaluate", (*ALL, "--randomize", "none"), "--randomize 'none' with --all; allowed: scenario, all"),
-    ("evaluate", ("--all", "--policy", "{tmp}/none"), "--policy with --all; allowed: without it"),
-    ("evaluate", ("--all", "--controllers", "nobody"), "--controller 'nobody' with --all; allowed: backstepping, "),
-    ("evaluate", ("--all", "--controllers", "residual"), "--controller 'residual' with --all; allowed: backstepping, "),
-    ("evaluate", ("--all", "--controllers", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
-    ("evaluate", ("--all", "--controllers", "nowhere.py:Mine"), "controller file 'nowhere.py' does not exist; allowed: "),
-    ("evaluate", ("--all", "--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
-    ("evaluate", ("--all", "--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: "),
+    ("comparison", ("--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
+    ("comparison", (*ALL, "--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1, "),
+    ("comparison", (*ALL, "--env", RESIDUAL), f"--env '{RESIDUAL}'; allowed: BirthSIM/Circle-v1, "),
+    ("comparison", ("--controller", "nobody"), "--controller 'nobody'; allowed: backstepping, "),
+    ("comparison", ("--controller", "residual"), "--controller 'residual'; allowed: backstepping, "),
+    ("comparison", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
+    ("comparison", ("--controller", "nowhere.py:Mine"), "controller file 'nowhere.py' does not exist; allowed: "),
+    ("comparison", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
+    ("comparison", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: "),
     ("evaluate", ("--episodes", "2", "--colour", "red"), "unrecognized arguments: --colour red"),
     ("figure4", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, "),
     ("figure4", ("--set", "gain=3"), "--set 'gain=3'; allowed for backstepping: weight_compensation, "),

@@ -1,4 +1,4 @@
-"""birthsim evaluate: tables, strict JSON and figures, a controller from a file, --all by pieces, and Ctrl-C."""
+"""birthsim evaluate: tables, strict JSON and figures, a controller from a file, the comparison by pieces, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from functools import partial
 
 import pytest
 
-from baselines.bench import studies
 from baselines.bench.metrics import UNITS
+from studies.comparison import stiffness as studies
 from tests.console import OWN, assert_picture, call, interrupted, strict
 
 
@@ -103,7 +103,7 @@ class Fails(Slam):
     def command(self, measurement, reference):
         raise RuntimeError("no law at all")
 """
-NARROW = ("--all", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2)
+NARROW = ("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--episodes", 2)
 
 
 @pytest.fixture
@@ -120,11 +120,11 @@ def small_studies(monkeypatch):
 
 
 @pytest.mark.slow
-def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
+def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
     (tmp_path / "slam.py").write_text(OWN)
     slam = f"{tmp_path}/slam.py:Slam"
-    arguments = (*NARROW, "--controllers", "backstepping", slam, "--jobs", 1, "--out")
-    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    arguments = (*NARROW, "--controller", "backstepping", slam, "--jobs", 1, "--out")
+    status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out")
     assert status == 0, complained
     assert "Warning" not in complained
     for title, pieces in (("comparison", 4), ("studies", 8)):
@@ -155,7 +155,7 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     # Once more: nothing is computed, and all is the same.
     written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.json") if path.parent != tmp_path / "out"}
     assert len(written) == 12
-    status, again, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out")
+    status, again, _ = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out")
     assert status == 0
     assert f"comparison: 4 of 4 are there with these settings, rig and code, and are kept: backstepping 2, {slam} 2" in again
     assert "studies: 8 of 8 are there" in again
@@ -164,7 +164,7 @@ def test_evaluate_all_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, 
     assert strict(tmp_path / "out" / "comparison.json") == content
     # The studies alone, from what is there of them.
     (tmp_path / "out" / "comparison.md").unlink()
-    status, alone, _ = call("evaluate", monkeypatch, capsys, *arguments, tmp_path / "out", "--studies-only")
+    status, alone, _ = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out", "--studies-only")
     assert status == 0
     assert "settled_error.png" not in alone
     assert "rendered_stiffness.png" in alone
@@ -186,18 +186,18 @@ class Waits(Slam):
 
 
 @pytest.mark.slow
-def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
+def test_the_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
     """Two pieces side by side: one is complete at Ctrl-C, the other one waits for what comes only afterwards."""
     own, out = tmp_path / "own.py", tmp_path / "out"
     own.write_text(OWN + WAITING)
-    names = ("--controllers", f"{own}:Slam", f"{own}:Waits")
+    names = ("--controller", f"{own}:Slam", f"{own}:Waits")
     line = (*NARROW, "--episodes", 1, "--jobs", 2, "--randomize", "all", "--no-studies", *names, "--out", out)
-    status, printed = interrupted("evaluate", line, lambda: list(out.rglob("*.json")))
+    status, printed = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
     assert status == 130
     assert printed.startswith("rigs drawn: ")
     assert len(list(out.rglob("*.json"))) == 1
     (tmp_path / "go").touch()
-    status, printed, _ = call("evaluate", monkeypatch, capsys, *line)
+    status, printed, _ = call("comparison", monkeypatch, capsys, *line)
     assert status == 0
     assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
     assert "out" not in strict(out / "comparison.json")["arguments"], "results do not depend on where they are"
@@ -205,14 +205,14 @@ def test_evaluate_all_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, ca
 
 
 @pytest.mark.usefixtures("brief")
-def test_evaluate_all_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
+def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
-    arguments = (*NARROW, "--randomize", "scenario", "--no-studies", "--jobs", 1, "--controllers", fails, "backstepping")
-    status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
+    arguments = (*NARROW, "--randomize", "scenario", "--no-studies", "--jobs", 1, "--controller", fails, "backstepping")
+    status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
-    assert "birthsim evaluate: error: 1 of 2 pieces failed, the first cells/" in complained
+    assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
     assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
 
@@ -238,13 +238,13 @@ def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monke
     assert complained == "birthsim evaluate: interrupted\n"
 
 
-def test_evaluate_all_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
-    case = ("--all", "--randomize", "sensors", "--no-studies", "--out", tmp_path / "out")
-    status, _, complained = call("evaluate", monkeypatch, capsys, *case, "--sensors", "lab")
+def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
+    case = ("--randomize", "sensors", "--no-studies", "--out", tmp_path / "out")
+    status, _, complained = call("comparison", monkeypatch, capsys, *case, "--sensors", "lab")
     assert status == 2
-    assert "--randomize 'sensors' with --all; allowed: with --sensors honest" in complained
+    assert "--randomize 'sensors'; allowed: with --sensors honest" in complained
     own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
-    status, _, complained = call("evaluate", monkeypatch, capsys, *case, *own)
+    status, _, complained = call("comparison", monkeypatch, capsys, *case, *own)
     assert status == 0, complained
     assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
     (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]

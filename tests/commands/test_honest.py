@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 
-from baselines.bench.comparison import MOVING
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
+from studies.comparison.grid import MOVING
 from studies.honest import command as honest
 
 

@@ -48,9 +48,9 @@ TARGETS = {
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
         ),
         Target(
-            "compare", "birthsim evaluate",
+            "compare", "birthsim study comparison",
             (
-                *("--all", "--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
+                *("--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
                 *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             ),
             older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),

@@ -12,10 +12,11 @@ from pathlib import Path
 import gymnasium
 import pytest
 
-from baselines.bench import comparison_tables, evaluation_data
+from baselines.bench import evaluation_data
 from baselines.bench.metrics import UNITS
 from birthsim.door import COMMANDS
 from birthsim_env import Parameters
+from studies.comparison import tables as comparison_tables
 from studies.scores import tables as score_tables
 from tests.live import axe, browser
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
-from baselines.bench.comparison import default_controllers
 from baselines.bench.probes import StiffnessResult, StiffnessTest, run_stiffness_test
 from baselines.registry import SLOW, controller_names, make_controller
 from baselines.rivals import NonlinearMPC, predictive
@@ -20,6 +19,7 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.comparison.grid import default_controllers
 from tests.controllers.test_informed import Aware
 from tests.controllers.test_through_friction import recorded
 from tests.controllers.test_valve_inverse import into_chambers

@@ -235,7 +235,7 @@ def test_the_stamp_follows_what_computes_and_not_what_shows(tmp_path, monkeypatc
         "birthsim_env/physics/plant.py",
         "birthsim_env/drawing/rendering.py",
         "baselines/gains.json",
-        "baselines/figures/studies.py",
+        "studies/comparison/stiffness_figures.py",
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("1")
@@ -247,7 +247,7 @@ def test_the_stamp_follows_what_computes_and_not_what_shows(tmp_path, monkeypatc
         (tmp_path / "birthsim_env" / name).write_text("2")
         assert (anew() != stamp) == counts, name
         stamp = anew()
-    for name, counts in (("gains.json", True), ("figures/studies.py", False), ("new.py", True)):
+    for name, counts in (("gains.json", True), ("figures/runs.py", False), ("new.py", True)):
         (tmp_path / "baselines" / name).write_text("2")
         assert (anew() != stamp) == counts, name
         stamp = anew()

@@ -17,7 +17,7 @@ from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, label_of, legend_
 from birthsim_env.physics.compiled.lanes import Array
 
 Study = Mapping[str, dict[str, Any]]
-"""Label of a controller -> its result, as ``baselines.bench.studies`` returns it."""
+"""Label of a controller -> its result, as ``studies.comparison.stiffness`` returns it."""
 
 ELLIPSE_SCALE = 9e-6
 """m of the picture's workspace per N/m of a stiffness ellipse."""

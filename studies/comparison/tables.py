@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.bench.comparison import METRICS, MOVING, REFERENCE, RIGS
 from baselines.bench.statistics import number
+from studies.comparison.grid import METRICS, MOVING, REFERENCE, RIGS
 
 Figures = Sequence[dict[str, Any]]
-"""What ``baselines.bench.comparison.statistics`` returns."""
+"""What ``studies.comparison.grid.statistics`` returns."""
 
 DATA = (
     *("environment", "sensors", "rig", "hand", "metric", "unit", "controller", "median", "low", "high", "q95", "worst"),

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.bench.comparison import known
-from baselines.bench.comparison_tables import CIRCLE, Figures, controllers_of
 from baselines.figures.runs import DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
+from studies.comparison.grid import known
+from studies.comparison.tables import CIRCLE, Figures, controllers_of
 
 CONDITIONS = {
     ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},

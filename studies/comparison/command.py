@@ -1,4 +1,4 @@
-"""birthsim evaluate --all: every controller under all conditions, and the studies of what a hand feels."""
+"""birthsim study comparison: every controller under all conditions, and how the stiffness feels."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from baselines.bench import comparison
-from baselines.bench.comparison import Conditions, all_conditions, cell_task, default_controllers
-from baselines.bench.comparison_tables import data, losses, overview
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable
-from baselines.bench.studies import study_tasks
-from baselines.commands.parts import with_options
-from baselines.commands.shared import JOBS, shown_arguments
+from baselines.commands.parts import add_set, with_options
+from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
 from baselines.registry import CONTROLLERS, SLOW, bare_name
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, code_stamp, run_tasks
 from birthsim_env.parts.drawn.randomization import described
+from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.comparison import grid as comparison
+from studies.comparison.grid import Conditions, all_conditions, cell_task, default_controllers
+from studies.comparison.stiffness import study_tasks
+from studies.comparison.tables import data, losses, overview
 
 NARROWED = {"scenario": "nominal", "all": "randomised", "sensors": "drawn-sensors"}
 """The option --randomize -> the one plant that is then compared."""
@@ -28,7 +29,38 @@ _FIGURES = (
 )
 
 
-def evaluate_all(arguments: argparse.Namespace) -> None:
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="birthsim study comparison",
+        description="Compare controllers in every environment, with every sensor model, on the rig as given and on rigs "
+        "drawn at random, and how their stiffness feels. --env, --sensors and --randomize narrow it. What the output folder "
+        "holds of the same settings, rig and code is kept, so that an interrupted run goes on.",
+    )
+    parser.add_argument("--env", help="environment id (default: every one)")
+    parser.add_argument(
+        "--controller", nargs="+", metavar="NAME", help="registered names, with options, or path/to/file.py:Class (default: "
+        "every one that is not slow)",
+    )  # fmt: skip
+    parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=32, help="per cell (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
+    parser.add_argument("--sensors", choices=tuple(SENSORS), help="default: ideal and lab")
+    parser.add_argument(
+        "--randomize",
+        choices=tuple(NARROWED),
+        help="default: the scenario, then both, then figures of sensors",
+    )
+    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
+    add_set(parser)
+    add_processes(parser)
+    parts = parser.add_mutually_exclusive_group()
+    parts.add_argument("--no-studies", action="store_true", help="leave out how the stiffness feels")
+    parts.add_argument("--studies-only", action="store_true", help="nothing but how the stiffness feels, some minutes")
+    parser.add_argument("--out", type=Path, required=True, help="folder for comparison.json, .csv, .md and figures")
+    run(parser, _compare)
+
+
+def _compare(arguments: argparse.Namespace) -> None:
     """Run what ``--out`` does not hold yet, and write comparison.json, .csv, .md and the figures."""
     rig = load_parameters(arguments.parameters)
     names = list(dict.fromkeys(arguments.controller or default_controllers()))
@@ -36,7 +68,7 @@ def evaluate_all(arguments: argparse.Namespace) -> None:
     for name in names:
         plain = bare_name(name)
         if plain not in CONTROLLERS and not plain.rpartition(":")[0].endswith(".py"):
-            raise ValueError(f"--controller {name!r} with --all; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
+            raise ValueError(f"--controller {name!r}; allowed: {', '.join(CONTROLLERS)}, or path/to/file.py:Class")
     settings = [controller_settings(name, rig) for name in names]
     conditions = [] if arguments.studies_only else _conditions(arguments)
     folder, jobs = make_folder(arguments.out), arguments.jobs or JOBS
@@ -65,17 +97,15 @@ def _conditions(arguments: argparse.Namespace) -> list[Conditions]:
     narrowed: dict[str, Any] = {}
     if arguments.env is not None:
         if arguments.env not in comparison.ENVIRONMENTS:
-            raise ValueError(f"--env {arguments.env!r} with --all; allowed: {', '.join(comparison.ENVIRONMENTS)}")
+            raise ValueError(f"--env {arguments.env!r}; allowed: {', '.join(comparison.ENVIRONMENTS)}")
         narrowed["environments"] = (arguments.env,)
     if arguments.sensors is not None:
         narrowed["sensors"] = (arguments.sensors,)
     if arguments.randomize is not None:
-        if arguments.randomize not in NARROWED:
-            raise ValueError(f"--randomize {arguments.randomize!r} with --all; allowed: {', '.join(NARROWED)}")
         narrowed["plants"] = (NARROWED[arguments.randomize],)
     conditions = all_conditions(**narrowed)
     if not conditions:
-        raise ValueError("--randomize 'sensors' with --all; allowed: with --sensors honest, whose figures can be drawn")
+        raise ValueError("--randomize 'sensors'; allowed: with --sensors honest, whose figures can be drawn")
     return conditions
 
 
@@ -84,8 +114,8 @@ def _write(
     folder: Path,
 ) -> list[str]:  # fmt: skip
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
-    from baselines.figures.comparison import draw_comparison
-    from baselines.figures.studies import draw_studies
+    from studies.comparison.figure import draw_comparison
+    from studies.comparison.stiffness_figures import draw_studies
 
     figures = comparison.statistics(cells)
     by_study: dict[str, dict[str, Result]] = {}

@@ -1,0 +1,1 @@
+"""Every controller under all conditions."""
