@@ -235,7 +235,7 @@ def test_the_stamp_follows_what_computes_and_not_what_shows(tmp_path, monkeypatc
         "birthsim_env/physics/plant.py",
         "birthsim_env/drawing/rendering.py",
         "baselines/gains.json",
-        "studies/comparison/stiffness_figures.py",
+        "baselines/figures/runs.py",
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("1")
