@@ -72,12 +72,6 @@ def evaluation(**given):
     return evaluate(PROBE, named("shut-valves"), "shut-valves", seed=0, progress=False, **given)
 
 
-def advance(**given):
-    return Plant(num_envs=2).advance(
-        **{"opening_command": np.zeros((4, 2)), "user_force": np.zeros((2, 2)), "duration": 0.01, **given}
-    )
-
-
 def linear(**given):
     return linearize(None, (0.5, 0.0), **given)
 
@@ -181,8 +175,6 @@ TABLE = [
     (evaluation, "episodes", (0, -3), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
     (Plant, "parameters", (42,), "None, a Parameters or the path"),
-    (advance, "duration", (NAN, 0, -0.01, "long"), "a positive number, at most 3600 (s)"),
-    (advance, "user_force", ([[1, 2], [3]],), "numbers of shape (2, 2)"),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
     (score, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
     (score, "sensors", ("perfect",), "'ideal', 'lab'"),

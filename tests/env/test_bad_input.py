@@ -119,13 +119,7 @@ def test_the_policy_period_follows_the_rigs_own_control_period():
         ("[mechanics]\nmas = 3.0\n", ("mechanics.mas", "allowed in mechanics", "mass", "gravity")),
         ("[motor]\nmass = 3.0\n", ("'motor'", "allowed", "mechanics")),
         ("[mechanics]\nmass = -3.0\n", ("Mechanics.mass = -3.0", "allowed", "> 0 and <= 1e+20 (kg)")),
-        ("[mechanics]\nmass = 'heavy'\n", ("Mechanics.mass = 'heavy'", "allowed", "> 0 and <= 1e+20 (kg)")),
-        ("[mechanics]\nmass = nan\n", ("Mechanics.mass = nan", "finite")),
-        ("[mechanics]\nmass = true\n", ("Mechanics.mass = True", "allowed")),
-        ("[friction]\nlaw = 'stribeck'\n", ("Friction.law = 'stribeck'", "'lugre'", "'coulomb'")),
         ("[cylinder1]\nrod_diameter = 0.03\n", ("rod_diameter = 0.03", "less than piston_diameter = 0.025")),
-        ("[air]\nsupply_pressure = 1e5\n", ("supply_pressure = 100000.0", "more than atmospheric_pressure")),
-        ("[geometry]\nk1 = 0.2\n", ("Geometry.k1 = 0.2", "allowed")),
         ("mechanics = 3\n", ("mechanics = 3", "allowed", "section")),
     ],
 )
