@@ -305,12 +305,6 @@ def test_the_control_rate_is_that_of_the_rig():
     assert spy.calls == 250
 
 
-@pytest.mark.parametrize("episodes", [0, -3])
-def test_no_episodes_are_refused(episodes):
-    with pytest.raises(ValueError, match=rf"episodes = {episodes}; allowed: a whole number >= 1"):
-        run(BacksteppingController(), episodes=episodes)
-
-
 def test_commands_that_are_not_openings_stop_the_evaluation_by_name():
     class Broken(BacksteppingController):
         def command(self, measurement, reference, feedforward_force=None):

@@ -200,23 +200,6 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
     assert np.all(fixed.gain_fraction == 1)
 
 
-@pytest.mark.parametrize(
-    ("gains", "message"),
-    [
-        ({"stiffness": 1.0}, r"stiffness = 1.0 is no gain of AdmittanceController; allowed: gain, rest_gain, rest_push, "),
-        ({"gain": 0.0}, r"gain = 0.0; allowed: a positive number"),
-        ({"bandwidth": np.nan}, r"bandwidth = nan; allowed: a positive number"),
-        ({"lead_time": np.inf}, r"lead_time = inf; allowed: a positive number"),
-        ({"dead_zone": -1e-6}, r"dead_zone = -1e-06; allowed: zero or a positive number"),
-        ({"friction_fraction": -0.1}, r"friction_fraction = -0.1; allowed: zero or a positive number"),
-        ({"yielding": 1.1}, r"yielding = 1.1; allowed: at most 1"),
-    ],
-)
-def test_impossible_gains_are_refused(gains: dict[str, float], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        AdmittanceController(BELIEVED, learn=False, **gains)
-
-
 def test_springs_that_are_none_are_refused() -> None:
     ((measured, wanted),) = recorded(3, 1, "ideal")
     wanted.rows[14, 2] = 5000.0

@@ -52,14 +52,6 @@ def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
     assert info["time"][0] == 0.0
     assert info["time"][1] > 0.0
     env.step(SLAM)
-    for mask in (np.array([1, 0]), np.array([True]), np.array([False, False])):
-        with pytest.raises(ValueError, match=r"options\['reset_mask'\] = .*; allowed: \(2,\) of bool"):
-            env.reset(options={"reset_mask": mask})
-
-
-def test_an_unknown_mode_is_refused():
-    with pytest.raises(ValueError, match="autoreset_mode = 'never'; allowed: 'NextStep', 'SameStep', 'Disabled'"):
-        make("never")
 
 
 @pytest.mark.parametrize(

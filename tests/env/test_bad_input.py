@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from birthsim_env import Parameters
-from birthsim_env.env import BirthSIMEnv
-from birthsim_env.vector_env import BirthSIMVectorEnv
 
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = math.nan, math.inf
@@ -86,53 +84,6 @@ def test_a_refused_action_leaves_the_vector_environment_as_it_was(action, words)
         np.testing.assert_array_equal(one, other)
 
 
-ARGUMENTS = [
-    ({"action_mode": "voltage"}, ("action_mode = 'voltage'", "'valve'", "'flow'")),
-    ({"action_mode": None}, ("action_mode = None", "'valve'", "'flow'")),
-    ({"valves": "three"}, ("valves = 'three'", "'two_valves'", "'one_valve'")),
-    ({"sensors": "magnetic"}, ("sensors = 'magnetic'", "'ideal'", "'lab'")),
-    ({"sensors": ["lab"]}, ("sensors = ['lab']", "'ideal'", "'lab'")),
-    ({"randomize": "all"}, ("randomize = 'all'", "False", "True", "'plant'", "'scenario'")),
-    ({"randomize": None}, ("randomize = None", "'plant'")),
-    ({"randomize": 1}, ("randomize = 1", "'plant'")),
-    ({"scenario": "birth"}, ("scenario = 'birth'", "'circle'", "'dystocia'")),
-    ({"reference": "circle"}, ("reference = 'circle'", "Trajectory")),
-    ({"user_force": 30.0}, ("user_force = 30.0", "UserForce")),
-    ({"stiffness": 4000.0}, ("stiffness = 4000.0", "StiffnessSchedule")),
-    ({"parameters": 3}, ("parameters = 3", "Parameters", "TOML")),
-    ({"policy_period": 0.0015}, ("policy_period = 0.0015", "multiple of the control period 0.001 s")),
-    ({"policy_period": 0.0004}, ("policy_period = 0.0004", "multiple")),
-    ({"policy_period": 0}, ("policy_period = 0;", "multiple")),
-    ({"policy_period": -0.01}, ("policy_period = -0.01", "multiple")),
-    ({"policy_period": INF}, ("policy_period = inf", "multiple")),
-    ({"policy_period": NAN}, ("policy_period = nan", "multiple")),
-    ({"policy_period": "10 ms"}, ("policy_period = '10 ms'", "multiple")),
-    ({"duration": 0.0}, ("duration = 0.0", "positive")),
-    ({"duration": -1}, ("duration = -1", "positive")),
-    ({"duration": INF}, ("duration = inf", "positive")),
-    ({"duration": "long"}, ("duration = 'long'", "positive")),
-]
-
-
-@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS)
-def test_impossible_arguments_are_refused_by_both_environments(arguments, words):
-    names_all(refusal(lambda: gymnasium.make(CIRCLE, **arguments)), words)
-    names_all(refusal(lambda: gymnasium.make_vec(CIRCLE, num_envs=2, **arguments)), words)
-
-
-@pytest.mark.parametrize("mode", ["ascii", "RGB_ARRAY", 1])
-def test_an_unknown_render_mode_is_refused(mode):
-    # gymnasium.make itself warns about it first, so the classes are asked directly.
-    for cls in (BirthSIMEnv, BirthSIMVectorEnv):
-        message = refusal(lambda cls=cls: cls("circle", render_mode=mode))
-        names_all(message, (f"render_mode = {mode!r}", "'human'", "'rgb_array'"))
-
-
-@pytest.mark.parametrize("lanes", [0, -1, 1.5, "2", None])
-def test_an_impossible_number_of_lanes_is_refused(lanes):
-    names_all(refusal(lambda: BirthSIMVectorEnv("circle", num_envs=lanes)), (f"num_envs = {lanes!r}", ">= 1"))
-
-
 @pytest.mark.filterwarnings("ignore:.*is out of date:DeprecationWarning")
 @pytest.mark.parametrize("kind", ["", "Residual"])
 def test_an_older_id_names_the_one_of_now(kind):
@@ -168,13 +119,7 @@ def test_the_policy_period_follows_the_rigs_own_control_period():
         ("[mechanics]\nmas = 3.0\n", ("mechanics.mas", "allowed in mechanics", "mass", "gravity")),
         ("[motor]\nmass = 3.0\n", ("'motor'", "allowed", "mechanics")),
         ("[mechanics]\nmass = -3.0\n", ("Mechanics.mass = -3.0", "allowed", "> 0 and <= 1e+20 (kg)")),
-        ("[mechanics]\nmass = 'heavy'\n", ("Mechanics.mass = 'heavy'", "allowed", "> 0 and <= 1e+20 (kg)")),
-        ("[mechanics]\nmass = nan\n", ("Mechanics.mass = nan", "finite")),
-        ("[mechanics]\nmass = true\n", ("Mechanics.mass = True", "allowed")),
-        ("[friction]\nlaw = 'stribeck'\n", ("Friction.law = 'stribeck'", "'lugre'", "'coulomb'")),
         ("[cylinder1]\nrod_diameter = 0.03\n", ("rod_diameter = 0.03", "less than piston_diameter = 0.025")),
-        ("[air]\nsupply_pressure = 1e5\n", ("supply_pressure = 100000.0", "more than atmospheric_pressure")),
-        ("[geometry]\nk1 = 0.2\n", ("Geometry.k1 = 0.2", "allowed")),
         ("mechanics = 3\n", ("mechanics = 3", "allowed", "section")),
     ],
 )

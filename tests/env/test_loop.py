@@ -112,9 +112,6 @@ def test_threads_are_all_that_there_are_unless_one_says_so(monkeypatch):
     assert gymnasium.make_vec(CIRCLE, num_envs=2, num_threads=7).unwrapped.simulation.threads == 7
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert gymnasium.make_vec(CIRCLE, num_envs=2).unwrapped.simulation.threads == 1
-    for wrong in (0, -1, 1.5, "2", True):
-        with pytest.raises(ValueError, match="num_threads"):
-            gymnasium.make_vec(CIRCLE, num_envs=2, num_threads=wrong)
 
 
 def _child(connection, env):

@@ -41,12 +41,6 @@ def test_noise_has_its_size_and_nothing_outside_its_band():
     assert len({tuple(lane) for lane in force[0].T}) == lanes, "every lane has its own"
 
 
-@pytest.mark.parametrize("band", [(0.0, 1.0), (2.0, 1.0)])
-def test_a_band_is_a_band(band):
-    with pytest.raises(ValueError, match=r"band = .*; allowed: .*> 0"):
-        Noise(15.0, band)
-
-
 def walk(hand, path, speed, times):
     return np.array([hand.force(np.array([[t]]), path(t)[:, None], speed(t)[:, None])[0, :, 0] for t in times])
 

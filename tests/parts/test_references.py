@@ -101,8 +101,6 @@ def test_a_circle_closes_keeps_its_radius_and_its_sense(period, radius):
     np.testing.assert_allclose(np.hypot(rows[0] - 0.5, rows[1] + 0.01), radius)
     np.testing.assert_allclose(np.hypot(rows[2], rows[3]), 2 * math.pi * radius / abs(period))
     assert rows[1, 8] == pytest.approx(-0.01 + math.copysign(radius, period))
-    with pytest.raises(ValueError, match=r"period = 0; allowed"):
-        Circle(period=0)
 
 
 def test_hold_stays():
@@ -223,20 +221,3 @@ def test_a_trajectory_without_sample_says_what_is_missing():
             ValueError, match=r"(?s)reference.* = .*; allowed: (None, a birthsim_env\.Trajectory|a function of time)"
         ):
             gymnasium.make("BirthSIM/Probe-v2", reference=wrong)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"begins": 2.0, "ends": 1.0}, ("ends = 1.0", "begins = 2.0")),
-        ({"length": -0.05}, ("length = -0.05", ">= 0")),
-        ({"length": (-0.05, 0.1)}, ("length = (-0.05, 0.1)", ">= 0")),
-        ({"radius": 0.0, "angle": 1.0}, ("radius = 0.0", ">= 0.001")),
-        ({"radius": (-0.1, 0.1)}, ("radius = (-0.1, 0.1)", ">= 0.001")),
-        ({"radius": (0.08, 0.06)}, ("(0.08, 0.06)", "ordered")),
-    ],
-)
-def test_impossible_paths_are_refused_by_name(arguments, words):
-    with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Probe-v2", reference=Path(**arguments)).reset(seed=0)
-    assert all(word in str(refusal.value) for word in words), refusal.value

@@ -261,12 +261,6 @@ def test_knots_of_many_lanes_are_refused_by_the_first_that_is_wrong():
         begin(hand, *new())
 
 
-@pytest.mark.parametrize("name", ["amplitude", "push", "heading"])
-def test_contractions_are_finite(name):
-    with pytest.raises(ValueError, match=f"{name} = nan; allowed: a finite number"):
-        Contractions(**{name: float("nan")})
-
-
 def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=50, randomize=True).unwrapped
     env.reset(seed=0)

@@ -231,7 +231,6 @@ def test_edges_of_the_pressures_are_finite() -> None:
         ({"pressures": (2e5, 2e5, 6e5, 2e5), "friction": "sliding"}, r"leave 204.1 N on piston 2"),
         ({"openings": (0.0, 0.0, 0.0, 2.0)}, r"openings = .*; allowed: -1 to 1"),
         ({"force": (1.0,)}, r"force has shape \(1,\); allowed: \(2,\)"),
-        ({"friction": "dry"}, r"friction = 'dry'; allowed: 'stuck', 'sliding'"),
         ({"parameters": Parameters().replace({"chambers.tube_length": 1.0})}, "allowed: a rig whose options are off"),
     ],
 )

@@ -69,35 +69,12 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
 REFUSED = [
     ("[experiment]\nsteps = 3", "table 'experiment'; allowed: training, residual"),
     ("steps = 3", "table 'steps'; allowed: training, residual"),
-    ("[training]\nstep = 3", "step = 3 is unknown; allowed: environment, algorithm, steps, "),
+    ("training = 3", "training = 3"),
+    ("[[training]]\nsteps = 3", "training = "),
+    ("residual = [1]", "residual = [1]"),
     ("[training]\nlaw = 'none'", "law = 'none' is unknown; allowed: environment, "),
-    ("[residual]\nsmoothing = 0.3", "smoothing = 0.3 is unknown; allowed: law, impedance, authority, "),
-    ("[residual]\nweight_compensation = true", "weight_compensation = True is unknown; allowed: law, "),
-    ("[training]\nalgorithm = 'dqn'", "algorithm = 'dqn'; allowed: 'ppo', 'sac', 'tqc'"),
-    ("[training]\nsteps = 0", "steps = 0; allowed: a whole number >= "),
-    ("[training]\nsteps = -5", "steps = -5; allowed: a whole number >= "),
-    ("[training]\nsteps = 1e6", "steps = 1000000.0; allowed: a whole number >= "),
-    ("[training]\nlanes = true", "lanes = True; allowed: a whole number >= "),
-    ("[training]\nrollout = '64'", "rollout = '64'; allowed: a whole number >= "),
-    ("[training]\nbatch = 2.5", "batch = 2.5; allowed: a whole number >= "),
-    ("[training]\nbatch = 1", "batch = 1; allowed: a whole number >= 2 and <= 1048576"),
-    ("[training]\nlanes = 65536\nrollout = 65536", "lanes = 65536 with rollout = 65536; allowed: a product of at most 4194304"),
-    ("[training]\nepochs = 0", "epochs = 0; allowed: a whole number >= "),
-    ("[training]\ngradient_steps = 0", "gradient_steps = 0; allowed: a whole number >= "),
-    ("[training]\nvalidation_lanes = 0", "validation_lanes = 0; allowed: a whole number >= "),
-    ("[training]\nvalidations = -1", "validations = -1; allowed: a whole number >= "),
-    ("[training]\nlearning_rate = 0.0", "learning_rate = 0.0; allowed: a finite number > 0 and <= 1 (-)"),
-    ("[training]\nlearning_rate = nan", "learning_rate = nan; allowed: a finite number > 0 and <= 1 (-)"),
-    ("[training]\ndiscount = -0.5", "discount = -0.5; allowed: a finite number > 0 and <= 1 (-)"),
-    ("[training]\ngae_lambda = 'a'", "gae_lambda = 'a'; allowed: a finite number > 0 and <= 1 (-)"),
-    ("[training]\nhidden = []", "hidden = (); allowed: 1 to 8 whole numbers from 1 to 2048"),
     ("[training]\nhidden = [64, 0]", "hidden = (64, 0); allowed: 1 to 8 whole numbers from 1 to 2048"),
-    ("[training]\nhidden = [64.5]", "hidden = (64.5,); allowed: 1 to 8 whole numbers from 1 to 2048"),
-    ("[residual]\nlaw = 'pid'", "law = 'pid'; allowed: 'backstepping', "),
-    ("[residual]\nimpedance = 'soft'", "impedance = 'soft'; allowed: 'fixed', 'variable_kp', 'variable'"),
-    ("[residual]\nlaw = 'none'\nimpedance = 'variable'", "law = 'none' has no impedance to vary"),
     ("[residual]\nauthority = 501", "authority = 501; allowed: more than 0, at most 500"),
-    ("[residual]\ntime_constant = 0", "time_constant = 0; allowed: more than 0, at most 1"),
     ("[training\nsteps = 3", "is no TOML: "),
     ("[training]\nsteps = 3\nsteps = 4", "is no TOML: "),
 ]
@@ -112,31 +89,6 @@ def assert_refused(path, message):
 
 @pytest.mark.parametrize(("text", "message"), REFUSED)
 def test_what_is_unknown_or_cannot_be_is_refused_with_the_file_and_what_is_allowed(tmp_path, text, message):
-    assert_refused(written(tmp_path, text), message)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("training = 3", "training = 3"),
-        ("[[training]]\nsteps = 3", "training = "),
-        ("residual = [1]", "residual = [1]"),
-        ("[training]\nhidden = 64", "hidden = 64"),
-        ("[training]\nhidden = [true]", "hidden = (True,)"),
-        ("[training]\nlog_std = 'low'", "log_std = 'low'"),
-        ("[training]\nlog_std = nan", "log_std = nan"),
-        ("[training]\nlearning_rate = inf", "learning_rate = inf"),
-        ("[training]\ndiscount = 1.5", "discount = 1.5"),
-        ("[training]\ngae_lambda = 2.0", "gae_lambda = 2.0"),
-        ("[training]\nseed = -1", "seed = -1"),
-        ("[training]\nseed = 'one'", "seed = 'one'"),
-        ("[training]\nsensors = 'none'", "sensors = 'none'"),
-        ("[training]\nrandomize = 'some'", "randomize = 'some'"),
-        ("[training]\nenvironment = 3", "environment = 3"),
-        ("[residual]\nauthority = true", "authority = True"),
-    ],
-)
-def test_values_of_a_wrong_kind_are_refused_too(tmp_path, text, message):
     assert_refused(written(tmp_path, text), message)
 
 
@@ -156,14 +108,10 @@ def test_what_is_no_text_is_refused(tmp_path):
         load_configuration(tmp_path)
 
 
-def test_overriding_checks_names_and_values():
+def test_overriding_changes_what_is_named():
     settings = override(TrainingSettings(), steps=9, algorithm="tqc")
     assert (settings.steps, settings.algorithm) == (9, "tqc")
     assert override(settings) == settings
-    with pytest.raises(ValueError, match=r"colour = 'red' is unknown; allowed: environment, "):
-        override(settings, colour="red")
-    with pytest.raises(ValueError, match=r"authority = 0; allowed: more than 0"):
-        override(ResidualSettings(), authority=0)
 
 
 RL_ZOO = yaml.safe_load((FOLDER / "rl_zoo_ppo.yml").read_text(encoding="utf-8"))

@@ -134,7 +134,8 @@ class _DiskCache(NullCache):
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._folder = folder
         path = Path(function.__code__.co_filename).resolve()
-        self._name = f"{function.__module__}.{function.__qualname__}"
+        # The module of a user's file has its whole path for a name.
+        self._name = f"{Path(function.__module__).name}.{function.__qualname__}"
         self._stamp = source_stamp(path)[:16]
 
     def _path(self, signature: Any, codegen: Any) -> Path:

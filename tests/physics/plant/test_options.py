@@ -236,22 +236,3 @@ def test_the_page_has_every_option_with_its_default_and_its_range():
     assert {name: (float(low), float(high)) for name, _, low, high in rows} == WORTH
     for name, default, *_ in rows:
         assert float(default) == field_of(name).default, name
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"air.supply_conductance": -1e-9}, r"Air\.supply_conductance = -1e-09 is impossible; allowed"),
-        ({"air.supply_volume": 1e-6}, r"Air\.supply_volume = 1e-06 is impossible; allowed"),
-        ({"chambers.tube_length": 20.0}, r"Chambers\.tube_length = 20\.0 is impossible; allowed"),
-        ({"mechanics.mode_frequency": 400.0}, r"Mechanics\.mode_frequency = 400\.0 is impossible; allowed"),
-        ({"mechanics.mode_mass_fraction": 1.0}, r"Mechanics\.mode_mass_fraction = 1\.0 is impossible; allowed"),
-        (
-            {"mechanics.mass": 0.03, "mechanics.mode_frequency": 30.0},
-            r"Mechanics\.mass = 0\.03 is impossible with this friction",
-        ),
-    ],
-)
-def test_impossible_options_are_refused_by_name(changes, words):
-    with pytest.raises(ValueError, match=words):
-        Parameters().replace(changes)

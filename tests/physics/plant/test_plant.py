@@ -105,11 +105,8 @@ def test_advance_refuses_by_name_and_leaves_the_state(command: Any, force: Any, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"num_envs": 0}, r"num_envs = 0; allowed: a whole number >= 1"),
-        ({"num_envs": 2.5}, r"num_envs = 2\.5; allowed: a whole number >= 1"),
         ({"parameters": [Parameters()] * 3, "num_envs": 2}, r"parameters has 3 entries; allowed: .* 2 lanes"),
         ({"parameters": [Parameters(), 7], "num_envs": 2}, r"parameters\[1\] = 7; allowed: a Parameters"),
-        ({"parameters": 42}, r"parameters = 42; allowed: None, a Parameters or the path"),
         ({"parameters": "no such file.toml"}, r"parameters = 'no such file\.toml' cannot be read"),
     ],
 )

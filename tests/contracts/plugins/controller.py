@@ -1,0 +1,40 @@
+"""A controller of a user's own, in Python and compiled: each axis by its own cylinder, opened in proportion to the error."""
+
+import numpy as np
+
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import Seen
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.records import Numbers, number
+
+GAIN = 6.0
+
+
+class Plain:
+    def __init__(self, parameters):
+        pass
+
+    def reset(self, lanes=None):
+        pass
+
+    def command(self, measurement, reference):
+        along, up = np.clip(GAIN * (reference.position - measurement.position), -1, 1)
+        return np.array([-up, up, along, -along])
+
+
+class Gain(Numbers):
+    gain = number("1/m", "opening per error")
+
+
+@kernel
+def push(world: int, seen: Seen, memory: int, gain: Gain, tables: int, lane: int, n: int):
+    for i in range(n):
+        along = max(-1.0, min(1.0, gain.gain * (seen.asked.position[0, i] - seen.position[0, i])))
+        up = max(-1.0, min(1.0, gain.gain * (seen.asked.position[1, i] - seen.position[1, i])))
+        seen.opening[0, i], seen.opening[1, i], seen.opening[2, i], seen.opening[3, i] = -up, up, along, -along
+    return 0
+
+
+class Compiled(StagedController):
+    def law_stages(self, sampled):
+        return [LawStage(push, Gain.numbers(gain=GAIN), np.zeros(0))]
