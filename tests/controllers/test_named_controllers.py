@@ -101,10 +101,6 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        (
-            "backsteping",
-            r"controller = 'backsteping' \(did you mean 'backstepping'\?\); allowed: backstepping, .*path/to/file\.py:Class",
-        ),
         ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
         ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),
         ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a name that it defines: "),
