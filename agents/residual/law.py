@@ -17,12 +17,12 @@ import numpy as np
 from agents.residual import authority, unexplained
 from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSettings
 from baselines.estimation import disturbance_observer, observers
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import CompiledDriving, LawStage, StagedController
 from birthsim_env.loop.rows import ACTION, POSITION, SHOWN, Seen
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Joints, Mask, Measurement, Point, Reference
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
-from baselines.estimation.rows import Joints
 from baselines.estimation.stages import Estimate
 from baselines.valve_inverse import force_first_openings
 from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel

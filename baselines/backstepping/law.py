@@ -16,10 +16,9 @@ import math
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
-from baselines.estimation.rows import Joints
 from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at

@@ -13,24 +13,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.estimation.rows import Motion, Point
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import Motion, Point, Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, rows
+from birthsim_env.physics.compiled.records import Numbers, number
 
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""
 
 MOVING_SPEED = 1e-3
 """m/s; assumed: a slower reference lets the pistons rest."""
-
-
-class Offset(Rows):
-    """How far the motion is from the target; zero at a new start."""
-
-    position = rows("x y", "m", "from the target")
-    velocity = rows("vx vy", "m/s", "relative to it")
 
 
 class Compliance(Numbers):
@@ -64,7 +56,7 @@ def is_stiffer(kxx: float, kyy: float, kxy: float, least: float) -> bool:
 
 @helper
 def derivatives(
-    offset: Offset, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
+    offset: Point, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
 ) -> tuple[float, float, float, float]:
     """Acceleration and jerk of the offset of lane ``i`` under a held force; all over the mass."""
     # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
@@ -76,7 +68,7 @@ def derivatives(
 
 @helper
 def advance(
-    offset: Offset, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
+    offset: Point, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
     kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float,
 ) -> None:  # fmt: skip
     """Carries the offset of lane ``i`` on by one period."""
@@ -90,7 +82,7 @@ def advance(
 
 
 @helper
-def give_way(offset: Offset, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
+def give_way(offset: Point, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
     """Writes ``motion`` and carries ``offset`` on by one period; returns how many setpoints are not positive definite.
 
     ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1.
@@ -122,14 +114,14 @@ def mark_moving(motion: Motion, moving: Array) -> None:
 
 @kernel
 def forecast(
-    offset: Offset, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
+    offset: Point, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
 ) -> None:  # fmt: skip
     """Writes ``ahead`` (M, 4, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
 
     The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
     from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
     """
-    z, mass, period = Offset(offset.rows.copy()), about.mass, about.period
+    z, mass, period = Point(offset.rows.copy()), about.mass, about.period
     for i in range(force.shape[1]):
         kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
         bxx, byy, bxy = damping(kxx, kyy, kxy, about.damping_ratio)

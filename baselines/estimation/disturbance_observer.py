@@ -8,7 +8,8 @@ the compliance error in disguise.
 
 from __future__ import annotations
 
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
+from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper

@@ -11,7 +11,7 @@ mass and of the pressure cells.
 from __future__ import annotations
 
 from baselines.estimation import force_bias
-from baselines.estimation.rows import Joints
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper

@@ -21,9 +21,9 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.estimation.disturbance_observer import accelerations
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from birthsim_env.loop.rows import Signals
-from birthsim_env.loop.signals import Measurement
+from birthsim_env.loop.signals import Joints, Measurement, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at

@@ -40,6 +40,13 @@ class Motion(Point):
     jerk = rows("jx jy", "m/s3", "jerk")
 
 
+class Joints(Rows):
+    """Where the pistons are, measured or estimated."""
+
+    position = rows("y1 y2", "m", "position")
+    speed = rows("v1 v2", "m/s", "speed")
+
+
 class Setpoints(Rows):
     """How stiff the rig should be."""
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.backstepping import law
-from baselines.estimation.rows import Joints
 from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
