@@ -51,19 +51,8 @@ class Observation(Rows):
     target_acceleration = rows("x y", "m/s2", "target acceleration {}")
 
 
-SCALES = np.array(
-    [
-        *[0.01] * 2,
-        *[0.2] * 2,
-        *[1.0] * 2,
-        *[200.0] * 2,
-        *[5000.0, 2500.0] * 2,
-        *[5000.0] * 2,
-        *[50.0] * 2,
-        *[0.2] * 2,
-        *[0.5] * 2,
-    ]
-)
+_PAIRS = (0.01, 0.01), (0.2, 0.2), (1.0, 1.0), (200.0, 200.0), (5000.0, 2500.0), (5000.0, 2500.0)
+SCALES = np.array((*_PAIRS, (5000.0, 5000.0), (50.0, 50.0), (0.2, 0.2), (0.5, 0.5))).ravel()
 ENTRIES = tuple(
     Entry(about.format(name), unit, scale) for (name, unit, about, _), scale in zip(Observation.entries(), SCALES, strict=True)
 )

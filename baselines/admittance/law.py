@@ -129,7 +129,7 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
         jerk_t = across(jx, jy, sine, cosine) - jerk_for(at_, dt, et, fraction_t * c)
         jerk_n = along(jx, jy, sine, cosine) - jerk_for(an_, dn, en, fraction_n * c)
-        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         rate1 += p[at.FV1] * mechanics.acceleration1(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity
         )  # fmt: skip

@@ -46,12 +46,12 @@ def cartesian(t: float, n: float, sine: float, cosine: float) -> tuple[float, fl
 
 @helper
 def load_rates(
-    load1: float, load2: float, growth: float, turn: float, kappa: float, mass: float, jerk_t: float, jerk_n: float
+    load1: float, load2: float, growth: float, turn: float, kappa: float, rate_t: float, rate_n: float
 ) -> tuple[float, float]:
-    """L' of both pistons, N/s, for a jerk (m/s3) across and along cylinder 2; ``growth`` kappa'/kappa, ``turn`` theta1'."""
+    """L' of both pistons, N/s, for mass times jerk, N/s, across and along cylinder 2; growth: kappa'/kappa, turn: theta1'."""
     force_t, force_n = -load1 / kappa, load2
-    rate1 = kappa * (turn * force_n - growth * force_t - mass * jerk_t)
-    rate2 = turn * force_t + mass * jerk_n
+    rate1 = kappa * (turn * force_n - growth * force_t - rate_t)
+    rate2 = turn * force_t + rate_n
     return rate1, rate2
 
 
@@ -106,7 +106,7 @@ def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
         jy = target.jerk[1, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
         jerk_t, jerk_n = across(jx, jy, sine, cosine) + drag_t, along(jx, jy, sine, cosine) + drag_n
 
-        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
         rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
         rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)

@@ -120,16 +120,6 @@ def outer_jerk(v: float, a: float, vd: float, ad: float, jd: float, c1: float, c
 
 
 @helper
-def force_rate_command(
-    rate: float, force: float, wanted: float, y: float, v: float, yd: float, vd: float, c1: float, c3: float,
-    apparent_mass: float,
-) -> float:  # fmt: skip
-    """dF/dt = dF*/dt - z2/g - c3 z3, N/s."""
-    z2 = v - vd + c1 * (y - yd)
-    return rate - apparent_mass * z2 - c3 * (force - wanted)
-
-
-@helper
 def needs_of_gains(joints: Joints, target: Reference, p: Array, needs: Needs, n: int) -> None:
     """Writes what the gains of n lanes follow from."""
     for i in range(n):
@@ -247,9 +237,8 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
         )
         # F* takes off what is believed, and dF*/dt its rate.
         star1_rate -= believed.rate[0, i]
-        intent.force_rate[0, i] = force_rate_command(
-            star1_rate, net1, star1, y1, v1, yd1, vd1, gains.c1[0, i], gains.c3[0, i], mass1
-        )
+        z2 = v1 - vd1 + gains.c1[0, i] * (y1 - yd1)
+        intent.force_rate[0, i] = star1_rate - mass1 * z2 - gains.c3[0, i] * (net1 - star1)
 
         accel2 = outer_acceleration(y2, v2, yd2, vd2, ad2, gains.c1[1, i], gains.c2[1, i])
         jerk2 = outer_jerk(v2, a2, vd2, ad2, wanted.jerk[1, i], gains.c1[1, i], gains.c2[1, i])
@@ -260,9 +249,8 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
             m * (jerk2 - compensate * neglected_rate) + (sliding * p[at.FC2] * smooth_sign_slope(v2, width) + p[at.FV2]) * a2
         )
         star2_rate -= believed.rate[1, i]
-        intent.force_rate[1, i] = force_rate_command(
-            star2_rate, net2, star2, y2, v2, yd2, vd2, gains.c1[1, i], gains.c3[1, i], m
-        )
+        z2 = v2 - vd2 + gains.c1[1, i] * (y2 - yd2)
+        intent.force_rate[1, i] = star2_rate - m * z2 - gains.c3[1, i] * (net2 - star2)
 
         kp1 = stiffness_of(air_at(0, pp1, pn1, y1, v1, p), p)
         kp2 = stiffness_of(air_at(1, pp2, pn2, y2, v2, p), p)

@@ -69,7 +69,7 @@ class TrackingController(StagedController, ABC):
     CONSTANTS: ClassVar[type[Numbers]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
     TUNED: ClassVar[dict[str, dict[str, float]]]
-    TOLD: ClassVar[tuple[str, ...]] = ("damping_factor",)
+    COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ("damping_factor",)
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)
