@@ -66,20 +66,20 @@ def lanes_of(measurement: Measurement, reference: Reference) -> int:
     return lanes
 
 
-TOLD = ("feedforward_force", "feedforward_rate", "damping_factor")
-"""What a law may be told besides the signals."""
+COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
+"""What ``command`` of a law may take besides the signals."""
 
 
 def feedforward_rows(
-    lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None, taken: Sequence[str] = TOLD
+    lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None, taken: Sequence[str] = COMMAND_OPTIONS
 ) -> Array:
-    """What a law is told besides, (5, lanes), zero where nothing: forces to believe in along cylinders 1 and 2, N, their
+    """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
     rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
     told = np.zeros((5, lanes))
     for name, rows, given in (
-        (TOLD[0], told[:2], force),
-        (TOLD[1], told[2:4], rate),
-        (TOLD[2], told[4], factor),
+        (COMMAND_OPTIONS[0], told[:2], force),
+        (COMMAND_OPTIONS[1], told[2:4], rate),
+        (COMMAND_OPTIONS[2], told[4], factor),
     ):
         if given is not None:
             if name not in taken:

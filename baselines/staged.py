@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import TOLD, Controller, checked_command, feedforward_rows, lanes_of
+from baselines.controller import COMMAND_OPTIONS, Controller, checked_command, feedforward_rows, lanes_of
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, Seen, fill_measurement
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
@@ -45,7 +45,7 @@ class StagedController:
     ``parameters`` is what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = TOLD
+    COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = COMMAND_OPTIONS
     """What ``command`` takes besides the signals."""
 
     asks: ClassVar[bool] = False
@@ -114,8 +114,8 @@ class StagedController:
 
         Called once per control period. ``feedforward_force`` (2, N), N, along cylinders 1 and 2, is added to what the law
         believes acts on the pistons, and ``feedforward_rate``, N/s, is how fast it changes. ``damping_factor`` (N,) multiplies
-        the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``TOLD``, for signals over different
-        numbers of lanes, for setpoints that the law cannot render, and without an acceleration where the law needs one.
+        the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``COMMAND_OPTIONS``, for signals
+        over different numbers of lanes, for setpoints that the law cannot render, and where an acceleration is missing.
         """
         if measurement.position.ndim == 1:
             given = (feedforward_force, feedforward_rate, damping_factor)
@@ -139,7 +139,7 @@ class StagedController:
             unchanged.flags.writeable = False
             placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.TOLD)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
         return self._loop.run()
@@ -199,8 +199,8 @@ class CompiledDriving(Driving):
         own = self.controller.more_rows(lanes)
         if self.controller.asks:
             return own
-        force, rate, factor = map(self._told.get, TOLD)
-        return [(feedforward_rows(lanes, force, rate, factor, self.controller.TOLD), FEEDFORWARD), *own]
+        force, rate, factor = map(self._told.get, COMMAND_OPTIONS)
+        return [(feedforward_rows(lanes, force, rate, factor, self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the law."""

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
+
+CLEARANCE = 0.002
+"""m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no
+meaning."""
 
 
 @helper
@@ -26,84 +32,100 @@ def driving_flows(pressure: float, p: Array) -> tuple[float, float]:
     )
 
 
+class CylinderAir(NamedTuple):
+    """Pressures (Pa), areas (m2) and lengths (m) of a cylinder's chambers at an instant, and the speed of its piston (m/s)."""
+
+    pp: float
+    pn: float
+    ap: float
+    an: float
+    length_p: float
+    length_n: float
+    speed: float
+
+
 @helper
-def two_valve_openings(
-    u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
-    length_p: float, length_n: float, v: float, p: Array,
-) -> None:  # fmt: skip
-    """Writes the openings of one cylinder's two valves, rows ``row`` and ``row + 1``, for the wanted dF/dt and dK/dt.
+def air_at(k: int, pp: float, pn: float, y: float, v: float, p: Array) -> CylinderAir:
+    """Cylinder ``k``, 0 or 1, of a rig with its piston at ``y``, m."""
+    ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if k == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+    half = p[at.HALF_L1] if k == 0 else p[at.HALF_L2]
+    return CylinderAir(pp, pn, ap, an, max(half + y, CLEARANCE), max(half - y, CLEARANCE), v)
+
+
+@helper
+def stiffness_of(c: CylinderAir, p: Array) -> float:
+    """Pneumatic stiffness (9), N/m."""
+    return control_model.pneumatic_stiffness(c.pp, c.pn, c.ap, c.an, c.length_p, c.length_n, p[at.INDEX])
+
+
+@helper
+def _flows_for(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+    """Active and pressurisation flow (10) for the wanted dF/dt and dK/dt."""
+    index, gas_t, stiffness = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE], stiffness_of(c, p)
+    force = c.pp * c.ap - c.pn * c.an
+    active = control_model.active_flow_for(rate, stiffness, c.speed, c.length_p + c.length_n, index, gas_t)
+    return active, control_model.pressurization_flow_for(
+        stiffness_rate, force, stiffness, c.speed, active, c.length_p, c.length_n, index, gas_t
+    )
+
+
+@helper
+def two_valve_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+    """Openings of one cylinder's two valves for the wanted dF/dt and dK/dt.
 
     Where a valve saturates, both rates fall short: neither has priority (the paper's law).
     """
-    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    force = pp * ap - pn * an
-    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
-    active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
-    pressurization = control_model.pressurization_flow_for(
-        stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
-    )
-    flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
-    flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
-    fill_p, drain_p = driving_flows(pp, p)
-    fill_n, drain_n = driving_flows(pn, p)
-    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
-    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    active, pressurization = _flows_for(rate, stiffness_rate, c, p)
+    flow_p = control_model.chamber_flow_p(active, pressurization, c.length_p, c.length_n)
+    flow_n = control_model.chamber_flow_n(active, pressurization, c.length_p, c.length_n)
+    fill_p, drain_p = driving_flows(c.pp, p)
+    fill_n, drain_n = driving_flows(c.pn, p)
+    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
 
 
 @helper
-def one_valve_openings(
-    u: Array, i: int, row: int, rate: float, pp: float, pn: float, ap: float, an: float, length_p: float, length_n: float,
-    v: float, p: Array,
-) -> None:  # fmt: skip
-    """Writes the openings of one cylinder's single 5/3 valve for the wanted dF/dt: chamber N gets minus those of chamber P.
+def one_valve_openings(rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+    """Openings of one cylinder's single 5/3 valve for the wanted dF/dt: chamber N gets minus that of chamber P.
 
     The pneumatic stiffness is left to itself.
     """
-    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    stroke = length_p + length_n
-    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
-    active = control_model.active_flow_for(rate, stiffness, v, stroke, index, gas_t)
-    fill_p, drain_p = driving_flows(pp, p)
-    fill_n, drain_n = driving_flows(pn, p)
+    stroke = c.length_p + c.length_n
+    active = control_model.active_flow_for(
+        rate, stiffness_of(c, p), c.speed, stroke, p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+    )  # fmt: skip
+    fill_p, drain_p = driving_flows(c.pp, p)
+    fill_n, drain_n = driving_flows(c.pn, p)
     opened = valves.opening_for_active_flow(
-        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / length_p, 0.5 * stroke / length_n, p[at.CONDUCTANCE],
+        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / c.length_p, 0.5 * stroke / c.length_n, p[at.CONDUCTANCE],
         p[at.LEAKAGE],
     )  # fmt: skip
-    u[row, i], u[row + 1, i] = opened, -opened
+    return opened, -opened
 
 
 @helper
-def force_first_openings(
-    u: Array, i: int, row: int, rate: float, stiffness_rate: float, pp: float, pn: float, ap: float, an: float,
-    length_p: float, length_n: float, v: float, p: Array,
-) -> None:  # fmt: skip
+def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
     """As ``two_valve_openings``, but where a valve saturates the pneumatic stiffness gives way to the force.
 
     The pressurisation flow is moved to the nearest at which both chambers still get what the active flow asks of them;
     where none is, the active flow comes as near as both valves allow.
     """
-    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    force = pp * ap - pn * an
-    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, index)
-    active = control_model.active_flow_for(rate, stiffness, v, length_p + length_n, index, gas_t)
-    pressurization = control_model.pressurization_flow_for(
-        stiffness_rate, force, stiffness, v, active, length_p, length_n, index, gas_t
-    )
-    fill_p, drain_p = driving_flows(pp, p)
-    fill_n, drain_n = driving_flows(pn, p)
-    c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
-    to_p, to_n = (length_p + length_n) / length_p, (length_p + length_n) / length_n
+    active, pressurization = _flows_for(rate, stiffness_rate, c, p)
+    fill_p, drain_p = driving_flows(c.pp, p)
+    fill_n, drain_n = driving_flows(c.pn, p)
+    full, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
+    to_p, to_n = (c.length_p + c.length_n) / c.length_p, (c.length_p + c.length_n) / c.length_n
     # Bounds of qT + qA and of qT - qA from what each chamber can get; a valve without driving pressure stays shut.
     shut_p, shut_n = leak * (fill_p - drain_p), leak * (fill_n - drain_n)
-    most_p, least_p = to_p * (shut_p + c * max(fill_p, 0.0)), to_p * (shut_p - c * max(drain_p, 0.0))
-    most_n, least_n = to_n * (shut_n + c * max(fill_n, 0.0)), to_n * (shut_n - c * max(drain_n, 0.0))
+    most_p, least_p = to_p * (shut_p + full * max(fill_p, 0.0)), to_p * (shut_p - full * max(drain_p, 0.0))
+    most_n, least_n = to_n * (shut_n + full * max(fill_n, 0.0)), to_n * (shut_n - full * max(drain_n, 0.0))
     low, high = max(least_p - active, least_n + active), min(most_p - active, most_n + active)
     middle = 0.5 * (low + high)
     pressurization = max(low, min(high, pressurization)) if low < high else middle
-    flow_p = control_model.chamber_flow_p(active, pressurization, length_p, length_n)
-    flow_n = control_model.chamber_flow_n(active, pressurization, length_p, length_n)
-    u[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, c, leak)
-    u[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, c, leak)
+    flow_p = control_model.chamber_flow_p(active, pressurization, c.length_p, c.length_n)
+    flow_n = control_model.chamber_flow_n(active, pressurization, c.length_p, c.length_n)
+    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, full, leak)
+    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, full, leak)
 
 
 @kernel

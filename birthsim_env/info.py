@@ -71,12 +71,10 @@ def describe(world: World, seen: Signals, info: Info, n: int) -> None:
         info.pneumatic_stiffness[1, i] = control_model.pneumatic_stiffness(
             state[at.PP2, i], state[at.PN2, i], p[at.AREA_P2, i], p[at.AREA_N2, i], half2 + y2, half2 - y2, p[at.INDEX, i]
         )
-        info.supply_flow[i] = (
-            max(dynamics.flows_of(state, p, i, at.PP1, at.TP1, at.S1P)[0], 0.0)
-            + max(dynamics.flows_of(state, p, i, at.PN1, at.TN1, at.S1N)[0], 0.0)
-            + max(dynamics.flows_of(state, p, i, at.PP2, at.TP2, at.S2P)[0], 0.0)
-            + max(dynamics.flows_of(state, p, i, at.PN2, at.TN2, at.S2N)[0], 0.0)
-        )
+        info.supply_flow[i] = 0.0
+        for k in range(4):
+            inflow, _ = dynamics.flows_of(state, p, i, at.PRESSURES[k], at.TEMPERATURES[k], at.SPOOLS[k])
+            info.supply_flow[i] += max(inflow, 0.0)
 
 
 _PLACES = {name: group.first if group.single else group.place for name, group in Info.groups.items()}

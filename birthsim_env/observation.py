@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Measurement, Reference, compliance
+from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, compliance
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
@@ -51,19 +51,8 @@ class Observation(Rows):
     target_acceleration = rows("x y", "m/s2", "target acceleration {}")
 
 
-SCALES = np.array(
-    [
-        *[0.01] * 2,
-        *[0.2] * 2,
-        *[1.0] * 2,
-        *[200.0] * 2,
-        *[5000.0, 2500.0] * 2,
-        *[5000.0] * 2,
-        *[50.0] * 2,
-        *[0.2] * 2,
-        *[0.5] * 2,
-    ]
-)
+_PAIRS = (0.01, 0.01), (0.2, 0.2), (1.0, 1.0), (200.0, 200.0), (5000.0, 2500.0), (5000.0, 2500.0)
+SCALES = np.array((*_PAIRS, (5000.0, 5000.0), (50.0, 50.0), (0.2, 0.2), (0.5, 0.5))).ravel()
 ENTRIES = tuple(
     Entry(about.format(name), unit, scale) for (name, unit, about, _), scale in zip(Observation.entries(), SCALES, strict=True)
 )
@@ -73,12 +62,13 @@ SIZE = len(ENTRIES)
 @helper
 def look(seen: Signals, action: Array, shown: Array, p: Array, scales: Array, out: NDArray[np.float32], n: int) -> None:
     """Writes observations of n lanes, ``out`` (N, SIZE + M + S), see ``observe``; then ``action`` (M, N), ``shown`` (S, N)."""
-    motion, joints, own, reference = scratch(4), scratch(4), Observation(scratch(Observation.size)[:, 0]), seen.reference
+    point, joints, reference = Point(scratch(Point.size)), Joints(scratch(Joints.size)), seen.reference
+    own = Observation(scratch(Observation.size)[:, 0])
     for i in range(n):
         for axis in range(2):
-            motion[axis, 0], motion[2 + axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
-        piston_motion(motion, p, joints, 1)
-        y1, y2 = joints[0, 0], joints[1, 0]
+            point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
+        piston_motion(point.rows, p, joints.rows, 1)
+        y1, y2 = joints.position[0, 0], joints.position[1, 0]
         pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
         half1, half2 = p[at.HALF_L1], p[at.HALF_L2]
         edge1, edge2 = 0.02 * half1, 0.02 * half2

@@ -108,10 +108,11 @@ def assess(
             turned += abs(action[k, i] - last_action[k, i])
             effort += action[k, i] * action[k, i]
         inside = True
+        (least_p, most_p), (least_t, most_t) = PRESSURE_RANGE, TEMPERATURE_RANGE
         for k in (at.PP1, at.PN1, at.PP2, at.PN2):
-            inside = inside and PRESSURE_RANGE[0] < state[k, i] < PRESSURE_RANGE[1]
+            inside = inside and least_p < state[k, i] < most_p
         for k in (at.TP1, at.TN1, at.TP2, at.TN2):
-            inside = inside and TEMPERATURE_RANGE[0] < state[k, i] < TEMPERATURE_RANGE[1]
+            inside = inside and least_t < state[k, i] < most_t
         inside = inside and math.isfinite(state[at.Y1, i] + state[at.Y2, i])
         failed[i] = 1.0 if not inside or max(world.impact[0, i], world.impact[1, i]) > limits.impact_speed else 0.0
         terms.survive[i] = steps

@@ -42,7 +42,7 @@ class ResidualController(ResidualLaw):
     also be any ``PolicyFunction``. Then ``settings`` say what it may do; a folder has its own settings.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = ()
+    COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.signals import Mask
-from birthsim_env.loop.stage import described, singles, table1
+from birthsim_env.loop.stage import described, singles, singles1, table1
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -29,6 +29,9 @@ CLIP = 10.0
 
 EPSILON = 1e-8
 
+
+ONE, OTHER, ENTERS, HOLDS = range(4)
+"""What stands in ``PolicyNetwork.room``: activations of two layers in turns, and what enters a memory and what it holds."""
 
 Layer = tuple[Weights, Weights]
 """Weight (out, in) and bias (out,)."""
@@ -105,9 +108,9 @@ class PolicyNetwork:
 
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
-        """What ``answer`` reads: means and standard deviations (D,), then weight (in, out) and bias (1, out) of each layer,
+        """What ``answer`` reads: means and standard deviations (D,), then weight (in, out) and bias (out,) of each layer,
         those of the memory last."""
-        layers = (array for weight, bias in self.transposed for array in (weight, bias[None].copy()))
+        layers = (array for weight, bias in self.transposed for array in (weight, bias.copy()))
         return self.mean, np.sqrt(self.variance + EPSILON), *layers
 
     def room(self, lanes: int) -> Array:
@@ -197,30 +200,32 @@ def answer(
     """Writes ``actions`` (N, outputs) for observations (N, inputs); ``space`` is ``PolicyNetwork.room``, and the memory ``own``
     (N, cells) goes on. ``tables`` is the address of the description of ``PolicyNetwork.tables``."""
     mean, deviation, last, cells = table1(tables, 0), table1(tables, 1), layers - 1, own.shape[1]
+    x, y = space[ONE], space[OTHER]
     for i in range(observed.shape[0]):
         for k in range(mean.shape[0]):
-            space[0, i, k] = min(max((observed[i, k] - mean[k]) / deviation[k], -CLIP), CLIP)
+            x[i, k] = min(max((observed[i, k] - mean[k]) / deviation[k], -CLIP), CLIP)
     for k in range(last):
-        _through(tables, k, True, space[k % 2], space[(k + 1) % 2])
+        _through(tables, k, True, x, y)
+        x, y = y, x
     if cells > 0:
-        enters = space[last % 2]
-        _through(tables, layers, False, enters, space[2])
-        _through(tables, layers + 1, False, own, space[3])
-        remember(space[2], space[3], own)
+        enters, holds = space[ENTERS], space[HOLDS]
+        _through(tables, layers, False, x, enters)
+        _through(tables, layers + 1, False, own, holds)
+        remember(enters, holds, own)
         width = singles(tables, 2 + 2 * layers).shape[0]
         for i in range(own.shape[0]):
             for k in range(cells):
-                enters[i, width + k] = own[i, k]
-    _through(tables, last, squashed, space[last % 2], space[layers % 2])
+                x[i, width + k] = own[i, k]
+    _through(tables, last, squashed, x, y)
     for i in range(actions.shape[0]):
         for k in range(actions.shape[1]):
-            actions[i, k] = np.float32(min(max(space[layers % 2, i, k], -1.0), 1.0))
+            actions[i, k] = np.float32(min(max(y[i, k], -1.0), 1.0))
 
 
 @helper
 def _through(tables: int, k: int, squashed: bool, x: Array, y: Array) -> None:
     """The first numbers of ``x`` (N, W), through the ``k``-th layer of the tables, become the first of ``y`` (N, W)."""
-    weight, bias = singles(tables, 2 + 2 * k), singles(tables, 3 + 2 * k)[0]
+    weight, bias = singles(tables, 2 + 2 * k), singles1(tables, 3 + 2 * k)
     layer(x[:, : weight.shape[0]], weight, bias, squashed, y[:, : weight.shape[1]])
 
 

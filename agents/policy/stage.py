@@ -36,7 +36,7 @@ class Memory(Rows):
     cells = rows(0, "1", "the policy's own memory")
 
 
-TOLD = 2
+FIRST_TABLE = 2
 """Tables: observations (N, D), ``PolicyNetwork.room``, and from here on ``PolicyNetwork.tables``."""
 
 
@@ -53,7 +53,7 @@ def decide(world: int, seen: Seen, memory: int, about: About, tables: int, lane:
     size, shown, mine = int(about.actions), int(about.shown), slice(lane, lane + n)
     observed, space = singles(tables, 0)[mine], table3(tables, 1)[:, mine]
     look(seen, seen.action[:size], seen.shown[:shown], about.rig, about.scales, observed, n)
-    network, actions = tables + TOLD * TABLE * 8, seen.action[:size, :n].T
+    network, actions = tables + FIRST_TABLE * TABLE * 8, seen.action[:size, :n].T
     answer(network, int(about.layers), about.squashed > 0.0, observed, space, kept.cells[:, :n].T, actions)
     return 0
 

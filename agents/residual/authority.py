@@ -14,8 +14,7 @@ from __future__ import annotations
 from baselines.admittance.law import sustained
 from baselines.admittance.rows import HalfWave
 from baselines.backstepping.cartesian_law import across, along
-from baselines.estimation.rows import Joints
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at

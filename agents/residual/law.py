@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from agents.residual import authority, unexplained
-from agents.residual.settings import IMPEDANCES, NO_LAW, VALVES, ResidualSettings
+from agents.residual.settings import NO_LAW, ResidualSettings
 from baselines.estimation import disturbance_observer, observers
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import CompiledDriving, LawStage, StagedController
 from birthsim_env.loop.rows import ACTION, POSITION, SHOWN, Seen
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.signals import REFERENCES, Joints, Mask, Measurement, Point, Reference
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
@@ -93,6 +93,14 @@ class Correction(Rows):
     damping_factor = row("1", "factor of the damping; 0: the law's own")
 
 
+class Action(Rows):
+    """What the entries of an action say to a law; shorter ones lack the last."""
+
+    force = rows("1 2", "1", "force along a cylinder, in units of the authority")
+    powers = rows("x y", "1", "power of ``STIFFENING`` of the stiffness")
+    damping = row("1", "power of ``MOST_DAMPING`` of the damping")
+
+
 class Constants(Numbers):
     """Of the stage."""
 
@@ -113,7 +121,7 @@ class Constants(Numbers):
 class Memory(Rows):
     """What the stage remembers."""
 
-    smooth = rows(max(VALVES, *IMPEDANCES.values()), "1", "smoothed action")
+    smooth = part(Action, "smoothed action; without a law the openings of its first four rows")
     limiter = part(authority.Limiter, "authority")
     moved = part(unexplained.Moved, "which ways pistons have moved")
     unexplained = part(unexplained.Forces, "unexplained forces")
@@ -138,18 +146,18 @@ def stiffen(force: Array, powers: Array, asked: Reference) -> None:
 
 
 @helper
-def _correct(action: Array, left: Array, about: Constants, smooth: Array, said: Correction) -> None:
+def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth: Action, said: Correction) -> None:
     """Writes what actions (size, N) say; ``smooth`` goes on by one period towards them."""
-    size, most = action.shape[0], about.authority
+    size, most, left = action.shape[0], about.authority, limiter.left
     for i in range(action.shape[1]):
         for k in range(2):
             strength = most * left[k, i]
-            said.force[k, i] = strength * smooth[k, i]
-            said.rate[k, i] = strength / about.time_constant * (action[k, i] - smooth[k, i])
-            said.powers[k, i] = max(smooth[2 + k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
-        said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth[4, i], 0.0)) if size > 4 else 0.0
+            said.force[k, i] = strength * smooth.force[k, i]
+            said.rate[k, i] = strength / about.time_constant * (action[k, i] - smooth.force[k, i])
+            said.powers[k, i] = max(smooth.powers[k, i], 0.0) * min(left[0, i], left[1, i]) if size > 2 else 0.0
+        said.damping_factor[i] = exact.exp2(_DAMPING_DOUBLINGS * max(smooth.damping[i], 0.0)) if size > 4 else 0.0
         for k in range(size):
-            smooth[k, i] += about.quickness * (action[k, i] - smooth[k, i])
+            smooth.rows[k, i] += about.quickness * (action[k, i] - smooth.rows[k, i])
 
 
 @helper
@@ -179,12 +187,12 @@ def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, l
     unexplained.remember(joints, own.pistons.disturbance, belief.rig, belief.period, own.moved, own.unexplained)
     limiter, action, shown, asked, target = own.limiter, signals.action[:size], signals.shown, signals.asked, signals.reference
     authority.limit_authority(joints, target, belief.rig, belief.period, about.level, limiter)
-    _correct(action, limiter.left, about, own.smooth, said)
+    _correct(action, limiter, about, own.smooth, said)
     for i in range(n):
         for k in range(Reference.size):
             asked.rows[k, i] = target.rows[k, i]
         for k in range(size):
-            shown[k, i] = own.smooth[k, i]
+            shown[k, i] = own.smooth.rows[k, i]
         for k in range(2):
             signals.feedforward.force[k, i], signals.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
             said.powers[k, i] = said.powers[k, i] - limiter.softness[i]

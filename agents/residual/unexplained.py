@@ -6,7 +6,7 @@ turns. What was met when the piston last moved out and in tells weight and frict
 
 from __future__ import annotations
 
-from baselines.estimation.rows import Joints
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at

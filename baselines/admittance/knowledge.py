@@ -27,8 +27,8 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.rows import Point
 from birthsim_env.loop.rows import POSITION, Seen
+from birthsim_env.loop.signals import Point
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -49,7 +49,7 @@ def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         for k in range(2):
             hand[k, i] = seen.user_force[k, i] if about.force_sensor > 0.0 else memory.hand.force[k, i]
     if about.learns_noise > 0.0:
-        tracker_noise.observe(memory.tracker, seen.position, seen.position_time, about.belief.noise, memory.fresh)
+        tracker_noise.observe(memory.tracker, seen, about.belief.noise, memory.fresh)
         for i in range(lanes):
             noise[i] = math.sqrt(memory.tracker.variance[i])
     if about.most_bias > 0.0:
@@ -85,10 +85,10 @@ def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         point = Point(seen.rows[place : place + Point.size])
         disturbance_observer.observe(pistons, point, memory.chambers.pressure, given, belief, joints)
     for i in range(lanes):
-        kappa = geometry.pose(
+        _, _, _, _, _, kappa, _, _ = geometry.pose(
             joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
             p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
-        )[5]  # fmt: skip
+        )  # fmt: skip
         for k in range(2):
             found = (p[at.MASS] * kappa * kappa if k == 0 else p[at.MASS]) * pistons.disturbance[k, i]
             known.unexplained[k, i] = given.believed[k, i] + found

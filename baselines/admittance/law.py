@@ -19,8 +19,8 @@ from __future__ import annotations
 from baselines.admittance.rows import Gains, HalfWave, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates, pressure_openings
 from baselines.estimation.rows import Belief
+from baselines.valve_inverse import air_at
 from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -95,7 +95,7 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
     """Writes the openings to ``seen`` and carries ``memory.follower`` on by one period."""
     p, period, motion, hand, asked = about.rig, about.period, known.motion, known.given.force, seen.asked
     feedforward, joints, pressure, follower = seen.feedforward, memory.joints, memory.chambers.pressure, memory.follower
-    u, kept, rest, c4 = scratch(4), exact.exp(-period / p[at.TAU]), memory.pistons.rest, gains.pneumatic_gain
+    kept, rest, c4 = exact.exp(-period / p[at.TAU]), memory.pistons.rest, gains.pneumatic_gain
     for i in range(memory.fresh.shape[0]):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
         pp1, pn1, pp2, pn2 = pressure[0, i], pressure[1, i], pressure[2, i], pressure[3, i]
@@ -129,20 +129,15 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         et, en = max(-MOST_ERROR, min(MOST_ERROR, et)), max(-MOST_ERROR, min(MOST_ERROR, en))
         jerk_t = across(jx, jy, sine, cosine) - jerk_for(at_, dt, et, fraction_t * c)
         jerk_n = along(jx, jy, sine, cosine) - jerk_for(an_, dn, en, fraction_n * c)
-        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         rate1 += p[at.FV1] * mechanics.acceleration1(
             load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity
         )  # fmt: skip
         rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
         rate1, rate2 = rate1 - feedforward.rate[0, i], rate2 - feedforward.rate[1, i]
         stiffness, stiffness_rate = asked.pneumatic_stiffness, asked.pneumatic_stiffness_rate
-        pressure_openings(
-            u, 0, 0, rate1, stiffness[0, i], stiffness_rate[0, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1],
-            p[at.HALF_L1], y1, v1, p,
-        )  # fmt: skip
-        pressure_openings(
-            u, 0, 2, rate2, stiffness[1, i], stiffness_rate[1, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2],
-            p[at.HALF_L2], y2, v2, p,
-        )  # fmt: skip
-        for valve in range(4):
-            seen.opening[valve, i] = lead(u[valve, 0], memory.chambers.spool[valve, i], kept, gains.quickness)
+        first, second = air_at(0, pp1, pn1, y1, v1, p), air_at(1, pp2, pn2, y2, v2, p)
+        p1, n1 = pressure_openings(rate1, stiffness[0, i], stiffness_rate[0, i], c4, first, p)
+        p2, n2 = pressure_openings(rate2, stiffness[1, i], stiffness_rate[1, i], c4, second, p)
+        for valve, wanted in ((0, p1), (1, n1), (2, p2), (3, n2)):
+            seen.opening[valve, i] = lead(wanted, memory.chambers.spool[valve, i], kept, gains.quickness)

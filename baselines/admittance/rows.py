@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from baselines.estimation.admittance import Compliance, Offset
+from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.rows import Belief, Given, Joints, Motion, Pistons
+from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
+from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
@@ -37,7 +38,7 @@ class Memory(Rows):
     """What the law remembers."""
 
     fresh = row("1", "1 at a new start")
-    offset = part(Offset, "motion from the target")
+    offset = part(Point, "motion from the target; zero at a new start")
     bristle = rows("z1 z2", "m", "deflection along the motion")
     chambers = part(Chambers, "valves and chambers")
     joints = part(Joints, "pistons a period ago")

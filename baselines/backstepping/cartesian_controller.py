@@ -26,7 +26,7 @@ class CartesianBackstepping(StagedController):
     Arguments as in ``BacksteppingController``. Raises ``ValueError`` for those that are not positive.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = ()
+    COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,

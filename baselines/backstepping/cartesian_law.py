@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
-from baselines.estimation.rows import Joints
 from baselines.estimation.stages import Estimate
-from baselines.valve_inverse import force_first_openings
+from baselines.valve_inverse import CylinderAir, air_at, force_first_openings, stiffness_of
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.loop.signals import Joints
+from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
@@ -46,27 +46,21 @@ def cartesian(t: float, n: float, sine: float, cosine: float) -> tuple[float, fl
 
 @helper
 def load_rates(
-    load1: float, load2: float, growth: float, turn: float, kappa: float, mass: float, jerk_t: float, jerk_n: float
+    load1: float, load2: float, growth: float, turn: float, kappa: float, rate_t: float, rate_n: float
 ) -> tuple[float, float]:
-    """L' of both pistons, N/s, for a jerk (m/s3) across and along cylinder 2; ``growth`` kappa'/kappa, ``turn`` theta1'."""
+    """L' of both pistons, N/s, for mass times jerk, N/s, across and along cylinder 2; growth: kappa'/kappa, turn: theta1'."""
     force_t, force_n = -load1 / kappa, load2
-    rate1 = kappa * (turn * force_n - growth * force_t - mass * jerk_t)
-    rate2 = turn * force_t + mass * jerk_n
+    rate1 = kappa * (turn * force_n - growth * force_t - rate_t)
+    rate2 = turn * force_t + rate_n
     return rate1, rate2
 
 
 @helper
 def pressure_openings(
-    u: Array, i: int, row: int, rate: float, wanted: float, wanted_rate: float, c4: float, pp: float, pn: float, ap: float,
-    an: float, half_stroke: float, y: float, v: float, p: Array,
-) -> None:  # fmt: skip
+    rate: float, wanted: float, wanted_rate: float, c4: float, cylinder: CylinderAir, p: Array
+) -> tuple[float, float]:  # fmt: skip
     """Openings of one cylinder for dF/dt = ``rate`` while its pneumatic stiffness (9) tends to ``wanted`` at c4."""
-    # Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning.
-    length_p, length_n = max(half_stroke + y, 0.002), max(half_stroke - y, 0.002)
-    stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, length_p, length_n, p[at.INDEX])
-    force_first_openings(
-        u, i, row, rate, wanted_rate - c4 * (stiffness - wanted), pp, pn, ap, an, length_p, length_n, v, p
-    )  # fmt: skip
+    return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(cylinder, p) - wanted), cylinder, p)
 
 
 class Constants(Numbers):
@@ -81,7 +75,7 @@ class Constants(Numbers):
 @helper
 def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
     """Writes the openings of n lanes."""
-    p, c4, width, target, u = about.rig, about.pneumatic_gain, about.sign_width, seen.asked, seen.opening
+    p, c4, width, target, opening = about.rig, about.pneumatic_gain, about.sign_width, seen.asked, seen.opening
     for i in range(n):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
         pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
@@ -112,19 +106,14 @@ def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
         jy = target.jerk[1, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
         jerk_t, jerk_n = across(jx, jy, sine, cosine) + drag_t, along(jx, jy, sine, cosine) + drag_n
 
-        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m, jerk_t, jerk_n)
+        rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
         rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
         rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
         stiffness, stiffness_rate = target.pneumatic_stiffness, target.pneumatic_stiffness_rate
-        pressure_openings(
-            u, i, 0, rate1, stiffness[0, i], stiffness_rate[0, i], c4, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1],
-            p[at.HALF_L1], y1, v1, p,
-        )  # fmt: skip
-        pressure_openings(
-            u, i, 2, rate2, stiffness[1, i], stiffness_rate[1, i], c4, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2],
-            p[at.HALF_L2], y2, v2, p,
-        )  # fmt: skip
+        first, second = air_at(0, pp1, pn1, y1, v1, p), air_at(1, pp2, pn2, y2, v2, p)
+        opening[0, i], opening[1, i] = pressure_openings(rate1, stiffness[0, i], stiffness_rate[0, i], c4, first, p)
+        opening[2, i], opening[3, i] = pressure_openings(rate2, stiffness[1, i], stiffness_rate[1, i], c4, second, p)
 
 
 @kernel

@@ -14,12 +14,11 @@ from baselines.backstepping.impedance import paper_impedance
 from baselines.backstepping.stiffest import require_softer, stiffness_range
 from baselines.controller import check_flags
 from baselines.estimation.observers import measured_joints
-from baselines.estimation.rows import Joints
 from baselines.estimation.stages import JOINTS, Estimate, pistons
 from baselines.impedance import Impedance
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import ACTION, ASKED, Seen
-from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.signals import Joints, Measurement, Reference
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array

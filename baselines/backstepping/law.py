@@ -16,12 +16,11 @@ import math
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
-from baselines.estimation.rows import Joints
-from baselines.valve_inverse import force_first_openings, one_valve_openings, two_valve_openings
+from baselines.valve_inverse import air_at, force_first_openings, one_valve_openings, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
-from birthsim_env.physics import control_model, geometry, mechanics
+from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -71,6 +70,12 @@ class Intent(Rows):
     force = rows("F1 F2", "N", "F*")
 
 
+class Openings(Rows):
+    """Of the valves."""
+
+    opening = rows("P1 N1 P2 N2", "1", "commanded opening, -1 to 1")
+
+
 class Terms(Rows):
     """What the law works out at one instant."""
 
@@ -83,10 +88,6 @@ class Terms(Rows):
 
 LEAST_FACTOR = 1.01
 """Damping relative to equal gains. Below this ratio equal gains are used, since other positive gains may not exist."""
-
-CLEARANCE = 0.002
-"""m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no
-meaning."""
 
 STEP = 1e-4
 """s; half the distance of the central difference that gives the rates of the gains, exact to 1e-7 of them."""
@@ -116,16 +117,6 @@ def outer_acceleration(y: float, v: float, yd: float, vd: float, ad: float, c1: 
 def outer_jerk(v: float, a: float, vd: float, ad: float, jd: float, c1: float, c2: float) -> float:
     """dA/dt along the model's acceleration ``a``, m/s3."""
     return jd - c1 * (a - ad) - (v - vd) - c2 * (a - ad + c1 * (v - vd))
-
-
-@helper
-def force_rate_command(
-    rate: float, force: float, wanted: float, y: float, v: float, yd: float, vd: float, c1: float, c3: float,
-    apparent_mass: float,
-) -> float:  # fmt: skip
-    """dF/dt = dF*/dt - z2/g - c3 z3, N/s."""
-    z2 = v - vd + c1 * (y - yd)
-    return rate - apparent_mass * z2 - c3 * (force - wanted)
 
 
 @helper
@@ -203,12 +194,6 @@ def choose_gains(joints: Joints, target: Reference, factor: Array, p: Array, rat
 
 
 @helper
-def chamber_lengths(y: float, half: float) -> tuple[float, float]:
-    """Lp and Ln (m) of a cylinder with strokes of +-``half`` at ``y``, for (9) and (10)."""
-    return max(half + y, CLEARANCE), max(half - y, CLEARANCE)
-
-
-@helper
 def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n: int) -> None:
     """Writes what the law wants of n lanes, with the reference and the gains of ``terms``."""
     c4, width, compensate, sliding = options.pneumatic_gain, options.sign_width, options.weight, options.coulomb_rate
@@ -252,9 +237,8 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
         )
         # F* takes off what is believed, and dF*/dt its rate.
         star1_rate -= believed.rate[0, i]
-        intent.force_rate[0, i] = force_rate_command(
-            star1_rate, net1, star1, y1, v1, yd1, vd1, gains.c1[0, i], gains.c3[0, i], mass1
-        )
+        z2 = v1 - vd1 + gains.c1[0, i] * (y1 - yd1)
+        intent.force_rate[0, i] = star1_rate - mass1 * z2 - gains.c3[0, i] * (net1 - star1)
 
         accel2 = outer_acceleration(y2, v2, yd2, vd2, ad2, gains.c1[1, i], gains.c2[1, i])
         jerk2 = outer_jerk(v2, a2, vd2, ad2, wanted.jerk[1, i], gains.c1[1, i], gains.c2[1, i])
@@ -265,53 +249,47 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
             m * (jerk2 - compensate * neglected_rate) + (sliding * p[at.FC2] * smooth_sign_slope(v2, width) + p[at.FV2]) * a2
         )
         star2_rate -= believed.rate[1, i]
-        intent.force_rate[1, i] = force_rate_command(
-            star2_rate, net2, star2, y2, v2, yd2, vd2, gains.c1[1, i], gains.c3[1, i], m
-        )
+        z2 = v2 - vd2 + gains.c1[1, i] * (y2 - yd2)
+        intent.force_rate[1, i] = star2_rate - m * z2 - gains.c3[1, i] * (net2 - star2)
 
-        lp1, ln1 = chamber_lengths(y1, p[at.HALF_L1])
-        lp2, ln2 = chamber_lengths(y2, p[at.HALF_L2])
-        kp1 = control_model.pneumatic_stiffness(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, p[at.INDEX])
-        kp2 = control_model.pneumatic_stiffness(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, p[at.INDEX])
+        kp1 = stiffness_of(air_at(0, pp1, pn1, y1, v1, p), p)
+        kp2 = stiffness_of(air_at(1, pp2, pn2, y2, v2, p), p)
         intent.stiffness_rate[0, i] = target.pneumatic_stiffness_rate[0, i] - c4 * (kp1 - target.pneumatic_stiffness[0, i])
         intent.stiffness_rate[1, i] = target.pneumatic_stiffness_rate[1, i] - c4 * (kp2 - target.pneumatic_stiffness[1, i])
         intent.force[0, i], intent.force[1, i] = star1, star2
 
 
 @helper
-def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Array, options: Options, u: Array, n: int) -> None:
-    """Writes the openings ``u`` (4, n) for what the law wants."""
-    one_valve, force_first = options.one_valve > 0.0, options.force_first > 0.0
+def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Array, options: Options, openings: Openings, n: int) -> None:
+    """Writes the ``openings`` of n lanes for what the law wants."""
+    opening, one_valve, force_first = openings.opening, options.one_valve > 0.0, options.force_first > 0.0
     for i in range(n):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
+        first = air_at(0, seen.pressure[0, i], seen.pressure[1, i], y1, v1, p)
+        second = air_at(1, seen.pressure[2, i], seen.pressure[3, i], y2, v2, p)
         rate1, rate2 = intent.force_rate[0, i], intent.force_rate[1, i]
         stiff1, stiff2 = intent.stiffness_rate[0, i], intent.stiffness_rate[1, i]
-        lp1, ln1 = chamber_lengths(y1, p[at.HALF_L1])
-        lp2, ln2 = chamber_lengths(y2, p[at.HALF_L2])
         if one_valve:
-            one_valve_openings(u, i, 0, rate1, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
-            one_valve_openings(u, i, 2, rate2, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
+            (p1, n1), (p2, n2) = one_valve_openings(rate1, first, p), one_valve_openings(rate2, second, p)
         elif force_first:
-            force_first_openings(u, i, 0, rate1, stiff1, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
-            force_first_openings(u, i, 2, rate2, stiff2, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
+            (p1, n1), (p2, n2) = force_first_openings(rate1, stiff1, first, p), force_first_openings(rate2, stiff2, second, p)
         else:
-            two_valve_openings(u, i, 0, rate1, stiff1, pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], lp1, ln1, v1, p)
-            two_valve_openings(u, i, 2, rate2, stiff2, pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], lp2, ln2, v2, p)
+            (p1, n1), (p2, n2) = two_valve_openings(rate1, stiff1, first, p), two_valve_openings(rate2, stiff2, second, p)
+        opening[0, i], opening[1, i], opening[2, i], opening[3, i] = p1, n1, p2, n2
 
 
 @helper
 def command(seen: Seen, joints: Joints, p: Array, options: Options, n: int) -> int:
     """Writes the openings of n lanes, at most BLOCK, with a rig's parameters (PARAMETERS,); returns how many have no gains."""
     # Openings of their own, apart from what they follow from: only then LLVM vectorises their loops.
-    terms, u = Terms(scratch(Terms.size)), scratch(4)
+    terms, openings = Terms(scratch(Terms.size)), Openings(scratch(Openings.size))
     piston_reference(seen.asked.rows, p, terms.wanted.rows, n)
     misses = choose_gains(joints, seen.asked, seen.damping_factor, p, options.damping_ratio, terms, n)
     law(seen, joints, terms, p, options, n)
-    openings_for(seen, joints, terms.intent, p, options, u, n)
+    openings_for(seen, joints, terms.intent, p, options, openings, n)
     for valve in range(4):
         for i in range(n):
-            seen.opening[valve, i] = u[valve, i]
+            seen.opening[valve, i] = openings.opening[valve, i]
     return misses
 
 

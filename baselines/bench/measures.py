@@ -16,6 +16,7 @@ from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import compliance
 from birthsim_env.loop.stage import Stage, scratch, table3
+from birthsim_env.outcome import Ends
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.compiled.records import Numbers, number, part, row, rows
@@ -80,10 +81,10 @@ def _see(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
 
 @kernel
 def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane: int, n: int) -> int:
-    terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), scratch(2), seen.reference
-    failed, good = ends[0], ends[1]
+    terms, ends, reference = reward.Terms(scratch(reward.Terms.size)), Ends(scratch(Ends.size)), seen.reference
+    failed = ends.failed
     reward.assess(world, reference, own.owed, own.command, own.last, about.limits, terms, failed, n)
-    success.add(world, reference, failed, own.calm, good, n)
+    success.add(world, reference, failed, own.calm, ends.success, n)
     for i in range(n):
         paid = terms.total[i] if own.alive[i] > 0.0 else 0.0
         for k in range(len(DISCOUNTS)):
@@ -97,7 +98,7 @@ def _pay(world: World, seen: Seen, own: Memory, about: About, tables: int, lane:
                 world.state[k, i] = own.state[k, i]
             for k in range(4):
                 world.motion.rows[k, i] = own.motion[k, i]
-        own.success[i] = good[i] * own.alive[i]
+        own.success[i] = ends.success[i] * own.alive[i]
     return 0
 
 

@@ -9,28 +9,21 @@ K, whatever its own stiffness. The mass is the rig's own, so that the hand feels
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.estimation.rows import Motion, Point
-from birthsim_env.loop.signals import Reference
+from birthsim_env.loop.signals import InPlane, Motion, Point, Reference
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, rows
+from birthsim_env.physics.compiled.records import Numbers, number
 
 DAMPING_RATIO = 0.9
 """assumed: hardly any overshoot, and no slower than the rig needs to be."""
 
 MOVING_SPEED = 1e-3
 """m/s; assumed: a slower reference lets the pistons rest."""
-
-
-class Offset(Rows):
-    """How far the motion is from the target; zero at a new start."""
-
-    position = rows("x y", "m", "from the target")
-    velocity = rows("vx vy", "m/s", "relative to it")
 
 
 class Compliance(Numbers):
@@ -62,26 +55,40 @@ def is_stiffer(kxx: float, kyy: float, kxy: float, least: float) -> bool:
     return kxx > least and (kxx - least) * (kyy - least) - kxy * kxy > 0.0
 
 
+class Spring(NamedTuple):
+    """Stiffness (1/s2) and damping (1/s), all over the mass: entries xx, yy, xy."""
+
+    kxx: float
+    kyy: float
+    kxy: float
+    bxx: float
+    byy: float
+    bxy: float
+
+
 @helper
-def derivatives(
-    offset: Offset, i: int, fx: float, fy: float, kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float
-) -> tuple[float, float, float, float]:
-    """Acceleration and jerk of the offset of lane ``i`` under a held force; all over the mass."""
+def spring_of(asked: Reference, i: int, mass: float, ratio: float) -> Spring:
+    """The spring of lane ``i`` with a damping ``ratio``."""
+    kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
+    bxx, byy, bxy = damping(kxx, kyy, kxy, ratio)
+    return Spring(kxx, kyy, kxy, bxx, byy, bxy)
+
+
+@helper
+def derivatives(offset: Point, i: int, fx: float, fy: float, s: Spring) -> tuple[float, float, float, float]:
+    """Acceleration and jerk of the offset of lane ``i`` under a held force over the mass."""
     # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
     x, y, vx, vy = offset.position[0, i], offset.position[1, i], offset.velocity[0, i], offset.velocity[1, i]
-    ax, ay = fx - bxx * vx - bxy * vy - kxx * x - kxy * y, fy - bxy * vx - byy * vy - kxy * x - kyy * y
-    jx, jy = -bxx * ax - bxy * ay - kxx * vx - kxy * vy, -bxy * ax - byy * ay - kxy * vx - kyy * vy
+    ax, ay = fx - s.bxx * vx - s.bxy * vy - s.kxx * x - s.kxy * y, fy - s.bxy * vx - s.byy * vy - s.kxy * x - s.kyy * y
+    jx, jy = -s.bxx * ax - s.bxy * ay - s.kxx * vx - s.kxy * vy, -s.bxy * ax - s.byy * ay - s.kxy * vx - s.kyy * vy
     return ax, ay, jx, jy
 
 
 @helper
-def advance(
-    offset: Offset, i: int, period: float, ax: float, ay: float, jx: float, jy: float,
-    kxx: float, kyy: float, kxy: float, bxx: float, byy: float, bxy: float,
-) -> None:  # fmt: skip
-    """Carries the offset of lane ``i`` on by one period."""
-    vx, vy = offset.velocity[0, i], offset.velocity[1, i]
-    sx, sy = -bxx * jx - bxy * jy - kxx * ax - kxy * ay, -bxy * jx - byy * jy - kxy * ax - kyy * ay
+def advance(offset: Point, i: int, period: float, rates: tuple[float, float, float, float], s: Spring) -> None:
+    """Carries the offset of lane ``i`` on by one period with its ``derivatives``."""
+    (ax, ay, jx, jy), vx, vy = rates, offset.velocity[0, i], offset.velocity[1, i]
+    sx, sy = -s.bxx * jx - s.bxy * jy - s.kxx * ax - s.kxy * ay, -s.bxy * jx - s.byy * jy - s.kxy * ax - s.kyy * ay
     # Taylor's series to the third order: the system is linear and w x period is below 0.06.
     offset.position[0, i] += period * (vx + period * (ax / 2.0 + period * jx / 6.0))
     offset.position[1, i] += period * (vy + period * (ay / 2.0 + period * jy / 6.0))
@@ -90,25 +97,24 @@ def advance(
 
 
 @helper
-def give_way(offset: Offset, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
+def give_way(offset: Point, asked: Reference, force: Array, about: Compliance, factor: Array, motion: Motion) -> int:
     """Writes ``motion`` and carries ``offset`` on by one period; returns how many setpoints are not positive definite.
 
     ``force`` (2, N), N, is the hand's; ``factor`` (N,) multiplies the damping where it is more than 1.
     """
-    missed, mass = 0, about.mass
+    missed, mass, push = 0, about.mass, InPlane(force)
     for i in range(factor.shape[0]):
         stiffer = is_stiffer(asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i], 0.0)
         missed += 0 if stiffer else 1
     for i in range(factor.shape[0]):
-        kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
-        bxx, byy, bxy = damping(kxx, kyy, kxy, about.damping_ratio * max(1.0, factor[i]))
-        ax, ay, jx, jy = derivatives(offset, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
+        spring = spring_of(asked, i, mass, about.damping_ratio * max(1.0, factor[i]))
+        ax, ay, jx, jy = derivatives(offset, i, push.x[i] / mass, push.y[i] / mass, spring)
         for axis in range(2):
             motion.position[axis, i] = asked.position[axis, i] + offset.position[axis, i]
             motion.velocity[axis, i] = asked.velocity[axis, i] + offset.velocity[axis, i]
         motion.acceleration[0, i], motion.acceleration[1, i] = asked.acceleration[0, i] + ax, asked.acceleration[1, i] + ay
         motion.jerk[0, i], motion.jerk[1, i] = asked.jerk[0, i] + jx, asked.jerk[1, i] + jy
-        advance(offset, i, about.period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+        advance(offset, i, about.period, (ax, ay, jx, jy), spring)
     return missed
 
 
@@ -122,22 +128,19 @@ def mark_moving(motion: Motion, moving: Array) -> None:
 
 @kernel
 def forecast(
-    offset: Offset, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
+    offset: Point, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
 ) -> None:  # fmt: skip
     """Writes ``ahead`` (M, 4, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
 
     The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
     from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
     """
-    z, mass, period = Offset(offset.rows.copy()), about.mass, about.period
+    z, mass, period, push = Point(offset.rows.copy()), about.mass, about.period, InPlane(force)
     for i in range(force.shape[1]):
-        kxx, kyy, kxy = asked.stiffness[0, i] / mass, asked.stiffness[1, i] / mass, asked.stiffness_coupling[i] / mass
-        bxx, byy, bxy = damping(kxx, kyy, kxy, about.damping_ratio)
-        tick = 1
+        spring, tick = spring_of(asked, i, mass, about.damping_ratio), 1
         for k in range(len(ticks)):
             while tick < ticks[k]:
-                ax, ay, jx, jy = derivatives(z, i, force[0, i] / mass, force[1, i] / mass, kxx, kyy, kxy, bxx, byy, bxy)
-                advance(z, i, period, ax, ay, jx, jy, kxx, kyy, kxy, bxx, byy, bxy)
+                advance(z, i, period, derivatives(z, i, push.x[i] / mass, push.y[i] / mass, spring), spring)
                 tick += 1
             t, now = tick * period, Point(ahead[k])
             for axis in range(2):

@@ -8,8 +8,8 @@ so that noise is averaged over 1/w without the delay of a filter: only the model
 
 from __future__ import annotations
 
-from baselines.estimation.rows import Joints
 from baselines.valve_inverse import driving_flows
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at

@@ -8,7 +8,8 @@ the compliance error in disguise.
 
 from __future__ import annotations
 
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
+from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -17,22 +18,21 @@ from birthsim_env.physics.inverse_kinematics import piston_motion
 
 
 @helper
-def accelerations(
-    y1: float, y2: float, v1: float, v2: float, i: int, pressures: Array, given: Given, p: Array
-) -> tuple[float, float, float]:
+def accelerations(joints: Joints, i: int, pressures: Array, given: Given, p: Array) -> tuple[float, float, float]:
     """What pressures (4, N) and forces explain of the pistons' accelerations in lane ``i``, m/s2; and kappa."""
+    y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
     r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
         y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
     )
-    force, believed = given.force, given.believed
+    force, believed, air = given.force, given.believed, PerChamber(pressures)
     load1 = (
-        mechanics.piston_force(pressures[0, i], pressures[1, i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
+        mechanics.piston_force(air.p1[i], air.n1[i], p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
         - p[at.FV1] * v1
         + mechanics.user_force1(force[0, i], force[1, i], kappa, sine, cosine)
         + believed[0, i]
     )
     load2 = (
-        mechanics.piston_force(pressures[2, i], pressures[3, i], p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
+        mechanics.piston_force(air.p2[i], air.n2[i], p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
         - p[at.FV2] * v2
         + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
         + believed[1, i]
@@ -50,10 +50,10 @@ def observe(pistons: Pistons, point: Point, pressures: Array, given: Given, abou
     p, period, bandwidth, speed, disturbance = about.rig, about.period, about.bandwidth, pistons.speed, pistons.disturbance
     piston_motion(point.rows, p, joints.rows, pistons.fresh.shape[0])
     for i in range(pistons.fresh.shape[0]):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
+        v1, v2 = joints.speed[0, i], joints.speed[1, i]
         if pistons.fresh[i] > 0.0:
             speed[0, i], speed[1, i], disturbance[0, i], disturbance[1, i], pistons.fresh[i] = v1, v2, 0.0, 0.0, 0.0
-        a1, a2, _ = accelerations(y1, y2, v1, v2, i, pressures, given, p)
+        a1, a2, _ = accelerations(joints, i, pressures, given, p)
         off1, off2 = v1 - speed[0, i], v2 - speed[1, i]
         speed[0, i] += period * (a1 + disturbance[0, i] + 2.0 * bandwidth * off1)
         speed[1, i] += period * (a2 + disturbance[1, i] + 2.0 * bandwidth * off2)

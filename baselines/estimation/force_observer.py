@@ -11,7 +11,7 @@ mass and of the pressure cells.
 from __future__ import annotations
 
 from baselines.estimation import force_bias
-from baselines.estimation.rows import Joints
+from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
@@ -41,7 +41,7 @@ class Hand(Rows):
 @helper
 def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Array, period: float, fresh: Array) -> None:
     """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R."""
-    share = period / (1.0 / QUICKNESS + period)
+    share, left = period / (1.0 / QUICKNESS + period), PerPiston(unexplained)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
             joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
@@ -53,8 +53,8 @@ def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Arra
             moved = joints.position[cylinder, i] - hand.before[cylinder, i]
             bristle = 0.0 if new else max(-most, min(most, hand.bristle[cylinder, i] + moved))
             hand.bristle[cylinder, i], hand.before[cylinder, i] = bristle, joints.position[cylinder, i]
-        f1 = unexplained[0, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[0, i]
-        f2 = unexplained[1, i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[1, i]
+        f1 = left.first[i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[0, i]
+        f2 = left.second[i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[1, i]
         across, along = -f1 / kappa, f2
         x, y = across * cosine + along * sine, across * sine - along * cosine
         hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])

@@ -9,7 +9,8 @@ what the observer found besides, so that it does not depend on what has been lea
 
 from __future__ import annotations
 
-from baselines.estimation.rows import Belief, Joints
+from baselines.estimation.rows import Belief
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array

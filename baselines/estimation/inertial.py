@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.estimation.rows import Point
 from baselines.staged import LawStage
 from birthsim_env.loop.rows import Seen, Signals
+from birthsim_env.loop.signals import Point
 from birthsim_env.loop.stage import block
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel

@@ -21,9 +21,9 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.estimation.disturbance_observer import accelerations
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from birthsim_env.loop.rows import Signals
-from birthsim_env.loop.signals import Measurement
+from birthsim_env.loop.signals import Joints, Measurement, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled import lanes as at
@@ -80,7 +80,7 @@ def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Array, 
     """Carries positions and speeds of lane ``i`` on by one period of the model; returns kappa where it began."""
     position, speed = pistons.position, pistons.speed
     y1, y2, v1, v2 = position[0, i], position[1, i], speed[0, i], speed[1, i]
-    a1, a2, kappa = accelerations(y1, y2, v1, v2, i, pressures, given, p)
+    a1, a2, kappa = accelerations(pistons, i, pressures, given, p)
     a1, a2 = a1 + pistons.disturbance[0, i], a2 + pistons.disturbance[1, i]
     position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
     position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
@@ -103,12 +103,14 @@ def rest(pistons: Pistons, i: int, moving: float, period: float, held: float) ->
 
 
 @helper
-def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float, about: Belief, explained: Array) -> None:
+def correct(
+    pistons: Pistons, i: int, joints: Joints, sampled: float, age: float, about: Belief, explained: tuple[float, float]
+) -> None:
     """Takes a sample: the pistons stood at the one lane of ``joints`` an ``age`` ago, ``sampled`` s after the last one.
 
-    A low-passed innovation beyond ``explained`` (2, 1), m, ends the rest of that piston.
+    A low-passed innovation beyond what is ``explained`` of each piston, m, ends its rest.
     """
-    past, slot, period = pistons.past, int(pistons.slot[i]), about.period
+    (explained1, explained2), past, slot, period = explained, pistons.past, int(pistons.slot[i]), about.period
     depth, periods = past.shape[0] // 2, age / period
     back = min(int(periods), depth - 2)
     part = min(periods - back, 1.0)
@@ -118,7 +120,7 @@ def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float
         innovation = joints.position[cylinder, 0] - (newer + part * (older - newer))
         pistons.innovation[cylinder, i] += INNOVATION_FRACTION * (innovation - pistons.innovation[cylinder, i])
         resting = pistons.rest[cylinder, i]
-        if abs(pistons.innovation[cylinder, i]) > explained[cylinder, 0]:
+        if abs(pistons.innovation[cylinder, i]) > (explained1 if cylinder == 0 else explained2):
             pistons.reluctance[cylinder, i] *= 1.0 + RELUCTANCE * resting
             pistons.rest[cylinder, i], resting = 0.0, 0.0
         kept = exact.exp(-about.bandwidth * sampled)
@@ -139,7 +141,7 @@ def correct(pistons: Pistons, i: int, joints: Joints, sampled: float, age: float
 def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, about: Belief) -> None:
     """One control period of N lanes, in which positions are samples and pressures (4, N), Pa, are known."""
     p, period, held = about.rig, about.period, exact.exp(-REST_BANDWIDTH * about.period)
-    past, point, joints, explained = pistons.past, Point(scratch(Point.size)), Joints(scratch(Joints.size)), scratch(2)
+    past, point, joints = pistons.past, Point(scratch(Point.size)), Joints(scratch(Joints.size))
     depth = past.shape[0] // 2
     for i in range(signals.time.shape[0]):
         slot = (int(pistons.slot[i]) + 1) % depth
@@ -157,8 +159,8 @@ def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, 
         past[2 * slot, i], past[2 * slot + 1, i] = pistons.position[0, i], pistons.position[1, i]
         if sampled > 0.0:
             piston_motion(point.rows, p, joints.rows, 1)
-            explained[0, 0], explained[1, 0] = STIR * given.noise[i] / kappa, STIR * given.noise[i]
-            correct(pistons, i, joints, sampled, age, about, explained)
+            explained = STIR * given.noise[i]
+            correct(pistons, i, joints, sampled, age, about, (explained / kappa, explained))
 
 
 def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.estimation.rows import Joints, Motion
+from birthsim_env.loop.signals import Joints, Motion
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
 from birthsim_env.physics.compiled import lanes as at
@@ -26,6 +26,15 @@ def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, per
 
 
 @helper
+def _rub(joints: Joints, p: Array, period: float, bristles: Array, drag: Array) -> None:
+    for cylinder in range(2):
+        coulomb, static = (p[at.FC1], p[at.FS1]) if cylinder == 0 else (p[at.FC2], p[at.FS2])
+        for i in range(bristles.shape[1]):
+            z = bristle(bristles[cylinder, i], joints.speed[cylinder, i], coulomb, static, p, period)
+            bristles[cylinder, i], drag[cylinder, i] = z, p[at.BRISTLE_S0] * z
+
+
+@helper
 def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -> None:
     """Carries ``bristles`` (2, N) on by one period of ``motion`` and writes what they hold back, ``drag`` (2, N), N.
 
@@ -33,10 +42,7 @@ def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -
     """
     joints, lanes = Joints(scratch(Joints.size)), bristles.shape[1]
     piston_motion(motion.rows, p, joints.rows, lanes)
-    for i in range(lanes):
-        bristles[0, i] = bristle(bristles[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, period)
-        bristles[1, i] = bristle(bristles[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, period)
-        drag[0, i], drag[1, i] = p[at.BRISTLE_S0] * bristles[0, i], p[at.BRISTLE_S0] * bristles[1, i]
+    _rub(joints, p, period, bristles, drag)
 
 
 @kernel
@@ -47,7 +53,4 @@ def forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array)
     joints = Joints(np.empty((Joints.size, lanes)))
     for k in range(ahead.shape[0]):
         piston_motion(ahead[k], p, joints.rows, lanes)
-        for i in range(lanes):
-            z[0, i] = bristle(z[0, i], joints.speed[0, i], p[at.FC1], p[at.FS1], p, steps[k])
-            z[1, i] = bristle(z[1, i], joints.speed[1, i], p[at.FC2], p[at.FS2], p, steps[k])
-            drag[k, 0, i], drag[k, 1, i] = p[at.BRISTLE_S0] * z[0, i], p[at.BRISTLE_S0] * z[1, i]
+        _rub(joints, p, steps[k], z, drag[k])

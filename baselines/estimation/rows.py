@@ -2,29 +2,9 @@
 
 from __future__ import annotations
 
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
-
-
-class Point(Rows):
-    """Where the end effector is."""
-
-    position = rows("x y", "m", "position")
-    velocity = rows("vx vy", "m/s", "velocity")
-
-
-class Motion(Point):
-    """The motion that the hand should find."""
-
-    acceleration = rows("ax ay", "m/s2", "acceleration")
-    jerk = rows("jx jy", "m/s3", "jerk, without the rate of the force")
-
-
-class Joints(Rows):
-    """Where the pistons are, measured or estimated."""
-
-    position = rows("y1 y2", "m", "position")
-    speed = rows("v1 v2", "m/s", "speed")
 
 
 class Pistons(Joints):

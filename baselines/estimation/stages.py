@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.estimation.admittance import DAMPING_RATIO, Compliance, Offset, give_way, mark_moving
+from baselines.estimation.admittance import DAMPING_RATIO, Compliance, give_way, mark_moving
 from baselines.estimation.observers import belief, fresh_memory, observe
-from baselines.estimation.rows import Belief, Given, Joints, Motion, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.staged import LawStage
 from birthsim_env.loop.rows import HANDED, POSITION, Seen
+from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
@@ -31,11 +32,11 @@ MOTION, MOVING, JOINTS, OWN = (
 
 
 @kernel
-def _comply(world: int, seen: Seen, offset: Offset, about: Compliance, tables: int, lane: int, n: int) -> int:
+def _comply(world: int, seen: Seen, offset: Point, about: Compliance, tables: int, lane: int, n: int) -> int:
     """Writes motion and ``moving``; returns how many stiffness setpoints are not positive definite."""
     s = Seen(seen.rows[:, :n])
     estimate = Estimate(s.handed[: Estimate.size])
-    missed = give_way(Offset(offset.rows[:, :n]), s.asked, s.user_force, about, s.damping_factor, estimate.motion)
+    missed = give_way(Point(offset.rows[:, :n]), s.asked, s.user_force, about, s.damping_factor, estimate.motion)
     mark_moving(estimate.motion, estimate.moving)
     return missed
 
@@ -47,7 +48,7 @@ def compliance(rig: Parameters) -> Array:
 
 def compliant_motion(rig: Parameters) -> LawStage:
     """Turns the measured force into the motion that the hand should find."""
-    return LawStage(_comply, compliance(rig), Offset.lane())
+    return LawStage(_comply, compliance(rig), Point.lane())
 
 
 class Location(Numbers):

@@ -8,6 +8,7 @@ So the samples give s without a model of the rig, wherever the noise comes from.
 
 from __future__ import annotations
 
+from birthsim_env.loop.rows import Signals
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
@@ -34,11 +35,11 @@ class Tracker(Rows):
 
 
 @helper
-def observe(tracker: Tracker, position: Array, position_time: Array, believed: float, fresh: Array) -> None:
+def observe(tracker: Tracker, seen: Signals, believed: float, fresh: Array) -> None:
     """Carries ``tracker`` on by one period. ``believed``, m, is the standard deviation at a new start."""
     older, newest = tracker.older, tracker.newest
-    for i in range(position_time.shape[0]):
-        x, y, t = position[0, i], position[1, i], position_time[i]
+    for i in range(fresh.shape[0]):
+        x, y, t = seen.position[0, i], seen.position[1, i], seen.position_time[i]
         if fresh[i] > 0.0:
             older[0, i], older[1, i], tracker.older_time[i] = x, y, t
             newest[0, i], newest[1, i], tracker.newest_time[i] = x, y, t

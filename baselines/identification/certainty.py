@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from baselines.identification.estimate import Fit
 from birthsim_env.physics.compiled.lanes import Array
 
-TOLD = 0.5
-"""A log tells a parameter where it makes the standard deviation less than this fraction of the owner's spread; assumed."""
+DETERMINED = 0.5
+"""A log determines a parameter where it makes the standard deviation less than this fraction of the owner's spread; assumed."""
 
 NORMAL = 1.959964
 """Standard deviations on either side of a 95 % interval."""
@@ -55,7 +55,7 @@ def certainty_of(fit: Fit) -> Certainty:
     # Singular values of the scaled Jacobian, from those of its inverse square.
     values, vectors = np.linalg.eigh(covariance / np.outer(spread, spread))
     weakest = tuple(_direction(fit, vectors[:, k], float(values[k]) ** 0.5) for k in np.argsort(values)[::-1][:3])
-    return Certainty(noise, windows, deviation, deviation < TOLD * spread, weakest)
+    return Certainty(noise, windows, deviation, deviation < DETERMINED * spread, weakest)
 
 
 def score_products(fit: Fit) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.identification.windows import Windows, admitted_openings, spools_at
+from birthsim_env.loop.world import Clock
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
@@ -35,7 +36,8 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
         states[np.ix_(np.array(at.SPOOLS), lanes)] = spools_at(openings, trial.period, windows.starts, float(rate))[:, None]
     pressures = np.empty((len(rigs), count, windows.length, 4))
     positions = np.empty((len(rigs), count, *windows.positions.shape[1:]))
-    at_once, steps = max(1, LANES // count), steps_in(trial.period)
+    at_once = max(1, LANES // count)
+    clock = Clock(Clock.numbers(period=trial.period, steps=steps_in(trial.period)))
     for first in range(0, len(rigs), at_once):
         part = slice(first, first + at_once)
         moved = states[:, part].reshape(at.STATES, -1)
@@ -43,7 +45,7 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
         tracks = np.empty((windows.length + 1, 6, moved.shape[1]))
         rows = np.tile(windows.starts, some).astype(np.int64)
         parameters = np.repeat(columns[:, part], count, axis=1)
-        _track(moved, openings, trial.forces, rows, parameters, steps, trial.period / steps, tracks)
+        _track(moved, openings, trial.forces, rows, parameters, clock, tracks)
         states[:, part] = moved.reshape(at.STATES, some, count)
         shaped = tracks.reshape(windows.length + 1, 6, some, count)
         pressures[part] = shaped[:-1, :4].transpose(2, 3, 0, 1)
@@ -53,15 +55,14 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
 
 @kernel
 def _track(
-    state: Array, openings: Array, forces: Array, rows: NDArray[np.int64], parameters: Array, steps: int, step: float,
-    tracks: Array,
+    state: Array, openings: Array, forces: Array, rows: NDArray[np.int64], parameters: Array, clock: Clock, tracks: Array
 ) -> None:  # fmt: skip
-    """Moves ``state`` (18, N) by K periods of ``steps`` steps of ``step`` s, under openings (4, T) and forces (2, T) from
+    """Moves ``state`` (18, N) by K periods of a ``clock``, under openings (4, T) and forces (2, T) from
     ``rows`` (N,) on; writes pressures and position of the end effector at every period, ``tracks`` (K + 1, 6, N)."""
     x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
     p, dx, hit = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK)), np.zeros((2, BLOCK))
     total, trial, motion = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK))
-    periods = tracks.shape[0] - 1
+    periods, steps = tracks.shape[0] - 1, int(clock.steps)
     for first in range(0, state.shape[1], BLOCK):
         n = min(BLOCK, state.shape[1] - first)
         load(state, first, n, x)
@@ -71,14 +72,16 @@ def _track(
             for i in range(n):
                 for chamber in range(4):
                     tracks[k, chamber, first + i] = x[at.PRESSURES[chamber], i]
-                tracks[k, 4, first + i], tracks[k, 5, first + i] = motion[0, i], motion[1, i]
+                for axis in range(2):
+                    tracks[k, 4 + axis, first + i] = motion[axis, i]
             if k < periods:
                 for i in range(n):
                     row = rows[first + i] + k
                     for valve in range(4):
                         u[valve, i] = openings[valve, row]
-                    f[0, i], f[1, i] = forces[0, row], forces[1, row]
-                integrate(x, u, f, p, steps, step, hit, dx, total, trial, n)
+                    for axis in range(2):
+                        f[axis, i] = forces[axis, row]
+                integrate(x, u, f, p, steps, clock.period / steps, hit, dx, total, trial, n)
                 settle(x, n)
         store(x, first, n, state)
 

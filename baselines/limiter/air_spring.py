@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from baselines.valve_inverse import openings_for_flows
-from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerPiston, Reference
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -35,14 +35,14 @@ _OUTWARD = np.array([[1.0], [-1.0], [1.0], [-1.0]])
 
 
 @kernel
-def _along(force: Array, pistons: Array, p: Array, along: Array) -> None:
-    for i in range(force.shape[1]):
+def _along(force: InPlane, joints: Joints, p: Array, along: PerPiston) -> None:
+    for i in range(force.x.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            pistons[0, i], pistons[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3],
-            p[at.COS_GAMMA3],
+            joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
+            p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
         )  # fmt: skip
-        along[0, i] = mechanics.user_force1(force[0, i], force[1, i], kappa, sine, cosine)
-        along[1, i] = mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
+        along.first[i] = mechanics.user_force1(force.x[i], force.y[i], kappa, sine, cosine)
+        along.second[i] = mechanics.user_force2(force.x[i], force.y[i], sine, cosine)
 
 
 class AirSpring:
@@ -62,9 +62,9 @@ class AirSpring:
     def openings(self, position: Array, pressures: Array, hand: Array, measurement: Measurement, reference: Reference) -> Array:
         """Spool openings (4, N) at the signals of now; ``position`` (2, N), m, was taken when the ``pressures`` were (4, N),
         Pa, and the ``hand``'s force (2, N), N."""
-        (pistons, here), (_, there) = self._lengths(position), self._lengths(reference.position)
+        (joints, here), (_, there) = self._lengths(position), self._lengths(reference.position)
         forces, along = pressures * self._areas, np.empty_like(hand)
-        _along(np.ascontiguousarray(hand), pistons, self._p, along)
+        _along(InPlane(np.ascontiguousarray(hand)), joints, self._p, PerPiston(along))
         stroke = np.repeat(here[::2] + here[1::2], 2, axis=0)
         balanced = forces + _OUTWARD * np.repeat(along, 2, axis=0) * here / stroke
         self._forces = np.where(np.isnan(self._forces), balanced, self._forces)
@@ -72,8 +72,8 @@ class AirSpring:
         flows = (self._forces * there - forces * here) / (RETURN * self._p[at.GAS] * self._p[at.TEMPERATURE])
         return openings_for_flows(flows, measurement.pressures, self._p)
 
-    def _lengths(self, position: Array) -> tuple[Array, Array]:
-        """Pistons' positions, m, (2, N), and lengths of the chambers, dead volumes included, m, (4, N)."""
-        joints: Array = np.empty((4, position.shape[1]))
-        pistons_at(np.concatenate([position, np.zeros_like(position)]), self._p, joints)
-        return joints[:2], self._middle + _OUTWARD * np.repeat(joints[:2], 2, axis=0)
+    def _lengths(self, position: Array) -> tuple[Joints, Array]:
+        """Pistons, which stand still, and lengths of the chambers, dead volumes included, m, (4, N)."""
+        joints = Joints(np.empty((Joints.size, position.shape[1])))
+        pistons_at(np.concatenate([position, np.zeros_like(position)]), self._p, joints.rows)
+        return joints, self._middle + _OUTWARD * np.repeat(joints.position, 2, axis=0)

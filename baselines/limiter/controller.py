@@ -70,9 +70,9 @@ class PortLimiter:
         self.authority: Array = np.ones(0)
 
     @property
-    def TOLD(self) -> tuple[str, ...]:
+    def COMMAND_OPTIONS(self) -> tuple[str, ...]:
         """What the law's ``command`` takes besides the signals, and this one hands on."""
-        return getattr(self.law, "TOLD", ())
+        return getattr(self.law, "COMMAND_OPTIONS", ())
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """That of the law, which holds where neither limit acts."""
@@ -91,7 +91,8 @@ class PortLimiter:
     def command(self, measurement: Measurement, reference: Reference, **options: Any) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
-        ``options`` are those of the law, see ``TOLD``. Raises what the law raises; ``ValueError`` for openings that are none.
+        ``options`` are those of the law, see ``COMMAND_OPTIONS``. Raises what the law raises; ``ValueError`` for openings
+        that are none.
         """
         if measurement.position.ndim == 1:
             return self.command(*one_lane(measurement, reference), **options)[:, 0]

@@ -15,6 +15,7 @@ from baselines.backstepping.law import Wanted
 from baselines.estimation.stages import Estimate
 from baselines.staged import LawStage
 from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import InPlane
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -54,7 +55,7 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 @helper
 def needed_forces(tracked: Tracked, hand: Array, p: Array, fraction: float, n: int) -> None:
     """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N."""
-    wanted, motion, needed = tracked.wanted, tracked.motion, tracked.needed
+    wanted, motion, needed, push = tracked.wanted, tracked.motion, tracked.needed, InPlane(hand)
     for i in range(n):
         y1, y2, v1, v2 = wanted.position[0, i], wanted.position[1, i], wanted.speed[0, i], wanted.speed[1, i]
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
@@ -62,7 +63,7 @@ def needed_forces(tracked: Tracked, hand: Array, p: Array, fraction: float, n: i
         )
         m = p[at.MASS]
         ax, ay, jx, jy = motion.acceleration[0, i], motion.acceleration[1, i], m * motion.jerk[0, i], m * motion.jerk[1, i]
-        px, py = m * ax - hand[0, i], m * (ay + p[at.GRAVITY]) - hand[1, i]
+        px, py = m * ax - push.x[i], m * (ay + p[at.GRAVITY]) - push.y[i]
         along, across = sine * px - cosine * py, -cosine * px - sine * py
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1

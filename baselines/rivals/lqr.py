@@ -22,10 +22,9 @@ from scipy.linalg import solve_continuous_are
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
-from baselines.valve_inverse import two_valve_openings
+from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
@@ -100,14 +99,13 @@ class Constants(Numbers):
 @kernel
 def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
-    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
     setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
     lowest, step, zone, c4 = about.lowest, about.step, about.dead_zone, about.pneumatic_gain
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
-        half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
@@ -117,13 +115,13 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             error, excess = y - wanted.position[cylinder, i], pp * ap - pn * an - needed.force[cylinder, i]
             summed = held(memory, cylinder, i, -k4 * excess / k1)
             wish = k1 * summed + k2 * error + k3 * (v - wanted.speed[cylinder, i]) + k4 * excess
-            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
-            stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
-            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness - setpoint[cylinder, i])
+            air = air_at(cylinder, pp, pn, y, v, p)
+            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness_of(air, p) - setpoint[cylinder, i])
             rate = needed.rate[cylinder, i] - wish
-            two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+            opened = two_valve_openings(rate, stiffness_rate, air, p)
+            opening[row, i], opening[row + 1, i] = opened
             slope = beyond(error, zone / scale)
-            carry_on(memory, cylinder, i, summed, slope, about.period, openings)
+            carry_on(memory, cylinder, i, summed, slope, about.period, opened)
     return 0
 
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
-from baselines.valve_inverse import driving_flows
+from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.valve_inverse import CylinderAir, air_at, driving_flows
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import lanes as at
@@ -30,23 +30,15 @@ from birthsim_env.physics.compiled.records import Numbers, number, rows
 
 @helper
 def pressure_setpoints(
-    force: float,
-    stiffness: float,
-    ap: float,
-    an: float,
-    length_p: float,
-    length_n: float,
-    index: float,
-    low: float,
-    high: float,
+    force: float, stiffness: float, c: CylinderAir, index: float, low: float, high: float
 ) -> tuple[float, float]:
     """Pressures of chambers P and N, Pa, that hold ``force`` (N) at ``stiffness`` (N/m), between ``low`` and ``high``.
 
     Where both cannot be had the stiffness gives way; ``force`` must lie within low ap - high an and high ap - low an.
     """
-    a = (stiffness / index + force / length_n) / (1.0 / length_p + 1.0 / length_n)
-    a = max(max(low * ap, low * an + force), min(min(high * ap, high * an + force), a))
-    return a / ap, (a - force) / an
+    a = (stiffness / index + force / c.length_n) / (1.0 / c.length_p + 1.0 / c.length_n)
+    a = max(max(low * c.ap, low * c.an + force), min(min(high * c.ap, high * c.an + force), a))
+    return a / c.ap, (a - force) / c.an
 
 
 @helper
@@ -70,7 +62,7 @@ class Constants(Numbers):
 @kernel
 def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, N, on."""
-    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
     setpoint = seen.asked.pneumatic_stiffness
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
     bandwidth, damping, zone = about.bandwidth, about.damping, about.dead_zone
@@ -79,7 +71,6 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
-        half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
@@ -90,15 +81,16 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             force += spring * (error + 2.0 * damping / bandwidth * error_rate) + summed
             least, most = low * ap - high * an, high * ap - low * an
             given = max(least, min(most, force))
-            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
-            pp_set, pn_set = pressure_setpoints(given, setpoint[cylinder, i], ap, an, lp, ln, index, low, high)
-            flow_p = flow_for(about.pressure_gain * (pp_set - pp), pp, ap, lp, v, index, gas_t)
-            flow_n = flow_for(about.pressure_gain * (pn_set - pn), pn, an, ln, -v, index, gas_t)
+            air = air_at(cylinder, pp, pn, y, v, p)
+            pp_set, pn_set = pressure_setpoints(given, setpoint[cylinder, i], air, index, low, high)
+            flow_p = flow_for(about.pressure_gain * (pp_set - pp), pp, ap, air.length_p, v, index, gas_t)
+            flow_n = flow_for(about.pressure_gain * (pn_set - pn), pn, an, air.length_n, -v, index, gas_t)
             (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
-            openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
-            openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            opening[row, i], opening[row + 1, i] = opening_p, opening_n
             rate = spring * about.integral_rate * beyond(error, zone / scale) if given == force else 0.0
-            carry_on(memory, cylinder, i, summed, rate, about.period, openings)
+            carry_on(memory, cylinder, i, summed, rate, about.period, (opening_p, opening_n))
     return 0
 
 

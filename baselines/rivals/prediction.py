@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.rivals.tracking import LEAST_LENGTH
+from baselines.valve_inverse import CLEARANCE
 from birthsim_env.physics import control_model, geometry, mechanics
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 
@@ -69,7 +69,7 @@ class ControlModel:
     def lengths(self, cylinder: Cylinder, y: Any) -> tuple[Any, Any]:
         """Lp and Ln, m, of a piston that an end stop keeps from leaving its stroke: nothing else in the model does."""
         half = cylinder.stroke / 2
-        return self.casadi.fmax(half + y, LEAST_LENGTH), self.casadi.fmax(half - y, LEAST_LENGTH)
+        return self.casadi.fmax(half + y, CLEARANCE), self.casadi.fmax(half - y, CLEARANCE)
 
     def rates(self, state: Any, flows: Any, force: Any, disturbance_force: Any) -> Any:
         """d(state)/dt; ``force`` (2,), N, is the user's, ``disturbance_force`` (2,), N, acts along the pistons besides."""

@@ -19,10 +19,9 @@ from typing import ClassVar
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN
 from baselines.rivals.feedforward import Tracked
-from baselines.rivals.tracking import LEAST_LENGTH, Integrals, TrackingController, beyond, carry_on, held
-from baselines.valve_inverse import two_valve_openings
+from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
+from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics import control_model
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS
@@ -44,7 +43,7 @@ class Constants(Numbers):
 @kernel
 def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables: int, lane: int, n: int) -> int:
     """Carries the integrals, m s, on."""
-    tracked, pressure, openings, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
+    tracked, pressure, opening, p = Tracked(seen.handed[: Tracked.size]), seen.pressure, seen.opening, about.rig
     setpoint, setpoint_rate = seen.asked.pneumatic_stiffness, seen.asked.pneumatic_stiffness_rate
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
     r, reaching, inside = about.surface_rate, about.reaching_rate, about.layer_rate
@@ -52,7 +51,7 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     for cylinder in range(2):
         row = 2 * cylinder
         ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
-        half, viscous = (p[at.HALF_L1], p[at.FV1]) if cylinder == 0 else (p[at.HALF_L2], p[at.FV2])
+        viscous = p[at.FV1] if cylinder == 0 else p[at.FV2]
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
@@ -66,11 +65,11 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             switched = max(-reaching, min(reaching, inside * surface)) / scale
             turned = viscous / mass * second - r * (3.0 * second + r * (3.0 * error_rate + r * slope)) - switched
             rate = needed.rate[cylinder, i] + mass * turned
-            lp, ln = max(half + y, LEAST_LENGTH), max(half - y, LEAST_LENGTH)
-            stiffness = control_model.pneumatic_stiffness(pp, pn, ap, an, lp, ln, p[at.INDEX])
-            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness - setpoint[cylinder, i])
-            two_valve_openings(openings, i, row, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
-            carry_on(memory, cylinder, i, summed, slope, about.period, openings)
+            air = air_at(cylinder, pp, pn, y, v, p)
+            stiffness_rate = setpoint_rate[cylinder, i] - c4 * (stiffness_of(air, p) - setpoint[cylinder, i])
+            opened = two_valve_openings(rate, stiffness_rate, air, p)
+            opening[row, i], opening[row + 1, i] = opened
+            carry_on(memory, cylinder, i, summed, slope, about.period, opened)
     return 0
 
 

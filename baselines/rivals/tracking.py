@@ -15,12 +15,8 @@ from baselines.rivals.feedforward import feedforward
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, rows
 from birthsim_env.physics.rig.parameters import Parameters
-
-LEAST_LENGTH = 0.002
-"""m. Near an end stop a sensor may place the piston outside its stroke, where (9) has no meaning."""
 
 
 class Integrals(Rows):
@@ -43,9 +39,12 @@ def held(memory: Integrals, cylinder: int, i: int, first: float) -> float:
 
 
 @helper
-def carry_on(memory: Integrals, cylinder: int, i: int, integral: float, rate: float, period: float, openings: Array) -> None:
+def carry_on(
+    memory: Integrals, cylinder: int, i: int, integral: float, rate: float, period: float, openings: tuple[float, float]
+) -> None:
     """Takes the integral to the next period; it rests while a valve of the cylinder saturates (conditional integration)."""
-    full = max(abs(openings[2 * cylinder, i]), abs(openings[2 * cylinder + 1, i])) >= 1.0
+    opening_p, opening_n = openings
+    full = max(abs(opening_p), abs(opening_n)) >= 1.0
     memory.integral[cylinder, i], memory.fresh[cylinder, i] = integral if full else integral + period * rate, 0.0
 
 
@@ -70,7 +69,7 @@ class TrackingController(StagedController, ABC):
     CONSTANTS: ClassVar[type[Numbers]]
     TUNABLE: ClassVar[dict[str, tuple[float, float]]]
     TUNED: ClassVar[dict[str, dict[str, float]]]
-    TOLD: ClassVar[tuple[str, ...]] = ("damping_factor",)
+    COMMAND_OPTIONS: ClassVar[tuple[str, ...]] = ("damping_factor",)
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)

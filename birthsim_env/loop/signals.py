@@ -26,6 +26,29 @@ compliance = helper(displacement)
 """``displacement`` for kernels."""
 
 
+class InPlane(Rows):
+    """A vector in the plane."""
+
+    x = row("SI", "x")
+    y = row("SI", "y")
+
+
+class PerPiston(Rows):
+    """What pistons 1 and 2 have one each of."""
+
+    first = row("SI", "of piston 1")
+    second = row("SI", "of piston 2")
+
+
+class PerChamber(Rows):
+    """What chambers have one each of."""
+
+    p1 = row("SI", "of chamber P1")
+    n1 = row("SI", "of chamber N1")
+    p2 = row("SI", "of chamber P2")
+    n2 = row("SI", "of chamber N2")
+
+
 class Point(Rows):
     """Where a point is."""
 
@@ -38,6 +61,13 @@ class Motion(Point):
 
     acceleration = rows("ax ay", "m/s2", "acceleration")
     jerk = rows("jx jy", "m/s3", "jerk")
+
+
+class Joints(Rows):
+    """Where the pistons are, measured or estimated."""
+
+    position = rows("y1 y2", "m", "position")
+    speed = rows("v1 v2", "m/s", "speed")
 
 
 class Setpoints(Rows):
@@ -96,14 +126,9 @@ def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measuremen
     def column(values: Array) -> Array:
         return np.asarray(values, dtype=np.float64)[..., None]
 
+    m, acceleration = measurement, measurement.acceleration
     seen = Measurement(
-        column(measurement.time),
-        column(measurement.position),
-        column(measurement.position_time),
-        column(measurement.velocity),
-        column(measurement.pressures),
-        column(measurement.user_force),
-        measurement.sampled,
-        None if measurement.acceleration is None else column(measurement.acceleration),
-    )
+        column(m.time), column(m.position), column(m.position_time), column(m.velocity), column(m.pressures),
+        column(m.user_force), m.sampled, None if acceleration is None else column(acceleration),
+    )  # fmt: skip
     return seen, Reference(column(reference.rows))

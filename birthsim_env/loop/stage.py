@@ -101,44 +101,56 @@ def numbers(address: int, count: int) -> Array:
 
 
 @helper
+def _described(tables: int, k: int) -> tuple[int, int, int, int, int]:
+    """Address and dimensions of table ``k``."""
+    about = carray(pointer(tables, np.int64), (k + 1, TABLE))
+    return about[k, 0], about[k, 1], about[k, 2], about[k, 3], about[k, 4]
+
+
+@helper
 def table1(tables: int, k: int) -> Array:
     """Table ``k`` of one dimension."""
-    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
-    return carray(pointer(about[k * TABLE], np.float64), (about[k * TABLE + 1],))
+    place, first, _, _, _ = _described(tables, k)
+    return carray(pointer(place, np.float64), (first,))
 
 
 @helper
 def table2(tables: int, k: int) -> Array:
     """Table ``k`` of two dimensions."""
-    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
-    return carray(pointer(about[k * TABLE], np.float64), (about[k * TABLE + 1], about[k * TABLE + 2]))
+    place, first, second, _, _ = _described(tables, k)
+    return carray(pointer(place, np.float64), (first, second))
 
 
 @helper
 def singles(tables: int, k: int) -> NDArray[np.float32]:
     """Table ``k`` of two dimensions and single precision."""
-    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
-    return carray(pointer(about[k * TABLE], np.float32), (about[k * TABLE + 1], about[k * TABLE + 2]))
+    place, first, second, _, _ = _described(tables, k)
+    return carray(pointer(place, np.float32), (first, second))
+
+
+@helper
+def singles1(tables: int, k: int) -> NDArray[np.float32]:
+    """Table ``k`` of one dimension and single precision."""
+    place, first, _, _, _ = _described(tables, k)
+    return carray(pointer(place, np.float32), (first,))
 
 
 @helper
 def table3(tables: int, k: int) -> Array:
     """Table ``k`` of three dimensions."""
-    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
-    shape = (about[k * TABLE + 1], about[k * TABLE + 2], about[k * TABLE + 3])
-    return carray(pointer(about[k * TABLE], np.float64), shape)
+    place, first, second, third, _ = _described(tables, k)
+    return carray(pointer(place, np.float64), (first, second, third))
 
 
 @helper
 def table4(tables: int, k: int) -> Array:
     """Table ``k`` of four dimensions."""
-    about = carray(pointer(tables, np.int64), ((k + 1) * TABLE,))
-    shape = (about[k * TABLE + 1], about[k * TABLE + 2], about[k * TABLE + 3], about[k * TABLE + 4])
-    return carray(pointer(about[k * TABLE], np.float64), shape)
+    place, first, second, third, fourth = _described(tables, k)
+    return carray(pointer(place, np.float64), (first, second, third, fourth))
 
 
 def described(tables: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
-    """What ``table1`` to ``table4`` and ``singles`` need of tables: addresses and shapes, (T, TABLE)."""
+    """What ``table1`` to ``table4``, ``singles1`` and ``singles`` need of tables: addresses and shapes, (T, TABLE)."""
     about = np.zeros((max(1, len(tables)), TABLE), dtype=np.int64)
     for entry, table in zip(about, tables, strict=False):
         entry[: 1 + table.ndim] = table.ctypes.data, *table.shape

@@ -40,9 +40,10 @@ def _tick(world: World, seen: Seen, period: float, n: int) -> None:
 
 
 @helper
-def _move(world: World, seen: Seen, u: Array, clock: Clock, dx: Array, total: Array, trial: Array, n: int) -> None:
+def _move(world: World, seen: Seen, u: Array, clock: Clock, n: int) -> None:
     """One control period under openings ``u`` (4, n)."""
     x, p, steps = world.state, world.rig, int(clock.steps)
+    dx, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
     dynamics.integrate(x, u, world.force, p, steps, clock.period / steps, world.impact, dx, total, trial, n)
     dynamics.settle(x, n)
     _tick(world, seen, clock.period, n)
@@ -51,17 +52,16 @@ def _move(world: World, seen: Seen, u: Array, clock: Clock, dx: Array, total: Ar
 
 @kernel
 def _plant(world: World, seen: Seen, memory: int, clock: Clock, tables: int, lane: int, n: int) -> int:
-    dx, total, trial = scratch(STATES), scratch(STATES), scratch(STATES)
-    _move(world, seen, seen.opening, clock, dx, total, trial, n)
+    _move(world, seen, seen.opening, clock, n)
     return 0
 
 
 @kernel
 def _worn_plant(world: World, seen: Seen, memory: InnerCommands, clock: Clock, tables: int, lane: int, n: int) -> int:
     """As ``_plant``, with valves that do not open as they are commanded."""
-    dx, total, trial, u = scratch(STATES), scratch(STATES), scratch(STATES), scratch(4)
+    u = scratch(4)
     spools.admit(seen.opening, world.rig, memory.inner, u, n)
-    _move(world, seen, u, clock, dx, total, trial, n)
+    _move(world, seen, u, clock, n)
     return 0
 
 

@@ -116,7 +116,7 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
             pp, tp, pn, tn = (at.PP1, at.TP1, at.PN1, at.TN1) if cylinder == 0 else (at.PP2, at.TP2, at.PN2, at.TN2)
             fill_p, drain_p = driving_flows(p, i, state[pp, i], 1.0 / state[pp, i], p[at.T0, i] / state[tp, i])
             fill_n, drain_n = driving_flows(p, i, state[pn, i], 1.0 / state[pn, i], p[at.T0, i] / state[tn, i])
-            row = 2 * cylinder
+            chamber_p, chamber_n = (0, 1) if cylinder == 0 else (2, 3)
             if one_valve:
                 half = p[at.HALF_L1, i] if cylinder == 0 else p[at.HALF_L2, i]
                 y = max(-0.95 * half, min(0.95 * half, state[at.Y1, i] if cylinder == 0 else state[at.Y2, i]))
@@ -124,11 +124,12 @@ def _flow_openings(wanted: Array, one_valve: bool, state: Array, p: Array, openi
                     full * wanted[cylinder, i], fill_p, drain_p, fill_n, drain_n, half / (half + y), half / (half - y),
                     p[at.CONDUCTANCE, i], p[at.LEAKAGE, i],
                 )  # fmt: skip
-                openings[row, i], openings[row + 1, i] = opened, -opened
+                openings[chamber_p, i], openings[chamber_n, i] = opened, -opened
             else:
-                flow_p, flow_n = full * wanted[row, i], full * wanted[row + 1, i]
-                openings[row, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
-                openings[row + 1, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE, i], p[at.LEAKAGE, i])
+                flow_p, flow_n = full * wanted[chamber_p, i], full * wanted[chamber_n, i]
+                conductance, leak = p[at.CONDUCTANCE, i], p[at.LEAKAGE, i]
+                openings[chamber_p, i] = valves.opening_for_flow(flow_p, fill_p, drain_p, conductance, leak)
+                openings[chamber_n, i] = valves.opening_for_flow(flow_n, fill_n, drain_n, conductance, leak)
 
 
 @kernel

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from birthsim_env.loop.signals import Motion
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Trajectory
@@ -93,10 +94,10 @@ def _numbers(kind: str, path: Path, columns: str, widths: tuple[int, ...] = (3,)
 @kernel
 def _spline(time: Array, breaks: Array, pieces: Array, rows: Array) -> None:
     """``breaks`` (M + 1,), ``pieces`` (6, M, 2): coefficients, highest power first; at rest before and after."""
-    last = breaks.shape[0] - 1
+    motion, first, last = Motion(rows), 0, breaks.shape[0] - 1
     for i in range(time.shape[0]):
-        t = max(breaks[0], min(breaks[last], time[i]))
-        low, high = 0, last
+        t = max(breaks[first], min(breaks[last], time[i]))
+        low, high = first, last
         while high - low > 1:
             middle = (low + high) // 2
             if breaks[middle] <= t:
@@ -111,10 +112,9 @@ def _spline(time: Array, breaks: Array, pieces: Array, rows: Array) -> None:
                 bend = bend * s + 2.0 * slope
                 slope = slope * s + value
                 value = value * s + pieces[k, low, axis]
-            inside = breaks[0] <= time[i] <= breaks[last]
-            rows[axis, i] = value
-            rows[2 + axis, i], rows[4 + axis, i] = (slope, bend) if inside else (0.0, 0.0)
-            rows[6 + axis, i] = jerk if inside else 0.0
+            inside = breaks[first] <= time[i] <= breaks[last]
+            motion.position[axis, i], motion.velocity[axis, i] = value, slope if inside else 0.0
+            motion.acceleration[axis, i], motion.jerk[axis, i] = (bend, jerk) if inside else (0.0, 0.0)
 
 
 class Through(Trajectory):
@@ -134,7 +134,7 @@ class Through(Trajectory):
             self._pieces[5 - order] = spline(self._breaks[:-1], nu=order) / math.factorial(order)
 
     def sample(self, time: Array) -> Array:
-        rows = np.empty((8, time.shape[0]))
+        rows = np.empty((Motion.size, time.shape[0]))
         _spline(time, self._breaks, self._pieces, rows)
         return rows
 

@@ -137,7 +137,8 @@ def _sample(time: Array, schedule: Schedule, values: Array, asked: Setpoints, n:
         # Half a microsecond of grace: a phase that starts on a control instant starts there, whatever the rounding.
         while k + 1 < starts.shape[0] and time[i] >= starts[k + 1] - 5e-7:
             k += 1
-        phase, last, u = Phase(values[k]), Phase(values[max(k - 1, 0)]), (time[i] - starts[k]) / transition
+        earlier = max(k - 1, 0)
+        phase, last, u = Phase(values[k]), Phase(values[earlier]), (time[i] - starts[k]) / transition
         asked.stiffness_coupling[i] = phase.coupling[i]
         for axis in range(2):
             asked.stiffness[axis, i] = phase.stiffness[axis, i]

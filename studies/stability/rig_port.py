@@ -111,4 +111,4 @@ def no_hand(now: float, position: Array, velocity: Array) -> Array:
 
 def takes_damping_factor(controller: Controller) -> bool:
     """Whether a law's damping can be varied from outside."""
-    return "damping_factor" in getattr(controller, "TOLD", inspect.signature(controller.command).parameters)
+    return "damping_factor" in getattr(controller, "COMMAND_OPTIONS", inspect.signature(controller.command).parameters)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from baselines.valve_inverse import force_first_openings, two_valve_openings
+from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve_openings
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import derived_law
@@ -21,9 +21,9 @@ def openings_of_both(cases: Array, ap: float, an: float, stroke: float, p: Array
     """``u`` (4, N): force first, then neither first; ``cases`` (6, N): dF/dt, dK/dt, Pp, Pn, y, v."""
     for i in range(cases.shape[1]):
         rate, stiffness_rate, pp, pn, y, v = cases[0, i], cases[1, i], cases[2, i], cases[3, i], cases[4, i], cases[5, i]
-        lp, ln = stroke / 2 + y, stroke / 2 - y
-        force_first_openings(u, i, 0, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
-        two_valve_openings(u, i, 2, rate, stiffness_rate, pp, pn, ap, an, lp, ln, v, p)
+        air = CylinderAir(pp, pn, ap, an, stroke / 2 + y, stroke / 2 - y, v)
+        u[0, i], u[1, i] = force_first_openings(rate, stiffness_rate, air, p)
+        u[2, i], u[3, i] = two_valve_openings(rate, stiffness_rate, air, p)
 
 
 def openings(cases: Array) -> tuple[Array, Array]:

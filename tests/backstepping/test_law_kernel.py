@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from baselines.backstepping import law
-from baselines.estimation.rows import Joints
+from baselines.valve_inverse import air_at
 from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Joints
+from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -32,6 +34,9 @@ def test_lanes_without_gains_are_counted_once_each(ratio: float) -> None:
 
 
 def test_no_chamber_counts_as_shorter_than_two_millimetres() -> None:
-    assert law.chamber_lengths(0.03, 0.1) == pytest.approx((0.13, 0.07))
-    assert law.chamber_lengths(0.0985, 0.1) == pytest.approx((0.1985, 0.002))
-    assert law.chamber_lengths(-0.2, 0.1) == pytest.approx((0.002, 0.3))
+    p = parameter_column(Parameters())
+    for k, half in enumerate((p[at.HALF_L1], p[at.HALF_L2])):
+        beyond = ((0.03, half + 0.03, half - 0.03), (half - 0.0015, 2 * half - 0.0015, 0.002), (-2 * half, 0.002, 3 * half))
+        for y, length_p, length_n in beyond:
+            air = air_at(k, 3e5, 3e5, y, 0.0, p)
+            assert (air.length_p, air.length_n) == pytest.approx((length_p, length_n))

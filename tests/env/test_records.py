@@ -132,6 +132,11 @@ def test_kernels_read_what_python_names():
     assert of_history(History(array)) == (5, array[2, 0])
 
 
+def test_arrays_in_fortrans_order_are_read_by_their_strides():
+    array = np.arange(6.0 * 3).reshape(6, 3)
+    assert named(np.asfortranarray(array)) == named(array) == Memory(array).observer.estimate[1].sum() + 10 * array[-1].sum()
+
+
 def test_a_stage_is_handed_what_it_is_annotated_with():
     lanes = 70
     tick, asked, opening = np.arange(1.0 * lanes)[None], np.zeros((Reference.size, lanes)), np.zeros((4, lanes))

@@ -6,8 +6,10 @@ import pytest
 from baselines.estimation import force_bias, force_observer, friction_level, observers, tracker_noise
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.rows import Belief, Joints
+from baselines.estimation.rows import Belief
 from baselines.estimation.tracker_noise import Tracker
+from birthsim_env.loop.rows import Signals
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import parameter_column
@@ -26,11 +28,13 @@ def rubbing(coulomb):
 def test_tracker_noise_is_found_at_irregular_times_and_any_speed(spread):
     lanes, rng = 64, np.random.default_rng(5)
     tracker, fresh, time = Tracker(np.zeros((Tracker.size, lanes))), np.ones(lanes), np.zeros(lanes)
+    signals = Signals(np.zeros((Signals.size, lanes)))
     for _ in range(900):
         time = time + rng.choice([0.004, 0.005, 0.009], lanes)
-        position = np.stack([0.1 * time, -0.2 * time]) + spread * rng.standard_normal((2, lanes))
+        signals.position[:] = np.stack([0.1 * time, -0.2 * time]) + spread * rng.standard_normal((2, lanes))
+        signals.position_time[:] = time
         for _ in range(2):  # the second time nothing new has arrived
-            tracker_noise.observe(tracker, position, time, 1e-4, fresh)
+            tracker_noise.observe(tracker, signals, 1e-4, fresh)
             fresh[:] = 0.0
     found = np.sqrt(tracker.variance)
     # Each variance averages some 100 samples of two axes, of which neighbours are correlated; the clip takes 1 %.

@@ -11,9 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, sqrtm
 
 from baselines.estimation import admittance
-from baselines.estimation.admittance import DAMPING_RATIO, Compliance, Offset, square_root
-from baselines.estimation.rows import Motion
-from birthsim_env.loop.signals import REFERENCES, Reference
+from baselines.estimation.admittance import DAMPING_RATIO, Compliance, square_root
+from birthsim_env.loop.signals import REFERENCES, Motion, Point, Reference
 from birthsim_env.physics.compiled.lanes import Array
 
 MASS, PERIOD = 3.0, 1e-3
@@ -39,7 +38,7 @@ class Follower:
     """The kernels with the offset that a stage keeps for them, over N lanes."""
 
     def __init__(self, lanes: int = 1, ratio: float = DAMPING_RATIO, period: float = PERIOD, mass: float = MASS) -> None:
-        self.offset = Offset(np.zeros((Offset.size, lanes)))
+        self.offset = Point(np.zeros((Point.size, lanes)))
         self._about = Compliance(Compliance.numbers(mass=mass, damping_ratio=ratio, period=period))
 
     def update(self, force: Array, reference: Reference, factor: Array | None = None) -> Array:

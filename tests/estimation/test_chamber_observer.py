@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from baselines.estimation.chamber_observer import Chambers, observe
-from baselines.estimation.rows import Joints
+from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters

@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from baselines.estimation import inertial
-from baselines.estimation.rows import Point
 from birthsim_env.loop.rows import Signals
+from birthsim_env.loop.signals import Point
 from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD, EVERY = 1e-3, 4

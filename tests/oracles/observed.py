@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.estimation import disturbance_observer, observers
-from baselines.estimation.rows import Belief, Given, Joints, Pistons, Point
+from baselines.estimation.rows import Belief, Given, Pistons
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Mask, Measurement
+from birthsim_env.loop.signals import Joints, Mask, Measurement, Point
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 

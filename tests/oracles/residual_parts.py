@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.residual import authority, unexplained
-from baselines.estimation.rows import Joints
-from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.loop.signals import Joints, Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.observed import Measured, Sampled

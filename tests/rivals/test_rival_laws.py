@@ -12,6 +12,7 @@ from baselines.estimation.stages import MOTION
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode, lqr, pid
 from baselines.rivals.feedforward import SIGN_WIDTH, Tracked, feedforward
 from baselines.rivals.tracking import TrackingController
+from baselines.valve_inverse import CylinderAir
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import HANDED, Seen
 from birthsim_env.loop.signals import Reference
@@ -90,9 +91,9 @@ def test_pressure_setpoints_give_force_and_pneumatic_stiffness() -> None:
     rng, cylinder, rig = np.random.default_rng(2), Parameters().cylinder1, Parameters()
     (ap, an), low, high = derived.areas(cylinder), rig.air.atmospheric_pressure, rig.air.supply_pressure
     y, stiffness = rng.uniform(-0.08, 0.08, 400), rng.uniform(1500, 6500, 400)
-    force = rng.uniform(low * ap - high * an, high * ap - low * an, 400)
+    force, index = rng.uniform(low * ap - high * an, high * ap - low * an, 400), rig.air.polytropic_index
     both = [
-        pid.pressure_setpoints.py_func(f, k, ap, an, 0.1 + at, 0.1 - at, rig.air.polytropic_index, low, high)
+        pid.pressure_setpoints.py_func(f, k, CylinderAir(low, low, ap, an, 0.1 + at, 0.1 - at, 0.0), index, low, high)
         for f, k, at in zip(force, stiffness, y, strict=True)
     ]
     set_p, set_n = np.array(both).T

@@ -18,8 +18,8 @@ from birthsim_env.physics.rig.values import checked_count, checked_number, check
 
 @kernel
 def _contraction(
-    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: Array, lanes: NDArray[np.int64],
-    knots: Array,
+    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: tuple[float, float],
+    lanes: NDArray[np.int64], knots: Array,
 ) -> None:  # fmt: skip
     """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
 
@@ -27,7 +27,7 @@ def _contraction(
     a unit vector.
     """
     least = bumps.min()
-    pushes = np.empty(bumps.max() - least + 1)
+    pushes, (x, y) = np.empty(bumps.max() - least + 1), along
     for k in range(time.shape[0]):
         middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
         contraction = exact.sine(math.pi * time[k] / lasts)
@@ -36,7 +36,7 @@ def _contraction(
         for i in range(lanes.shape[0]):
             push = pushes[bumps[i] - least]
             force = size[i] * ((1.0 - fraction[i]) * contraction * contraction + fraction[i] * push * push)
-            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * along[0], force * along[1]
+            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * x, force * y
 
 
 class Contractions(ForceProfile):
@@ -99,9 +99,9 @@ class Contractions(ForceProfile):
 
     def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
         """Draw the forces of the lanes (L,) of a table of knots."""
-        time, along = self._time, np.array(exact.direction(self.heading))
+        time, along = self._time, exact.direction(self.heading)
         for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
             size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
             bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
             drawn = (np.full(len(lanes), number) for number in (size, fraction, bumps))
-            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg]
+            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg, arg-type]

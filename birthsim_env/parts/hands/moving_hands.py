@@ -172,9 +172,9 @@ def _guide(time: Array, motion: Point, arm: Arm, points: Array, hand: Hand, grip
             now = hand.time[i] + h * (step + 1)
             leg = max(0.0, now - CALM) / lasts
             place = int(leg)
-            u = 2.0 * (leg - place)
+            u, earlier = 2.0 * (leg - place), (place - 1) % POINTS
             for axis in range(2):
-                before = points[(place - 1) % POINTS, axis, i] if place > 0 else 0.0
+                before = points[earlier, axis, i] if place > 0 else 0.0
                 way = points[place % POINTS, axis, i] - before
                 wanted = hand.origin[axis, i] + before + way * minimum_jerk(u, 0)
                 pace = way * minimum_jerk(u, 1) * 2.0 / lasts if now > CALM and u < 1.0 else 0.0

@@ -125,18 +125,8 @@ def _honest(world: World, seen: Signals, shared: Shared, kept: Kept, n: int) -> 
                 readings.force[axis, i] = newer + rest * (older - newer)
             if shared.share > 0.0:
                 gain, bias = e.acceleration_gain[axis, i], e.acceleration_bias[axis, i]
-                value = acceleration.feel(
-                    kept.accelerometer,
-                    i,
-                    axis,
-                    tick,
-                    world.motion.velocity[axis, i],
-                    gain,
-                    bias,
-                    shared.period,
-                    shared.share,
-                    again,
-                )
+                velocity, memory = world.motion.velocity[axis, i], kept.accelerometer
+                value = acceleration.feel(memory, i, axis, tick, velocity, gain, bias, shared.period, shared.share, again)
                 if read:
                     noise = shared.acceleration_noise * normal(key, tick, acceleration.NOISE + axis)
                     readings.acceleration[axis, i] = value + noise

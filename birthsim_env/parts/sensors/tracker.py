@@ -43,7 +43,8 @@ def sample_due(tick: int, time: float, period: float, rate: float) -> bool:
 @helper
 def take(queue: Array, i: int, time: float, rate: float, x: float, y: float) -> None:
     """Put a sample into the queue of lane ``i``."""
-    sample = Sample(queue[math.floor(time * rate + 1e-9) % queue.shape[0]])
+    slot = math.floor(time * rate + 1e-9) % queue.shape[0]
+    sample = Sample(queue[slot])
     sample.position[0, i], sample.position[1, i], sample.time[i] = x, y, time
 
 

@@ -57,8 +57,9 @@ class Record(types.Type):
     """The rows of an ``array`` by name."""
 
     def __init__(self, layout: Any, array: types.Array) -> None:
-        self.layout, self.array = layout, array
-        super().__init__(f"{type(self).__name__}({layout.__module__}.{layout.__qualname__}, {array})")
+        # Rows of an array in Fortran's order are not contiguous: their strides count.
+        self.layout, self.array = layout, array if array.layout == "C" else array.copy(layout="A")
+        super().__init__(f"{type(self).__name__}({layout.__module__}.{layout.__qualname__}, {self.array})")
 
     def of(self, group: Any) -> Any:
         """Type of a group: a record, an array, or a number."""
