@@ -12,6 +12,7 @@ import pytest
 import agents
 import baselines
 import birthsim_env
+import studies
 
 
 @pytest.mark.parametrize("package", [agents, baselines, birthsim_env])
@@ -92,7 +93,7 @@ def test_rows_by_number_are_found():
 
 def test_kernels_name_their_rows():
     root, found = pathlib.Path(__file__).parents[2], []
-    for path in (one for package in (birthsim_env, baselines, agents) for one in (root / package.__name__).rglob("*.py")):
+    for path in (one for package in (birthsim_env, baselines, agents, studies) for one in (root / package.__name__).rglob("*.py")):
         place = path.relative_to(root).as_posix()
         if place != HASH and "/physics/" not in place:
             found += [f"{place}: {row}" for row in rows_by_number(path.read_text(encoding="utf-8"))]
