@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from baselines.commands.start import perform
 from birthsim_env.physics.rig.values import near, shown
+from studies.results import changed
 
 
 class Study(NamedTuple):
@@ -38,7 +39,16 @@ def overview() -> str:
     """The help: one line a study."""
     width = max(map(len, STUDIES))
     lines = [f"  {name:{width}}  {study.measures}" for name, study in STUDIES.items()]
+    lines += ["", f"  {'status':{width}}  which results/*.json are fresh, and what changed since the others"]
     return "\n".join(["usage: birthsim study NAME ...", "", *lines])
+
+
+def state(name: str) -> str:
+    """Whether the result of a study is of the sources that are here."""
+    files = changed(name, f"studies.{STUDIES[name].module}")
+    if files is None:
+        return "no result in results/"
+    return f"stale; changed: {', '.join(files)}" if files else "fresh"
 
 
 def main(arguments: list[str]) -> None:
@@ -47,10 +57,12 @@ def main(arguments: list[str]) -> None:
         print(overview())
         raise SystemExit(0 if arguments else 2)
     name, *rest = arguments
+    if name == "status":
+        print("\n".join(f"{one:12} {state(one)}" for one in STUDIES))
+        return
     if name not in STUDIES:
-        print(
-            f"birthsim study: error: NAME = {shown(name)}{near(name, STUDIES)}; allowed: {', '.join(STUDIES)}", file=sys.stderr
-        )
+        allowed = ", ".join(["status", *STUDIES])
+        print(f"birthsim study: error: NAME = {shown(name)}{near(name, STUDIES)}; allowed: {allowed}", file=sys.stderr)
         raise SystemExit(2)
     sys.argv = ["", *rest]
     perform(f"birthsim study {name}", "studies", STUDIES[name].module)

@@ -20,6 +20,7 @@ from baselines.commands.shared import run
 from baselines.registry import make_controller
 from baselines.staged import StagedController
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.results import Rows, measure
 from studies.stability.maps import Cases, judge
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
@@ -31,21 +32,30 @@ SWING = 0.02
 """m, peak to peak."""
 
 
+UNITS = {"controller": "", "mass": "kg", "valve": "s", "latency": "s", "limit": "N/m", "rate": "1/s"}
+
+
 def main() -> None:
     """Entry point."""
     run(argparse.ArgumentParser(prog="birthsim study stiffest", description=(__doc__ or "").splitlines()[0]), _measure)
 
 
 def _measure(_: argparse.Namespace) -> None:
-    head = ("mass, kg", "valve, ms", "late, ms", "rests up to, N/m", "over m/(tau + late/4), 1/s")
-    print(f"{'law':24}" + "".join(f"  {word}" for word in head))
+    print(f"written to {measure('stiffest', 'studies.stability.stiffest', UNITS, (0,), _rows)}")
+
+
+def _rows() -> Rows:
+    """A row per controller, mass, lag and latency; no limit (None) where it swings at no setpoint."""
     cases = list(itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES))
-    for name, mass, lag, late in tqdm(cases, leave=False):
-        rig = Parameters().replace({"mechanics.mass": mass, "valves.time_constant": lag, "electronics.position_latency": late})
-        limit = rests_up_to(name, rig, "lab" if late else "ideal")
-        rate = limit * (lag + PART * late) / mass
-        cells = zip((mass, 1e3 * lag, 1e3 * late, limit, rate), head, strict=True)
-        tqdm.write(f"{name:24}" + "".join(f"{value:{len(word) + 2}.5g}" for value, word in cells))
+    return [_row(*case) for case in tqdm(cases, "stiffest", leave=False)]
+
+
+def _row(name: str, mass: float, lag: float, late: float) -> dict[str, str | float | None]:
+    rig = Parameters().replace({"mechanics.mass": mass, "valves.time_constant": lag, "electronics.position_latency": late})
+    limit = rests_up_to(name, rig, "lab" if late else "ideal")
+    rate = limit * (lag + PART * late) / mass
+    row = (name, mass, lag, late, *((limit, rate) if np.isfinite(limit) else (None, None)))
+    return dict(zip(UNITS, row, strict=True))
 
 
 def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
