@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -21,10 +22,16 @@ def hashes(module: str) -> dict[str, str]:
         file = _file(waiting.pop())
         if file is None or (path := file.relative_to(ROOT).as_posix()) in found:
             continue
-        text = file.read_bytes()
-        found[path] = hashlib.sha256(text).hexdigest()
-        waiting += _named(ast.parse(text), file)
+        found[path], named = _read(file)
+        waiting += named
     return dict(sorted(found.items()))
+
+
+@cache
+def _read(file: Path) -> tuple[str, list[str]]:
+    """SHA-256 of a file as this process finds it at first, and the modules that it names."""
+    text = file.read_bytes()
+    return hashlib.sha256(text).hexdigest(), list(_named(ast.parse(text), file))
 
 
 def _named(tree: ast.AST, file: Path) -> Iterator[str]:
