@@ -58,13 +58,13 @@ SHORT_NAMES = {
 """Short name -> controller with options. Tables, trained policies and recordings have the short names."""
 
 LISTED = ("backstepping", *SHORT_NAMES, "pid", "lqr", "sliding-mode", "nonlinear-mpc")
-"""Controllers that ``birthsim evaluate --all``, scores, the page and the stored bits compare."""
+"""Controllers that ``birthsim study comparison``, scores, the page and the stored bits compare."""
 
 UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
-"""What any controller should beat; ``birthsim evaluate --all`` leaves them out."""
+"""What any controller should beat; ``birthsim study comparison`` leaves them out."""
 
 SLOW = frozenset({"nonlinear-mpc"})
-"""Controllers far from real time, which ``birthsim evaluate --all`` leaves out unless they are named."""
+"""Controllers far from real time, which ``birthsim study comparison`` leaves out unless they are named."""
 
 
 def _others() -> list[str]:

@@ -41,7 +41,3 @@ def _measure(arguments: argparse.Namespace) -> None:
             _, lasting = seconds(2, cluster, LASTS)
             row = (f"{start:.2f}", f"{1e3 * empty:.2f}", f"{1e3 * lasting:.1f}", f"{1e3 * (lasting - LASTS / 2):.1f}")
             print(f"| {name} | " + " | ".join(row) + " |")
-
-
-if __name__ == "__main__":
-    main()

@@ -15,7 +15,7 @@ PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build",
 def hashes(module: str) -> dict[str, str]:
     """Path from the root to SHA-256, sorted by path, of each Python file that ``module`` imports, itself too.
 
-    A module that a string names ("package.module:name") counts as imported; data files and compiled code do not.
+    A module that a string names ("package.module:name") counts as imported; weights of policies and other data do not count.
     """
     waiting, found = [module], dict[str, str]()
     while waiting:

@@ -39,8 +39,11 @@ def perform(name: str, package: str, module: str, example: str = "") -> None:
     try:
         _load(name, package, module).main()
     except SystemExit as end:
-        if example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
-            print(f"\nexample: {example}")
+        try:
+            if example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
+                print(f"\nexample: {example}", flush=True)
+        except BrokenPipeError:  # who reads has seen enough, as head has; what is left goes nowhere
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise
 
 

@@ -142,7 +142,7 @@ def open_study(folder: Path, setting: dict[str, Any]) -> Study:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     path = folder / "trials.journal"
     try:
-        study = optuna.create_study(storage=open_journal(path), study_name="birthsim tune", load_if_exists=True)
+        study = optuna.create_study(storage=open_journal(path), study_name="birthsim-tune", load_if_exists=True)
         # The first run may have been killed before it came to all of them.
         known = {**({} if complete(study) else setting), **study.user_attrs}
         if all(known.get(key) == value for key, value in setting.items()):

@@ -40,7 +40,3 @@ def _verify(arguments: argparse.Namespace) -> None:
     accuracy_figure(found, folder)
     print(accuracy_tables.tables(found))
     print(f"\nwritten to {folder}/: accuracy.json, accuracy.md, accuracy.png (the picture as .svg too)")
-
-
-if __name__ == "__main__":
-    main()

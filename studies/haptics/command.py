@@ -80,7 +80,3 @@ def _haptics(arguments: argparse.Namespace) -> None:
     print(text)
     pictures = ", ".join(path.name for path in drawn if path.suffix == ".png")
     print(f"written to {folder}/: haptics.json, haptics.md, {pictures} (each picture as .svg too)")
-
-
-if __name__ == "__main__":
-    main()

@@ -85,7 +85,3 @@ def sizes_of(evaluation: Evaluation, metric: str) -> Array:
 def three(values: Array) -> str:
     """Median, 95 % and worst."""
     return ", ".join(number(quantile(values, fraction)) for fraction in (0.5, 0.95, 1.0))
-
-
-if __name__ == "__main__":
-    main()

@@ -134,7 +134,3 @@ def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int,
     hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
     return evaluate(ENVIRONMENT, make_controller(name, rig), name, episodes, seed, False, randomize=True, **setting)
-
-
-if __name__ == "__main__":
-    main()

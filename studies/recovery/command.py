@@ -67,7 +67,3 @@ def recovery_table(results: list[dict[str, Any]]) -> list[str]:
         ranges = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
         lines.append(f"| `{one.name}` | {ranges} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
     return lines
-
-
-if __name__ == "__main__":
-    main()

@@ -215,7 +215,3 @@ def _median(values: Array) -> float:
 
 def _mean(values: Array) -> float:
     return float(np.mean(values))
-
-
-if __name__ == "__main__":
-    main()

@@ -142,7 +142,3 @@ def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
         }
         for role, name in zip(ROLES, chosen, strict=False)
     }  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

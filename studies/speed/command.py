@@ -270,7 +270,3 @@ def _rows(budget: float) -> list[Row]:
         ("  Gymnasium's CartPole-v1, 600 x 400", theirs, "frames/s"),
         ("  ratio", ours / theirs, "times"),
     ]
-
-
-if __name__ == "__main__":
-    main()

@@ -92,7 +92,3 @@ def _limit(value: float | None, last: float) -> str:
 def _number(value: float) -> str:
     """Four digits, without an exponent."""
     return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
-
-
-if __name__ == "__main__":
-    main()

@@ -66,7 +66,3 @@ def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
     verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), law, sensors, 0, None)
     swings = verdict.lost | (verdict.motion > SWING)
     return float(ASKED[max(int(np.argmax(swings)) - 1, 0)]) if swings.any() else np.inf
-
-
-if __name__ == "__main__":
-    main()

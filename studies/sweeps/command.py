@@ -93,7 +93,3 @@ def _write(points: list[Point], results: list[list[Result]], sweep: Sweep, folde
     lines: list[Any] = table(found).splitlines()
     print("\n".join(lines[:42]) + ("\n..." if len(lines) > 42 else ""))
     print(f"\nwritten to {folder}/: episodes.parquet, sweep.json, sweep.md{pictures}")
-
-
-if __name__ == "__main__":
-    main()

@@ -169,7 +169,3 @@ def _wide(folder: Path, bundle: Bundle) -> list[Line]:
         bits = _said(rows[:, SHARED], loop_rows(scenario, sensors, controller)[:, SHARED])
         lines.append((f"{scenario}, {sensors}, {controller}", bits, _per_second(speed)))
     return lines
-
-
-if __name__ == "__main__":
-    main()

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from studies.__main__ import STUDIES, state
+from studies.door import STUDIES, state
 from studies.results import changed, measure
 from studies.sources import ROOT, hashes
 from tests.console import call
@@ -17,7 +17,7 @@ MODULE = "studies.stability.stiffest"
 def test_sources_follow_imports_and_names_in_strings():
     found = hashes(MODULE)
     assert {"studies/stability/stiffest.py", "baselines/registry.py", "baselines/backstepping/stiffest.py"} <= found.keys()
-    assert "studies/__main__.py" not in found
+    assert "studies/door.py" not in found
     assert not any(path.startswith("tests/") for path in found)
 
 

@@ -39,7 +39,7 @@ CLIENTS = {
     # CleanRL's last release asks for Python below 3.11 and for the old gym, which the file that is run here does not import.
     "cleanrl": Client(extras="[agents]", alone=("cleanrl==1.2.0",)),
     "torchrl": Client(extras="[agents]", needs=("torchrl==0.14.1",)),
-    "cluster": Client(extras="[cluster,sweep]"),
+    "cluster": Client(extras="[cluster]"),
     # Never ray[rllib]: it pins gymnasium 1.2.2. These are what RLlib imports.
     "rllib": Client(
         extras="[agents]",

@@ -1,4 +1,4 @@
-"""Pieces on a Ray cluster of loopback: the same bytes as with joblib, failures by name, a worker that dies, a sweep."""
+"""Pieces on a Ray cluster of loopback: the same bytes as with joblib, failures by name, a worker that dies, an evaluation."""
 
 import json
 import os
@@ -11,16 +11,6 @@ import pytest
 
 from baselines.work.side_by_side import side_by_side
 from baselines.work.tasks import Task, run_tasks
-
-SWEEP = """
-[base]
-environment = "BirthSIM/Probe-v2"
-randomize = "scenario"
-episodes = 2
-[grid]
-controller = ["backstepping", "pid"]
-"rig.mechanics.mass" = [3.0, 4.0]
-"""
 
 
 @pytest.fixture(scope="module")
@@ -54,12 +44,12 @@ def test_the_files_are_those_of_joblibs_processes(cluster, tmp_path):
     assert len(files(tmp_path / "ray")) == 7
 
 
-def test_a_sweep_has_the_same_bytes(cluster, tmp_path):
-    (tmp_path / "sweep.toml").write_text(SWEEP)
-    command = [sys.executable, "-m", "studies", "sweep", str(tmp_path / "sweep.toml"), "--out"]
+def test_an_evaluation_has_the_same_bytes(cluster, tmp_path):
+    world = ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "4")
     for name, workers in (("joblib", ("--jobs", "2")), ("ray", ("--cluster", cluster))):
-        subprocess.run([*command, str(tmp_path / name), *workers], check=True, capture_output=True)
-    for name in ("episodes.parquet", "sweep.json", "sweep.md"):
+        command = [sys.executable, "-m", "birthsim", "evaluate", *world, "--out", str(tmp_path / name), *workers]
+        subprocess.run(command, check=True, capture_output=True)
+    for name in ("evaluation.csv", "evaluation.json", "evaluation.md"):
         assert (tmp_path / "ray" / name).read_bytes() == (tmp_path / "joblib" / name).read_bytes()
 
 

@@ -66,7 +66,3 @@ def main(arguments: list[str]) -> None:
         raise SystemExit(2)
     sys.argv = ["", *rest]
     perform(f"birthsim study {name}", "studies", STUDIES[name].module)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
