@@ -123,7 +123,7 @@ def test_ctrl_c_during_training_keeps_the_best_policy_and_the_checkpoint(tmp_pat
 def test_ctrl_c_ends_all_jobs_in_silence(tmp_path, small):
     arguments = ("--config", small, "--steps", 10**8, "--seeds", 2, "--jobs", 2, "--out", tmp_path)
     folders = [tmp_path / f"seed_{seed}" for seed in (0, 1)]
-    status, _ = interrupted("train", arguments, lambda: all((folder / CHECKPOINT).is_file() for folder in folders))
+    status, _ = interrupted("train", arguments, lambda: all((folder / WEIGHTS).is_file() for folder in folders))
     assert status == 130
     for folder in folders:
         load_policy(folder)
