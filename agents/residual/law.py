@@ -15,19 +15,18 @@ from typing import Any
 import numpy as np
 
 from agents.residual import authority, unexplained
+from agents.residual.pistons import Found, observed
 from agents.residual.settings import NO_LAW, ResidualSettings
-from baselines.estimation import disturbance_observer, observers
-from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import CompiledDriving, LawStage, StagedController
-from birthsim_env.loop.rows import ACTION, POSITION, SHOWN, Seen
-from birthsim_env.loop.signals import REFERENCES, Joints, Mask, Measurement, Point, Reference
-from birthsim_env.loop.stage import block, scratch
+from birthsim_env.loop.rows import ACTION, SHOWN, Seen
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.stage import scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -104,8 +103,6 @@ class Action(Rows):
 class Constants(Numbers):
     """Of the stage."""
 
-    sampled = number("1", "1 with sampled positions")
-    more_rows = number("1", "rows of memory besides, of the observer of sampled positions")
     actions = number("1", "length of an action")
     authority = number("N", "force of an action of 1")
     time_constant = number("s", "of the low-pass that an action passes")
@@ -115,7 +112,8 @@ class Constants(Numbers):
     has_law = number("1", "1 with a law")
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
-    belief = part(Belief, "of the observer of the pistons")
+    period = number("s", "control period")
+    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
 
 
 class Memory(Rows):
@@ -125,7 +123,6 @@ class Memory(Rows):
     limiter = part(authority.Limiter, "authority")
     moved = part(unexplained.Moved, "which ways pistons have moved")
     unexplained = part(unexplained.Forces, "unexplained forces")
-    pistons = part(Pistons, "observer")
 
 
 @helper
@@ -160,33 +157,13 @@ def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth
             smooth.rows[k, i] += about.quickness * (action[k, i] - smooth.rows[k, i])
 
 
-@helper
-def _observe(seen: Seen, pistons: Pistons, about: Constants, joints: Joints) -> None:
-    """Brings the observer up to what is measured, and writes the ``joints``."""
-    belief, given = about.belief, Given(scratch(Given.size)[:, : joints.rows.shape[1]])
-    for i in range(joints.rows.shape[1]):
-        for k in range(2):
-            given.force[k, i], given.believed[k, i] = seen.user_force[k, i], 0.0
-        given.moving[i], given.noise[i] = 1.0, belief.noise
-    if about.sampled > 0.0:
-        observers.observe(pistons, seen, seen.pressure, given, belief)
-        for i in range(joints.rows.shape[1]):
-            for k in range(2):
-                joints.position[k, i], joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
-    else:
-        point = Point(seen.rows[POSITION : POSITION + Point.size])
-        disturbance_observer.observe(pistons, point, seen.pressure, given, belief, joints)
-
-
 @kernel
-def _stage(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
-    size, belief, signals = int(about.actions), about.belief, Seen(seen.rows[:, :n])
-    own = Memory(block(memory, Memory.size + int(about.more_rows))[:, :n])
-    joints, said = Joints(scratch(Joints.size)[:, :n]), Correction(scratch(Correction.size)[:, :n])
-    _observe(signals, own.pistons, about, joints)
-    unexplained.remember(joints, own.pistons.disturbance, belief.rig, belief.period, own.moved, own.unexplained)
+def _stage(world: int, seen: Seen, memory: Memory, about: Constants, tables: int, lane: int, n: int) -> int:
+    size, signals, own = int(about.actions), Seen(seen.rows[:, :n]), Memory(memory.rows[:, :n])
+    said, found = Correction(scratch(Correction.size)[:, :n]), Found(signals.handed[: Found.size])
+    unexplained.remember(found.joints, found.disturbance, about.rig, about.period, own.moved, own.unexplained)
     limiter, action, shown, asked, target = own.limiter, signals.action[:size], signals.shown, signals.asked, signals.reference
-    authority.limit_authority(joints, target, belief.rig, belief.period, about.level, limiter)
+    authority.limit_authority(found.joints, target, about.rig, about.period, about.level, limiter)
     _correct(action, limiter, about, own.smooth, said)
     for i in range(n):
         for k in range(Reference.size):
@@ -222,17 +199,14 @@ class ResidualLaw(StagedController):
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
-        pistons = observers.fresh_memory(self.parameters, sampled)
-        belief = observers.belief(self.parameters, observers.BANDWIDTH if sampled else unexplained.BANDWIDTH)
         constants = Constants.numbers(
-            sampled=sampled, more_rows=len(pistons) - Pistons.size, actions=settings.size, authority=settings.authority,
-            time_constant=settings.time_constant, level=authority.LEVEL, unit=FORCE_UNIT, has_law=self._law is not None,
+            actions=settings.size, authority=settings.authority, time_constant=settings.time_constant, level=authority.LEVEL,
+            unit=FORCE_UNIT, has_law=self._law is not None, period=board.control_period, rig=self._p,
             quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
-            stiffens=settings.impedance != "fixed", damps=settings.impedance == "variable", belief=belief,
+            stiffens=settings.impedance != "fixed", damps=settings.impedance == "variable",
         )  # fmt: skip
-        fresh = Memory.lane(limiter=authority.Limiter.lane(left=1.0), pistons=pistons)
-        own = LawStage(_stage, constants, fresh)
-        return [own, *(self._law.law_stages(sampled) if self._law is not None else ())]
+        own = LawStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
+        return [observed(self.parameters, sampled), own, *(self._law.law_stages(sampled) if self._law is not None else ())]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """What the law underneath means to render, over N lanes; None without a law."""
@@ -265,7 +239,7 @@ class ResidualLaw(StagedController):
     @property
     def limiter(self) -> authority.Limiter:
         """What limits the authority."""
-        return Memory(self._memories[0]).limiter
+        return Memory(self._memories[1]).limiter
 
     @property
     def asked(self) -> Reference:

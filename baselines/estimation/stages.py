@@ -12,8 +12,8 @@ from birthsim_env.loop.rows import HANDED, POSITION, Seen
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row
+from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, Array, parameter_column
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -51,22 +51,34 @@ def compliant_motion(rig: Parameters) -> LawStage:
     return LawStage(_comply, compliance(rig), Point.lane())
 
 
-class Location(Numbers):
-    """Constants of the stage that finds the pistons."""
+class Located(Numbers):
+    """Constants of the stage that finds the pistons where speeds are measured."""
 
-    rows_of_memory = number("1", "rows of the observer, 0 where speeds are measured")
+    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
+
+
+@kernel
+def _measure(world: int, seen: Seen, memory: int, about: Located, tables: int, lane: int, n: int) -> int:
+    """Writes the joints that are measured."""
+    s = Seen(seen.rows[:, :n])
+    joints = Estimate(s.handed[: Estimate.size]).joints
+    piston_motion(s.rows[POSITION : POSITION + Point.size], about.rig, joints.rows, n)
+    return 0
+
+
+class Location(Numbers):
+    """Constants of the stage that observes the pistons."""
+
+    rows_of_memory = number("1", "rows of the observer")
     informed = number("1", "1 where the observer knows the force of the hand and whether the motion moves")
     belief = part(Belief, "of the observer")
 
 
 @kernel
 def _locate(world: int, seen: Seen, memory: int, about: Location, tables: int, lane: int, n: int) -> int:
-    """Writes the joints."""
+    """Writes the joints that an observer finds."""
     s, belief = Seen(seen.rows[:, :n]), about.belief
     estimate, given = Estimate(s.handed[: Estimate.size]), Given(scratch(Given.size)[:, :n])
-    if about.rows_of_memory == 0.0:
-        piston_motion(s.rows[POSITION : POSITION + Point.size], belief.rig, estimate.joints.rows, n)
-        return 0
     informed, pistons = about.informed > 0.0, Pistons(block(memory, int(about.rows_of_memory))[:, :n])
     for i in range(n):
         for k in range(2):
@@ -84,5 +96,7 @@ def pistons(rig: Parameters, sampled: bool, informed: bool) -> LawStage:
 
     Where it is ``informed`` it knows the hand's force, and lets pistons rest while nothing is to move.
     """
-    fresh = fresh_memory(rig, sampled) if sampled else np.zeros(0)
+    if not sampled:
+        return LawStage(_measure, parameter_column(rig), np.zeros(0))
+    fresh = fresh_memory(rig, sampled)
     return LawStage(_locate, Location.numbers(rows_of_memory=len(fresh), informed=informed, belief=belief(rig)), fresh)
