@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from birthsim_env.physics import control_model, valves
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 
 CLEARANCE = 0.002
 """m; assumed: no chamber counts as shorter. Near an end stop a sensor may place the piston outside its stroke, where (9) has no
@@ -17,18 +16,16 @@ meaning."""
 
 
 @helper
-def driving_flows(pressure: float, p: Array) -> tuple[float, float]:
+def driving_flows(pressure: float, p: Rig) -> tuple[float, float]:
     """Flows per unit of conductance from the supply into a chamber, and from it to the atmosphere, Pa kg/m3, as believed.
 
     No temperature is measured: all air counts as ambient. ``p`` (PARAMETERS,).
     """
-    inverse, air, rho0 = 1.0 / pressure, p[at.COLDNESS], p[at.RHO0]
-    critical, knee, slope = p[at.CRITICAL], p[at.KNEE], p[at.LAMINAR]
+    inverse, air, rho0 = 1.0 / pressure, p.coldness, p.rho0
+    critical, knee, slope = p.critical, p.knee, p.laminar
     return (
-        valves.driving_flow(p[at.SUPPLY], p[at.INVERSE_SUPPLY], air, pressure, inverse, air, rho0, critical, knee, slope),
-        valves.driving_flow(
-            pressure, inverse, air, p[at.ATMOSPHERE], p[at.INVERSE_ATMOSPHERE], air, rho0, critical, knee, slope
-        ),
+        valves.driving_flow(p.supply, p.inverse_supply, air, pressure, inverse, air, rho0, critical, knee, slope),
+        valves.driving_flow(pressure, inverse, air, p.atmosphere, p.inverse_atmosphere, air, rho0, critical, knee, slope),
     )
 
 
@@ -45,23 +42,23 @@ class CylinderAir(NamedTuple):
 
 
 @helper
-def air_at(k: int, pp: float, pn: float, y: float, v: float, p: Array) -> CylinderAir:
+def air_at(k: int, pp: float, pn: float, y: float, v: float, p: Rig) -> CylinderAir:
     """Cylinder ``k``, 0 or 1, of a rig with its piston at ``y``, m."""
-    ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if k == 0 else (p[at.AREA_P2], p[at.AREA_N2])
-    half = p[at.HALF_L1] if k == 0 else p[at.HALF_L2]
+    ap, an = (p.area_p1, p.area_n1) if k == 0 else (p.area_p2, p.area_n2)
+    half = p.half_l1 if k == 0 else p.half_l2
     return CylinderAir(pp, pn, ap, an, max(half + y, CLEARANCE), max(half - y, CLEARANCE), v)
 
 
 @helper
-def stiffness_of(c: CylinderAir, p: Array) -> float:
+def stiffness_of(c: CylinderAir, p: Rig) -> float:
     """Pneumatic stiffness (9), N/m."""
-    return control_model.pneumatic_stiffness(c.pp, c.pn, c.ap, c.an, c.length_p, c.length_n, p[at.INDEX])
+    return control_model.pneumatic_stiffness(c.pp, c.pn, c.ap, c.an, c.length_p, c.length_n, p.index)
 
 
 @helper
-def _flows_for(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+def _flows_for(rate: float, stiffness_rate: float, c: CylinderAir, p: Rig) -> tuple[float, float]:
     """Active and pressurisation flow (10) for the wanted dF/dt and dK/dt."""
-    index, gas_t, stiffness = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE], stiffness_of(c, p)
+    index, gas_t, stiffness = p.index, p.gas * p.temperature, stiffness_of(c, p)
     force = c.pp * c.ap - c.pn * c.an
     active = control_model.active_flow_for(rate, stiffness, c.speed, c.length_p + c.length_n, index, gas_t)
     return active, control_model.pressurization_flow_for(
@@ -70,7 +67,7 @@ def _flows_for(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> 
 
 
 @helper
-def two_valve_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+def two_valve_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Rig) -> tuple[float, float]:
     """Openings of one cylinder's two valves for the wanted dF/dt and dK/dt.
 
     Where a valve saturates, both rates fall short: neither has priority (the paper's law).
@@ -80,31 +77,31 @@ def two_valve_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Ar
     flow_n = control_model.chamber_flow_n(active, pressurization, c.length_p, c.length_n)
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
-    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
-    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p.conductance, p.leakage)
+    return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, p.conductance, p.leakage)
 
 
 @helper
-def one_valve_openings(rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+def one_valve_openings(rate: float, c: CylinderAir, p: Rig) -> tuple[float, float]:
     """Openings of one cylinder's single 5/3 valve for the wanted dF/dt: chamber N gets minus that of chamber P.
 
     The pneumatic stiffness is left to itself.
     """
     stroke = c.length_p + c.length_n
     active = control_model.active_flow_for(
-        rate, stiffness_of(c, p), c.speed, stroke, p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
+        rate, stiffness_of(c, p), c.speed, stroke, p.index, p.gas * p.temperature
     )  # fmt: skip
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
     opened = valves.opening_for_active_flow(
-        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / c.length_p, 0.5 * stroke / c.length_n, p[at.CONDUCTANCE],
-        p[at.LEAKAGE],
+        active, fill_p, drain_p, fill_n, drain_n, 0.5 * stroke / c.length_p, 0.5 * stroke / c.length_n, p.conductance,
+        p.leakage,
     )  # fmt: skip
     return opened, -opened
 
 
 @helper
-def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Array) -> tuple[float, float]:
+def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: Rig) -> tuple[float, float]:
     """As ``two_valve_openings``, but where a valve saturates the pneumatic stiffness gives way to the force.
 
     The pressurisation flow is moved to the nearest at which both chambers still get what the active flow asks of them;
@@ -113,7 +110,7 @@ def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: 
     active, pressurization = _flows_for(rate, stiffness_rate, c, p)
     fill_p, drain_p = driving_flows(c.pp, p)
     fill_n, drain_n = driving_flows(c.pn, p)
-    full, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
+    full, leak = p.conductance, p.leakage
     to_p, to_n = (c.length_p + c.length_n) / c.length_p, (c.length_p + c.length_n) / c.length_n
     # Bounds of qT + qA and of qT - qA from what each chamber can get; a valve without driving pressure stays shut.
     shut_p, shut_n = leak * (fill_p - drain_p), leak * (fill_n - drain_n)
@@ -129,8 +126,8 @@ def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: 
 
 
 @kernel
-def _flow_ranges(pressures: Array, spools: Array, p: Array, least: Array, most: Array, present: Array) -> None:
-    c, leak = p[at.CONDUCTANCE], p[at.LEAKAGE]
+def _flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Array, present: Array) -> None:
+    c, leak = p.conductance, p.leakage
     for chamber in range(4):
         for i in range(pressures.shape[1]):
             fill, drain = driving_flows(pressures[chamber, i], p)
@@ -145,20 +142,20 @@ def flow_ranges(pressures: Array, spools: Array, lane_parameters: Array) -> tupl
     ``pressures`` (4, N), Pa, ``spools`` (4, N) in [-1, 1], one rig's parameters (PARAMETERS,).
     """
     least, most, present = np.empty_like(pressures), np.empty_like(pressures), np.empty_like(pressures)
-    _flow_ranges(pressures, spools, lane_parameters, least, most, present)
+    _flow_ranges(pressures, spools, Rig(lane_parameters), least, most, present)
     return least, most, present
 
 
 @kernel
-def _openings_for_flows(flows: Array, pressures: Array, p: Array, openings: Array) -> None:
+def _openings_for_flows(flows: Array, pressures: Array, p: Rig, openings: Array) -> None:
     for chamber in range(4):
         for i in range(pressures.shape[1]):
             fill, drain = driving_flows(pressures[chamber, i], p)
-            openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p.conductance, p.leakage)
 
 
 def openings_for_flows(flows: Array, pressures: Array, lane_parameters: Array) -> Array:
     """Openings in [-1, 1] at which chambers P1, N1, P2, N2 get ``flows``, kg/s, or come near; (4, N) each."""
     openings = np.empty_like(flows)
-    _openings_for_flows(flows, pressures, lane_parameters, openings)
+    _openings_for_flows(flows, pressures, Rig(lane_parameters), openings)
     return openings

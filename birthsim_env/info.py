@@ -42,7 +42,8 @@ FIELDS = {name: (count, f"{unit}, {about}") for name, unit, about, count in Info
 @helper
 def describe(world: World, seen: Signals, info: Info, n: int) -> None:
     """Writes all fields of n lanes."""
-    state, p, reference, motion = world.state, world.rig, seen.reference, world.motion
+    state, p = world.state, world.rig
+    reference, motion = seen.reference, world.motion
     for i in range(n):
         info.time[i], info.since_jump[i] = seen.time[i], world.since_jump[i]
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]

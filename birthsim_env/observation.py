@@ -14,9 +14,8 @@ from birthsim_env.loop.rows import Signals, fill_measurement
 from birthsim_env.loop.signals import Joints, Measurement, Point, Reference, compliance
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import control_model, geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 from birthsim_env.physics.inverse_kinematics import piston_motion
 
@@ -60,7 +59,7 @@ SIZE = len(ENTRIES)
 
 
 @helper
-def look(seen: Signals, action: Array, shown: Array, p: Array, scales: Array, out: NDArray[np.float32], n: int) -> None:
+def look(seen: Signals, action: Array, shown: Array, p: Rig, scales: Array, out: NDArray[np.float32], n: int) -> None:
     """Writes observations of n lanes, ``out`` (N, SIZE + M + S), see ``observe``; then ``action`` (M, N), ``shown`` (S, N)."""
     point, joints, reference = Point(scratch(Point.size)), Joints(scratch(Joints.size)), seen.reference
     own = Observation(scratch(Observation.size)[:, 0])
@@ -69,8 +68,9 @@ def look(seen: Signals, action: Array, shown: Array, p: Array, scales: Array, ou
             point.position[axis, 0], point.velocity[axis, 0] = seen.position[axis, i], seen.velocity[axis, i]
         piston_motion(point.rows, p, joints.rows, 1)
         y1, y2 = joints.position[0, 0], joints.position[1, 0]
-        pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
-        half1, half2 = p[at.HALF_L1], p[at.HALF_L2]
+        pp1, pn1 = seen.pressure[0, i], seen.pressure[1, i]
+        pp2, pn2 = seen.pressure[2, i], seen.pressure[3, i]
+        half1, half2 = p.half_l1, p.half_l2
         edge1, edge2 = 0.02 * half1, 0.02 * half2
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         fx, fy = seen.user_force[0, i], seen.user_force[1, i]
@@ -85,18 +85,18 @@ def look(seen: Signals, action: Array, shown: Array, p: Array, scales: Array, ou
             own.target_acceleration[axis] = reference.acceleration[axis, i]
         own.piston[0], own.piston[1] = y1 / half1, y2 / half2
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         # Pressures and hand together: what is left to hold them in balance is weight and friction, whatever the hand does.
-        pressed1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], p[at.ATMOSPHERE])
-        pressed2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], p[at.ATMOSPHERE])
+        pressed1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, p.atmosphere)
+        pressed2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, p.atmosphere)
         own.force[0] = pressed1 + mechanics.user_force1(fx, fy, kappa, sine, cosine)
         own.force[1] = pressed2 + mechanics.user_force2(fx, fy, sine, cosine)
         own.pneumatic_stiffness[0] = control_model.pneumatic_stiffness(
-            pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], max(half1 + y1, edge1), max(half1 - y1, edge1), p[at.INDEX]
+            pp1, pn1, p.area_p1, p.area_n1, max(half1 + y1, edge1), max(half1 - y1, edge1), p.index
         )
         own.pneumatic_stiffness[1] = control_model.pneumatic_stiffness(
-            pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], max(half2 + y2, edge2), max(half2 - y2, edge2), p[at.INDEX]
+            pp2, pn2, p.area_p2, p.area_n2, max(half2 + y2, edge2), max(half2 - y2, edge2), p.index
         )
         for k in range(scales.shape[0]):
             out[i, k] = max(-LIMIT, min(LIMIT, own.rows[k] / scales[k]))
@@ -116,5 +116,5 @@ def observe(measurement: Measurement, reference: Reference, beside: Array, nomin
     out, seen = np.empty((lanes, SIZE + beside.shape[0]), dtype=np.float32), Signals(np.zeros((Signals.size, lanes)))
     fill_measurement(seen.rows, measurement)
     seen.reference.rows[:] = reference.rows
-    look(seen, beside, np.empty((0, lanes)), nominal, SCALES, out, lanes)
+    look(seen, beside, np.empty((0, lanes)), Rig(nominal), SCALES, out, lanes)
     return out

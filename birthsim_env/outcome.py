@@ -12,7 +12,7 @@ from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.signals import Mask, compliance
 from birthsim_env.loop.stage import Stage, block, singles, table2
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
@@ -39,7 +39,7 @@ class About(Numbers):
     limits = part(reward.Limits, "of the environment")
     actions = number("1", "length of an action")
     shown = number("1", "length of what is shown of a memory")
-    rig = rows(PARAMETERS, "SI", "the rig as described")
+    rig = part(Rig, "the rig as described")
     scales = rows(observation.SIZE, "SI", "of an observation")
 
 

@@ -88,7 +88,8 @@ def assess(
     ``owed`` is carried on. ``action`` and ``last_action`` (size, N).
     """
     steps, kept = limits.period / 0.01, exact.exp(-limits.period / GIVING_WAY)
-    unit, entries, state, force = steps / LARGEST_COST, max(1, action.shape[0]), world.state, world.force
+    unit, entries = steps / LARGEST_COST, max(1, action.shape[0])
+    state, force = world.state, world.force
     for i in range(n):
         kx, ky, kxy = reference.stiffness[0, i], reference.stiffness[1, i], reference.stiffness_coupling[i]
         given, jumped = compliance(force[0, i], force[1, i], kx, ky, kxy), world.since_jump[i] < limits.jumped_below

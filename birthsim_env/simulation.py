@@ -45,7 +45,7 @@ from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.inverse_kinematics import pistons_at
@@ -201,7 +201,7 @@ class Simulation:
             self._begun = True
         inverse_geometry(start, self.parameters)  # refuses what is out of reach
         joints = np.empty((4, len(chosen)))
-        pistons_at(np.concatenate([start, speed]), self.nominal, joints)
+        pistons_at(np.concatenate([start, speed]), Rig(self.nominal), joints)
         own = self.plant.lane_parameters.take(chosen, axis=1)
         self.plant.state[:, chosen] = balanced_state(own, joints[:2], joints[2:], rows[10:12])
         self.plant.begin(chosen)

@@ -12,8 +12,8 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.stage import TABLE, Stage, block, singles, table3
 from birthsim_env.observation import SCALES, SIZE, look
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
+from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
 class About(Numbers):
@@ -25,7 +25,7 @@ class About(Numbers):
     layers = number("1", "layers of the network")
     squashed = number("1", "1 where the last layer is squashed")
     cells = number("1", "cells of the policy's own memory")
-    rig = rows(PARAMETERS, "SI", "the rig as described")
+    rig = part(Rig, "the rig as described")
     scales = rows(SIZE, "SI", "of an observation")
 
 

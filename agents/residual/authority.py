@@ -17,9 +17,8 @@ from baselines.backstepping.cartesian_law import across, along
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Rows, part, row, rows
 
 LEVEL = 0.1
@@ -66,13 +65,14 @@ def _yield(limiter: Limiter, cylinder: int, i: int, peak: float, level: float) -
 
 
 @helper
-def limit_authority(joints: Joints, target: Reference, p: Array, period: float, level: float, limiter: Limiter) -> None:
-    """Carries the ``limiter`` of N lanes on by one period. Half waves below ``level``, m/s, do not count."""
+def limit_authority(joints: Joints, target: Reference, p: Rig, period: float, level: float, limiter: Limiter, n: int) -> None:
+    """Carries the ``limiter`` of n lanes on by one period. Half waves below ``level``, m/s, do not count."""
     kept, asked = exact.exp(-period / RECOVERY), target.velocity
-    for i in range(joints.rows.shape[1]):
-        y1, y2, vx, vy = joints.position[0, i], joints.position[1, i], asked[0, i], asked[1, i]
+    for i in range(n):
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        vx, vy = asked[0, i], asked[1, i]
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         error1 = -kappa * joints.speed[0, i] - across(vx, vy, sine, cosine)
         error2 = joints.speed[1, i] - along(vx, vy, sine, cosine)

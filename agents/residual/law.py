@@ -26,7 +26,7 @@ from birthsim_env.loop.stage import scratch
 from birthsim_env.observation import ENTRIES, LIMIT
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -113,7 +113,7 @@ class Constants(Numbers):
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
     period = number("s", "control period")
-    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 class Memory(Rows):
@@ -126,14 +126,14 @@ class Memory(Rows):
 
 
 @helper
-def stiffen(force: Array, powers: Array, asked: Reference) -> None:
-    """Changes what is ``asked`` of N lanes to K' = K STIFFENING^``powers`` (2, N), the target moved by F/K - F/K'.
+def stiffen(force: Array, powers: Array, asked: Reference, n: int) -> None:
+    """Changes what is ``asked`` of n lanes to K' = K STIFFENING^``powers`` (2, N), the target moved by F/K - F/K'.
 
-    K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does. ``force`` (2, N), N, is the
+    K' exceeds ``STIFFEST`` only where K does, and falls below ``SOFTEST`` only where K does. ``force`` (2, n), N, is the
     hand's. The coupling Kclxy stays and moves nothing: the paper's law knows none.
     """
     stiffness, position = asked.stiffness, asked.position
-    for i in range(powers.shape[1]):
+    for i in range(n):
         for axis in range(2):
             if powers[axis, i] != 0.0:
                 before = stiffness[axis, i]
@@ -143,10 +143,10 @@ def stiffen(force: Array, powers: Array, asked: Reference) -> None:
 
 
 @helper
-def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth: Action, said: Correction) -> None:
-    """Writes what actions (size, N) say; ``smooth`` goes on by one period towards them."""
+def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth: Action, said: Correction, n: int) -> None:
+    """Writes what actions (size, n) say; ``smooth`` goes on by one period towards them."""
     size, most, left = action.shape[0], about.authority, limiter.left
-    for i in range(action.shape[1]):
+    for i in range(n):
         for k in range(2):
             strength = most * left[k, i]
             said.force[k, i] = strength * smooth.force[k, i]
@@ -159,28 +159,28 @@ def _correct(action: Array, limiter: authority.Limiter, about: Constants, smooth
 
 @kernel
 def _stage(world: int, seen: Seen, memory: Memory, about: Constants, tables: int, lane: int, n: int) -> int:
-    size, signals, own = int(about.actions), Seen(seen.rows[:, :n]), Memory(memory.rows[:, :n])
-    said, found = Correction(scratch(Correction.size)[:, :n]), Found(signals.handed[: Found.size])
-    unexplained.remember(found.joints, found.disturbance, about.rig, about.period, own.moved, own.unexplained)
-    limiter, action, shown, asked, target = own.limiter, signals.action[:size], signals.shown, signals.asked, signals.reference
-    authority.limit_authority(found.joints, target, about.rig, about.period, about.level, limiter)
-    _correct(action, limiter, about, own.smooth, said)
+    size, found, said = int(about.actions), Found(seen.handed[: Found.size]), Correction(scratch(Correction.size))
+    unexplained.remember(found.joints, found.disturbance, about.rig, about.period, memory.moved, memory.unexplained, n)
+    limiter, action, shown = memory.limiter, seen.action[:size], seen.shown
+    asked, target = seen.asked, seen.reference
+    authority.limit_authority(found.joints, target, about.rig, about.period, about.level, limiter, n)
+    _correct(action, limiter, about, memory.smooth, said, n)
     for i in range(n):
         for k in range(Reference.size):
             asked.rows[k, i] = target.rows[k, i]
         for k in range(size):
-            shown[k, i] = own.smooth.rows[k, i]
+            shown[k, i] = memory.smooth.rows[k, i]
         for k in range(2):
-            signals.feedforward.force[k, i], signals.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
+            seen.feedforward.force[k, i], seen.feedforward.rate[k, i] = said.force[k, i], said.rate[k, i]
             said.powers[k, i] = said.powers[k, i] - limiter.softness[i]
             shown[size + k, i] = limiter.left[k, i]
-        signals.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
+        seen.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
         for k in range(unexplained.Forces.size):
-            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, own.unexplained.rows[k, i] / about.unit))
+            shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, memory.unexplained.rows[k, i] / about.unit))
         for valve in range(4 if about.has_law == 0.0 else 0):
-            signals.opening[valve, i] = action[valve, i]
+            seen.opening[valve, i] = action[valve, i]
     if about.stiffens > 0.0:
-        stiffen(signals.user_force, said.powers, asked)
+        stiffen(seen.user_force, said.powers, asked, n)
     return 0
 
 

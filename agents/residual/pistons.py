@@ -13,6 +13,7 @@ from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Joints, Point
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -32,45 +33,44 @@ class Sampled(Numbers):
 
 
 @helper
-def _given(seen: Seen, about: Belief, given: Given) -> None:
-    """Writes what the observer is ``given``."""
-    for i in range(seen.time.shape[0]):
+def _given(force: Array, about: Belief, given: Given, n: int) -> None:
+    """Writes what the observer is ``given``, with the hand's ``force`` (2, n), N."""
+    for i in range(n):
         for k in range(2):
-            given.force[k, i], given.believed[k, i] = seen.user_force[k, i], 0.0
+            given.force[k, i], given.believed[k, i] = force[k, i], 0.0
         given.moving[i], given.noise[i] = 1.0, about.noise
 
 
 @helper
-def _hand_on(pistons: Pistons, found: Found) -> None:
+def _hand_on(pistons: Pistons, found: Found, n: int) -> None:
     """Writes the disturbance."""
-    for i in range(pistons.fresh.shape[0]):
+    for i in range(n):
         for k in range(2):
             found.disturbance[k, i] = pistons.disturbance[k, i]
 
 
 @kernel
-def _measure(world: int, seen: Seen, memory: Pistons, about: Belief, tables: int, lane: int, n: int) -> int:
+def _measure(world: int, seen: Seen, pistons: Pistons, about: Belief, tables: int, lane: int, n: int) -> int:
     """Where positions and speeds are measured."""
-    signals, pistons, given = Seen(seen.rows[:, :n]), Pistons(memory.rows[:, :n]), Given(scratch(Given.size)[:, :n])
-    found = Found(signals.handed[: Found.size])
-    _given(signals, about, given)
-    point = Point(signals.rows[POSITION : POSITION + Point.size])
-    disturbance_observer.observe(pistons, point, signals.pressure, given, about, found.joints)
-    _hand_on(pistons, found)
+    given, found = Given(scratch(Given.size)), Found(seen.handed[: Found.size])
+    _given(seen.user_force, about, given, n)
+    point = Point(seen.rows[POSITION : POSITION + Point.size])
+    disturbance_observer.observe(pistons, point, seen.pressure, given, about, found.joints, n)
+    _hand_on(pistons, found, n)
     return 0
 
 
 @kernel
 def _observe(world: int, seen: Seen, memory: int, about: Sampled, tables: int, lane: int, n: int) -> int:
     """Where positions are samples."""
-    signals, given = Seen(seen.rows[:, :n]), Given(scratch(Given.size)[:, :n])
+    signals, given = Seen(seen.rows[:, :n]), Given(scratch(Given.size))
     pistons, found = Pistons(block(memory, int(about.rows_of_memory))[:, :n]), Found(signals.handed[: Found.size])
-    _given(signals, about.belief, given)
+    _given(signals.user_force, about.belief, given, n)
     observers.observe(pistons, signals, signals.pressure, given, about.belief)
     for i in range(n):
         for k in range(2):
             found.joints.position[k, i], found.joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
-    _hand_on(pistons, found)
+    _hand_on(pistons, found, n)
     return 0
 
 

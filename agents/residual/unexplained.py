@@ -9,9 +9,8 @@ from __future__ import annotations
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 
 BANDWIDTH = 60.0
@@ -50,16 +49,14 @@ def _average(last: Array, moved: Array, cylinder: int, i: int, moves: bool, forc
 
 
 @helper
-def remember(joints: Joints, disturbance: Array, p: Array, period: float, moved: Moved, forces: Forces) -> None:
-    """Brings the ``forces`` of N lanes up to a ``disturbance`` (2, N), m/s2."""
+def remember(joints: Joints, disturbance: Array, p: Rig, period: float, moved: Moved, forces: Forces, n: int) -> None:
+    """Brings the ``forces`` of n lanes up to a ``disturbance`` (2, n), m/s2."""
     fraction = 1.0 - exact.exp(-period / AVERAGE)
-    for i in range(joints.rows.shape[1]):
+    for i in range(n):
         y1, y2 = joints.position[0, i], joints.position[1, i]
-        _, _, _, _, _, kappa, _, _ = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
-        )
+        _, _, _, _, _, kappa, _, _ = geometry.pose(y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)
         for cylinder in range(2):
-            mass = p[at.MASS] * kappa * kappa if cylinder == 0 else p[at.MASS]
+            mass = p.mass * kappa * kappa if cylinder == 0 else p.mass
             force, speed = mass * disturbance[cylinder, i], joints.speed[cylinder, i]
             forces.now[cylinder, i] = force
             _average(forces.out, moved.out, cylinder, i, speed > MOVING, force, fraction)

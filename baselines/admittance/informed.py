@@ -16,7 +16,7 @@ from baselines.estimation.admittance import Compliance
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import HANDED
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.rig.parameters import Parameters
 
 
@@ -62,5 +62,5 @@ class Informed(StagedController):
         lanes, steps = known.drag.shape[1], self.parameters.electronics.control_period * np.diff(ticks, prepend=0)
         ahead, drag = np.empty((len(ticks), 4, lanes)), np.empty((len(ticks), 2, lanes))
         admittance.forecast(memory.offset, reference, known.given.force, about, ticks, ahead)
-        reference_friction.forecast(ahead, self._p, steps, memory.bristle, drag)
+        reference_friction.forecast(ahead, Rig(self._p), steps, memory.bristle, drag)
         return ahead, known.unseen - known.given.believed - self._fraction * drag

@@ -31,7 +31,6 @@ from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -74,7 +73,8 @@ def predict(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
 @helper
 def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     """The pistons, and what accelerates them unseen."""
-    joints, pistons, given, belief = memory.joints, memory.pistons, known.given, about.belief
+    joints, pistons = memory.joints, memory.pistons
+    given, belief = known.given, about.belief
     lanes, place, p = memory.fresh.shape[0], int(about.place), belief.rig
     if about.sampled > 0.0:
         observers.observe(pistons, seen, memory.chambers.pressure, given, belief)
@@ -83,14 +83,14 @@ def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
                 joints.position[k, i], joints.speed[k, i] = pistons.position[k, i], pistons.speed[k, i]
     else:
         point = Point(seen.rows[place : place + Point.size])
-        disturbance_observer.observe(pistons, point, memory.chambers.pressure, given, belief, joints)
+        disturbance_observer.observe(pistons, point, memory.chambers.pressure, given, belief, joints, lanes)
     for i in range(lanes):
         _, _, _, _, _, kappa, _, _ = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
-            p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
+            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
+            p.sin_gamma3, p.cos_gamma3,
         )  # fmt: skip
         for k in range(2):
-            found = (p[at.MASS] * kappa * kappa if k == 0 else p[at.MASS]) * pistons.disturbance[k, i]
+            found = (p.mass * kappa * kappa if k == 0 else p.mass) * pistons.disturbance[k, i]
             known.unexplained[k, i] = given.believed[k, i] + found
             known.unseen[k, i] = given.believed[k, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, found))
 

@@ -23,7 +23,6 @@ from baselines.valve_inverse import air_at
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 
 MOTION_TIME = 0.1
@@ -93,20 +92,24 @@ def beyond(error: float, zone: float) -> float:
 @helper
 def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belief) -> None:
     """Writes the openings to ``seen`` and carries ``memory.follower`` on by one period."""
-    p, period, motion, hand, asked = about.rig, about.period, known.motion, known.given.force, seen.asked
-    feedforward, joints, pressure, follower = seen.feedforward, memory.joints, memory.chambers.pressure, memory.follower
-    kept, rest, c4 = exact.exp(-period / p[at.TAU]), memory.pistons.rest, gains.pneumatic_gain
+    p, period, motion = about.rig, about.period, known.motion
+    hand, asked = known.given.force, seen.asked
+    feedforward, joints = seen.feedforward, memory.joints
+    pressure, follower = memory.chambers.pressure, memory.follower
+    kept, rest, c4 = exact.exp(-period / p.tau), memory.pistons.rest, gains.pneumatic_gain
     for i in range(memory.fresh.shape[0]):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        pp1, pn1, pp2, pn2 = pressure[0, i], pressure[1, i], pressure[2, i], pressure[3, i]
-        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        v1, v2 = joints.speed[0, i], joints.speed[1, i]
+        pp1, pn1 = pressure[0, i], pressure[1, i]
+        pp2, pn2 = pressure[2, i], pressure[3, i]
+        m, gravity, atmosphere = p.mass, p.gravity, p.atmosphere
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
-        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - p[at.FV1] * v1
-        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - p[at.FV2] * v2
+        load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - p.fv1 * v1
+        load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - p.fv2 * v2
         load1 = load1 + known.unseen[0, i] + feedforward.force[0, i]
         load2 = load2 + known.unseen[1, i] + feedforward.force[1, i]
 
@@ -116,7 +119,8 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         dt = -kappa * v1 - across(motion.velocity[0, i], motion.velocity[1, i], sine, cosine)
         dn = v2 - along(motion.velocity[0, i], motion.velocity[1, i], sine, cosine)
         push_t, push_n = across(hand[0, i], hand[1, i], sine, cosine), along(hand[0, i], hand[1, i], sine, cosine)
-        ax, ay, jx, jy = motion.acceleration[0, i], motion.acceleration[1, i], motion.jerk[0, i], motion.jerk[1, i]
+        ax, ay = motion.acceleration[0, i], motion.acceleration[1, i]
+        jx, jy = motion.jerk[0, i], motion.jerk[1, i]
         at_ = (push_t - load1 / kappa) / m - gravity * sine - across(ax, ay, sine, cosine)
         an_ = (push_n + load2) / m + gravity * cosine - along(ax, ay, sine, cosine)
 
@@ -130,10 +134,10 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         jerk_t = across(jx, jy, sine, cosine) - jerk_for(at_, dt, et, fraction_t * c)
         jerk_n = along(jx, jy, sine, cosine) - jerk_for(an_, dn, en, fraction_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
-        rate1 += p[at.FV1] * mechanics.acceleration1(
-            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity
+        rate1 += p.fv1 * mechanics.acceleration1(
+            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, gravity
         )  # fmt: skip
-        rate2 += p[at.FV2] * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
+        rate2 += p.fv2 * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, p.inverse_mass, gravity)
         rate1, rate2 = rate1 - feedforward.rate[0, i], rate2 - feedforward.rate[1, i]
         stiffness, stiffness_rate = asked.pneumatic_stiffness, asked.pneumatic_stiffness_rate
         first, second = air_at(0, pp1, pn1, y1, v1, p), air_at(1, pp2, pn2, y2, v2, p)

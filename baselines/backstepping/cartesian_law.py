@@ -20,10 +20,9 @@ from baselines.valve_inverse import CylinderAir, air_at, force_first_openings, s
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
-from birthsim_env.physics.compiled.records import Numbers, number, rows
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.compiled.records import Numbers, number, part
 
 
 @helper
@@ -57,7 +56,7 @@ def load_rates(
 
 @helper
 def pressure_openings(
-    rate: float, wanted: float, wanted_rate: float, c4: float, cylinder: CylinderAir, p: Array
+    rate: float, wanted: float, wanted_rate: float, c4: float, cylinder: CylinderAir, p: Rig
 ) -> tuple[float, float]:  # fmt: skip
     """Openings of one cylinder for dF/dt = ``rate`` while its pneumatic stiffness (9) tends to ``wanted`` at c4."""
     return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(cylinder, p) - wanted), cylinder, p)
@@ -69,7 +68,7 @@ class Constants(Numbers):
     pneumatic_gain = number("1/s", "c4")
     sign_width = number("m/s", "width of the smoothed sign")
     least_stiffness = number("N/m", "least stiffness setpoint")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @helper
@@ -79,17 +78,17 @@ def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
     for i in range(n):
         y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
         pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
-        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        m, gravity, atmosphere = p.mass, p.gravity, p.atmosphere
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
 
-        drag1 = p[at.FC1] * smooth_sign(v1, width) + p[at.FV1] * v1
-        drag2 = p[at.FC2] * smooth_sign(v2, width) + p[at.FV2] * v2
-        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - drag1
-        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - drag2
+        drag1 = p.fc1 * smooth_sign(v1, width) + p.fv1 * v1
+        drag2 = p.fc2 * smooth_sign(v2, width) + p.fv2 * v2
+        load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - drag1
+        load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - drag2
         ax, ay = cartesian(-load1 / (kappa * m), load2 / m, sine, cosine)
         ay -= gravity
         vx, vy = cartesian(-kappa * v1, v2, sine, cosine)
@@ -100,16 +99,16 @@ def law(seen: Seen, joints: Joints, about: Constants, n: int) -> None:
         springx, springy = kxx * ex + kxy * ey, kxy * ex + kyy * ey
         cxx, cyy, cxy = square_root(3.0 * kxx - 2.0, 3.0 * kyy - 2.0, 3.0 * kxy)
         fx, fy = ax - target.acceleration[0, i] + springx, ay - target.acceleration[1, i] + springy
-        drag_t = p[at.FV1] / (kappa * kappa * m) * across(springx, springy, sine, cosine)
-        drag_n = p[at.FV2] / m * along(springx, springy, sine, cosine)
+        drag_t = p.fv1 / (kappa * kappa * m) * across(springx, springy, sine, cosine)
+        drag_n = p.fv2 / m * along(springx, springy, sine, cosine)
         jx = target.jerk[0, i] - 3.0 * (cxx * fx + cxy * fy) - (9.0 * kxx - 4.0) * dx - 9.0 * kxy * dy
         jy = target.jerk[1, i] - 3.0 * (cxy * fx + cyy * fy) - (9.0 * kyy - 4.0) * dy - 9.0 * kxy * dx
         jerk_t, jerk_n = across(jx, jy, sine, cosine) + drag_t, along(jx, jy, sine, cosine) + drag_n
 
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         # The Coulomb term is taken to be constant: at rest the model's acceleration, which lacks the user's force, is not 0.
-        rate1 += p[at.FV1] * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
-        rate2 += p[at.FV2] * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], gravity)
+        rate1 += p.fv1 * mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, gravity)
+        rate2 += p.fv2 * mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p.inverse_mass, gravity)
         stiffness, stiffness_rate = target.pneumatic_stiffness, target.pneumatic_stiffness_rate
         first, second = air_at(0, pp1, pn1, y1, v1, p), air_at(1, pp2, pn2, y2, v2, p)
         opening[0, i], opening[1, i] = pressure_openings(rate1, stiffness[0, i], stiffness_rate[0, i], c4, first, p)

@@ -21,8 +21,8 @@ from birthsim_env.loop.rows import ACTION, ASKED, Seen
 from birthsim_env.loop.signals import Joints, Measurement, Reference
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
-from birthsim_env.physics.compiled.records import Numbers, part, rows
+from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.records import Numbers, part
 from birthsim_env.physics.geometry import jacobian
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import is_within, limits, shown
@@ -58,7 +58,7 @@ class Constants(Numbers):
     """Of the stage."""
 
     options = part(backstepping_law.Options, "of the law")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @kernel
@@ -175,7 +175,7 @@ class BacksteppingController(StagedController):
         seen, joints = Seen(np.zeros((Seen.size, lanes))), Joints(self._joints.copy())
         seen.rows[:ASKED], seen.rows[ASKED:ACTION] = self._seen, self._asked
         terms = backstepping_law.Terms(np.zeros((backstepping_law.Terms.size, lanes)))
-        backstepping_law.inspect(seen, joints, self._p, backstepping_law.Options(self._options), terms)
+        backstepping_law.inspect(seen, joints, Rig(self._p), backstepping_law.Options(self._options), terms)
         gains, rates = (one.rows.reshape(3, 2, lanes) for one in (terms.gains, terms.gain_rates))
         intent = terms.intent
         return LawTerms(

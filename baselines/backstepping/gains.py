@@ -21,7 +21,6 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from birthsim_env.physics.compiled.compilation import helper
 
@@ -139,6 +138,8 @@ def least_damping(stiffness: float, apparent_mass: float, viscous: float) -> flo
 
     Every larger one can be rendered too. Raises ``ValueError`` for a stiffness that leaves c2 no positive value.
     """
+    from scipy.optimize import minimize_scalar  # late: it takes 0.3 s, and a law does without
+
     k, drag = stiffness / apparent_mass, viscous / apparent_mass
     if not k > 1:
         raise ValueError(f"stiffness = {stiffness:g} N/m; allowed with a damping: more than m_e/s2 = {apparent_mass:g} N/m")
@@ -240,6 +241,8 @@ def gains_for(
 
 def _gains_of_sum(a0: float, a1: float, a2: float) -> tuple[float, float, float]:
     """The gains with the largest c3, for an a1 that ``_a1`` takes between its nodes (rounding aside)."""
+    from scipy.optimize import brentq  # late, as above
+
     nodes, found = _inner_gains(a0, a2), []
     for left, right in pairwise(nodes):
         at_left, at_right = _a1(left, a0, a2) - a1, _a1(right, a0, a2) - a1

@@ -21,9 +21,8 @@ from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.inverse_kinematics import piston_reference
 
@@ -120,45 +119,46 @@ def outer_jerk(v: float, a: float, vd: float, ad: float, jd: float, c1: float, c
 
 
 @helper
-def needs_of_gains(joints: Joints, target: Reference, p: Array, needs: Needs, n: int) -> None:
+def needs_of_gains(joints: Joints, target: Reference, p: Rig, needs: Needs, n: int) -> None:
     """Writes what the gains of n lanes follow from."""
     for i in range(n):
-        y1, y2, kx, ky = joints.position[0, i], joints.position[1, i], target.stiffness[0, i], target.stiffness[1, i]
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        kx, ky = target.stiffness[0, i], target.stiffness[1, i]
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         needs.stiffness[0, i] = joint_stiffness1(kx, ky, kappa, sine, cosine)
         needs.stiffness[1, i] = joint_stiffness2(kx, ky, sine, cosine)
-        needs.mass[i] = p[at.MASS] * kappa * kappa
+        needs.mass[i] = p.mass * kappa * kappa
 
 
 @helper
-def equal_gains(needs: Needs, p: Array, gains: Gains, n: int) -> int:
+def equal_gains(needs: Needs, p: Rig, gains: Gains, n: int) -> int:
     """Writes ``gains`` with c1 = c2 = c3; returns the number of lanes without any."""
-    m, misses = p[at.MASS], 0
+    m, misses = p.mass, 0
     for i in range(n):
         k1, k2, mass1 = needs.stiffness[0, i], needs.stiffness[1, i], needs.mass[i]
-        missed = equal_gain_misses(k1, mass1, p[at.FV1]) + equal_gain_misses(k2, m, p[at.FV2])
+        missed = equal_gain_misses(k1, mass1, p.fv1) + equal_gain_misses(k2, m, p.fv2)
         misses += 1 if missed > 0.0 else 0
     for i in range(n):
-        first = equal_gain(needs.stiffness[0, i], needs.mass[i], p[at.FV1])
-        second = equal_gain(needs.stiffness[1, i], m, p[at.FV2])
+        first = equal_gain(needs.stiffness[0, i], needs.mass[i], p.fv1)
+        second = equal_gain(needs.stiffness[1, i], m, p.fv2)
         gains.c1[0, i], gains.c2[0, i], gains.c3[0, i] = first, first, first
         gains.c1[1, i], gains.c2[1, i], gains.c3[1, i] = second, second, second
     return misses
 
 
 @helper
-def damped_gains(needs: Needs, p: Array, ratio: float, gains: Gains, n: int) -> int:
+def damped_gains(needs: Needs, p: Rig, ratio: float, gains: Gains, n: int) -> int:
     """As ``equal_gains``, with c1 = c3 for the damping B = 2 ``ratio`` sqrt(K m_e)."""
-    m, misses = p[at.MASS], 0
+    m, misses = p.mass, 0
     for i in range(n):
         k1, k2, mass1 = needs.stiffness[0, i], needs.stiffness[1, i], needs.mass[i]
         b1, b2 = 2.0 * ratio * math.sqrt(k1 * mass1), 2.0 * ratio * math.sqrt(k2 * m)
-        outer1, outer2 = outer_gain(k1, b1, mass1, p[at.FV1]), outer_gain(k2, b2, m, p[at.FV2])
-        inner1, inner2 = inner_gain(outer1, k1, mass1, p[at.FV1]), inner_gain(outer2, k2, m, p[at.FV2])
-        missed = damped_gains_miss(outer1, inner1, k1, b1, mass1, p[at.FV1])
-        missed += damped_gains_miss(outer2, inner2, k2, b2, m, p[at.FV2])
+        outer1, outer2 = outer_gain(k1, b1, mass1, p.fv1), outer_gain(k2, b2, m, p.fv2)
+        inner1, inner2 = inner_gain(outer1, k1, mass1, p.fv1), inner_gain(outer2, k2, m, p.fv2)
+        missed = damped_gains_miss(outer1, inner1, k1, b1, mass1, p.fv1)
+        missed += damped_gains_miss(outer2, inner2, k2, b2, m, p.fv2)
         misses += 1 if missed > 0.0 else 0
         gains.c1[0, i], gains.c2[0, i], gains.c3[0, i] = outer1, inner1, outer1
         gains.c1[1, i], gains.c2[1, i], gains.c3[1, i] = outer2, inner2, outer2
@@ -166,13 +166,13 @@ def damped_gains(needs: Needs, p: Array, ratio: float, gains: Gains, n: int) -> 
 
 
 @helper
-def raise_damping(needs: Needs, p: Array, factor: Array, gains: Gains, n: int) -> None:
+def raise_damping(needs: Needs, p: Rig, factor: Array, gains: Gains, n: int) -> None:
     """Turns equal ``gains`` into those of ``factor`` (n,) times their damping where that is more."""
     for i in range(n):
         if factor[i] > LEAST_FACTOR:
             for cylinder in range(2):
                 k, c = needs.stiffness[cylinder, i], gains.c1[cylinder, i]
-                mass, viscous = (needs.mass[i], p[at.FV1]) if cylinder == 0 else (p[at.MASS], p[at.FV2])
+                mass, viscous = (needs.mass[i], p.fv1) if cylinder == 0 else (p.mass, p.fv2)
                 damping = factor[i] * (mass * (3.0 * c * c + 2.0) - k) / (3.0 * c - viscous / mass)
                 outer = outer_gain(k, damping, mass, viscous)
                 gains.c1[cylinder, i], gains.c3[cylinder, i] = outer, outer
@@ -180,7 +180,7 @@ def raise_damping(needs: Needs, p: Array, factor: Array, gains: Gains, n: int) -
 
 
 @helper
-def choose_gains(joints: Joints, target: Reference, factor: Array, p: Array, ratio: float, terms: Terms, n: int) -> int:
+def choose_gains(joints: Joints, target: Reference, factor: Array, p: Rig, ratio: float, terms: Terms, n: int) -> int:
     """Writes the gains for the setpoints of ``target``; returns the number of lanes without any.
 
     ``damped_gains`` where ``ratio`` is more than 0, else equal gains with ``factor`` (n,) times their damping.
@@ -194,28 +194,33 @@ def choose_gains(joints: Joints, target: Reference, factor: Array, p: Array, rat
 
 
 @helper
-def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n: int) -> None:
+def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: int) -> None:
     """Writes what the law wants of n lanes, with the reference and the gains of ``terms``."""
-    c4, width, compensate, sliding = options.pneumatic_gain, options.sign_width, options.weight, options.coulomb_rate
-    wanted, gains, intent, target, believed = terms.wanted, terms.gains, terms.intent, seen.asked, seen.feedforward
+    c4, width = options.pneumatic_gain, options.sign_width
+    compensate, sliding = options.weight, options.coulomb_rate
+    wanted, gains, intent = terms.wanted, terms.gains, terms.intent
+    target, believed = seen.asked, seen.feedforward
     for i in range(n):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
-        pp1, pn1, pp2, pn2 = seen.pressure[0, i], seen.pressure[1, i], seen.pressure[2, i], seen.pressure[3, i]
-        yd1, yd2, vd1, vd2 = wanted.position[0, i], wanted.position[1, i], wanted.speed[0, i], wanted.speed[1, i]
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        v1, v2 = joints.speed[0, i], joints.speed[1, i]
+        pp1, pn1 = seen.pressure[0, i], seen.pressure[1, i]
+        pp2, pn2 = seen.pressure[2, i], seen.pressure[3, i]
+        yd1, yd2 = wanted.position[0, i], wanted.position[1, i]
+        vd1, vd2 = wanted.speed[0, i], wanted.speed[1, i]
         ad1, ad2 = wanted.acceleration[0, i], wanted.acceleration[1, i]
-        m, gravity, atmosphere = p[at.MASS], p[at.GRAVITY], p[at.ATMOSPHERE]
+        m, gravity, atmosphere = p.mass, p.gravity, p.atmosphere
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         pole = 2.0 * r4 * w / s2
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + pole * v1
 
-        drag1 = p[at.FC1] * smooth_sign(v1, width) + p[at.FV1] * v1
-        drag2 = p[at.FC2] * smooth_sign(v2, width) + p[at.FV2] * v2
-        load1 = mechanics.piston_force(pp1, pn1, p[at.AREA_P1], p[at.AREA_N1], atmosphere) - drag1 + believed.force[0, i]
-        load2 = mechanics.piston_force(pp2, pn2, p[at.AREA_P2], p[at.AREA_N2], atmosphere) - drag2 + believed.force[1, i]
-        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], gravity)
+        drag1 = p.fc1 * smooth_sign(v1, width) + p.fv1 * v1
+        drag2 = p.fc2 * smooth_sign(v2, width) + p.fv2 * v2
+        load1 = mechanics.piston_force(pp1, pn1, p.area_p1, p.area_n1, atmosphere) - drag1 + believed.force[0, i]
+        load2 = mechanics.piston_force(pp2, pn2, p.area_p2, p.area_n2, atmosphere) - drag2 + believed.force[1, i]
+        a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, gravity)
         neglected = gravity * cosine + r2 * turn * turn
         a2 = load2 / m + compensate * neglected
         turn_rate = turn * (v1 / r4 + pole * v1) - 2.0 * r4 * a1 / root
@@ -228,11 +233,11 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
         pole_rate = v1 * ((2.0 * w + 4.0 * r4 * r4) / s2 + 2.0 * pole * pole)
         growth_rate = stretch + a1 / r4 - v1 * v1 / (r4 * r4) + pole * a1 + pole_rate * v1
         transport_rate = a1 * (growth + v2 / r2) + v1 * (growth_rate + stretch)
-        net1 = pp1 * p[at.AREA_P1] - pn1 * p[at.AREA_N1]
+        net1 = pp1 * p.area_p1 - pn1 * p.area_n1
         star1 = mass1 * (accel1 + transport) + (net1 - load1) - m * kappa * gravity * sine
         star1_rate = (
             mass1 * (2.0 * growth * (accel1 + transport) + jerk1 + transport_rate)
-            + (sliding * p[at.FC1] * smooth_sign_slope(v1, width) + p[at.FV1]) * a1
+            + (sliding * p.fc1 * smooth_sign_slope(v1, width) + p.fv1) * a1
             - m * gravity * kappa * (growth * sine + cosine * turn)
         )
         # F* takes off what is believed, and dF*/dt its rate.
@@ -243,11 +248,9 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
         accel2 = outer_acceleration(y2, v2, yd2, vd2, ad2, gains.c1[1, i], gains.c2[1, i])
         jerk2 = outer_jerk(v2, a2, vd2, ad2, wanted.jerk[1, i], gains.c1[1, i], gains.c2[1, i])
         neglected_rate = -gravity * sine * turn + v2 * turn * turn + 2.0 * r2 * turn * turn_rate
-        net2 = pp2 * p[at.AREA_P2] - pn2 * p[at.AREA_N2]
+        net2 = pp2 * p.area_p2 - pn2 * p.area_n2
         star2 = m * (accel2 - compensate * neglected) + (net2 - load2)
-        star2_rate = (
-            m * (jerk2 - compensate * neglected_rate) + (sliding * p[at.FC2] * smooth_sign_slope(v2, width) + p[at.FV2]) * a2
-        )
+        star2_rate = m * (jerk2 - compensate * neglected_rate) + (sliding * p.fc2 * smooth_sign_slope(v2, width) + p.fv2) * a2
         star2_rate -= believed.rate[1, i]
         z2 = v2 - vd2 + gains.c1[1, i] * (y2 - yd2)
         intent.force_rate[1, i] = star2_rate - m * z2 - gains.c3[1, i] * (net2 - star2)
@@ -260,11 +263,12 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Array, options: Options, n:
 
 
 @helper
-def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Array, options: Options, openings: Openings, n: int) -> None:
+def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Rig, options: Options, openings: Openings, n: int) -> None:
     """Writes the ``openings`` of n lanes for what the law wants."""
     opening, one_valve, force_first = openings.opening, options.one_valve > 0.0, options.force_first > 0.0
     for i in range(n):
-        y1, y2, v1, v2 = joints.position[0, i], joints.position[1, i], joints.speed[0, i], joints.speed[1, i]
+        y1, y2 = joints.position[0, i], joints.position[1, i]
+        v1, v2 = joints.speed[0, i], joints.speed[1, i]
         first = air_at(0, seen.pressure[0, i], seen.pressure[1, i], y1, v1, p)
         second = air_at(1, seen.pressure[2, i], seen.pressure[3, i], y2, v2, p)
         rate1, rate2 = intent.force_rate[0, i], intent.force_rate[1, i]
@@ -275,11 +279,12 @@ def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Array, options: 
             (p1, n1), (p2, n2) = force_first_openings(rate1, stiff1, first, p), force_first_openings(rate2, stiff2, second, p)
         else:
             (p1, n1), (p2, n2) = two_valve_openings(rate1, stiff1, first, p), two_valve_openings(rate2, stiff2, second, p)
-        opening[0, i], opening[1, i], opening[2, i], opening[3, i] = p1, n1, p2, n2
+        opening[0, i], opening[1, i] = p1, n1
+        opening[2, i], opening[3, i] = p2, n2
 
 
 @helper
-def command(seen: Seen, joints: Joints, p: Array, options: Options, n: int) -> int:
+def command(seen: Seen, joints: Joints, p: Rig, options: Options, n: int) -> int:
     """Writes the openings of n lanes, at most BLOCK, with a rig's parameters (PARAMETERS,); returns how many have no gains."""
     # Openings of their own, apart from what they follow from: only then LLVM vectorises their loops.
     terms, openings = Terms(scratch(Terms.size)), Openings(scratch(Openings.size))
@@ -294,7 +299,7 @@ def command(seen: Seen, joints: Joints, p: Array, options: Options, n: int) -> i
 
 
 @kernel
-def inspect(seen: Seen, joints: Joints, p: Array, options: Options, terms: Terms) -> None:
+def inspect(seen: Seen, joints: Joints, p: Rig, options: Options, terms: Terms) -> None:
     """Writes what goes on inside ``command`` in N lanes, for analysis."""
     n, ratio = joints.rows.shape[1], options.damping_ratio
     moved, ahead, behind = Joints(joints.rows.copy()), Terms(terms.rows.copy()), Terms(terms.rows.copy())

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from birthsim_env.physics import control_model, friction, geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.compiled.records import Rows, row
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
@@ -41,25 +40,25 @@ class Flows(Rows):
 
 
 @kernel
-def _rates(x: State, u: Flows, p: Array, neglected_fraction: float, rates: State, neglected: Array) -> None:
-    gas_t, index = p[at.GAS] * p[at.TEMPERATURE], p[at.INDEX]
+def _rates(x: State, u: Flows, p: Rig, neglected_fraction: float, rates: State, neglected: Array) -> None:
+    gas_t, index = p.gas * p.temperature, p.index
     for i in range(x.rows.shape[1]):
         y2, v2, f2, k2, y1, v1, f1, k1 = x.y2[i], x.v2[i], x.f2[i], x.k2[i], x.y1[i], x.v1[i], x.f1[i], x.k1[i]
         r4, r2, w, s2, _, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
-        outside1 = p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1])
-        outside2 = p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2])
-        net1 = f1 - outside1 - friction.coulomb_force(v1, p[at.FC1], p[at.FV1], p[at.SIGN_SLOPE])
-        net2 = f2 - outside2 - friction.coulomb_force(v2, p[at.FC2], p[at.FV2], p[at.SIGN_SLOPE])
-        neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p[at.INVERSE_MASS], p[at.GRAVITY])
-        lp1, ln1, lp2, ln2 = p[at.HALF_L1] + y1, p[at.HALF_L1] - y1, p[at.HALF_L2] + y2, p[at.HALF_L2] - y2
+        outside1 = p.atmosphere * (p.area_p1 - p.area_n1)
+        outside2 = p.atmosphere * (p.area_p2 - p.area_n2)
+        net1 = f1 - outside1 - friction.coulomb_force(v1, p.fc1, p.fv1, p.sign_slope)
+        net2 = f2 - outside2 - friction.coulomb_force(v2, p.fc2, p.fv2, p.sign_slope)
+        neglected[i] = mechanics.acceleration2(0.0, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity)
+        lp1, ln1, lp2, ln2 = p.half_l1 + y1, p.half_l1 - y1, p.half_l2 + y2, p.half_l2 - y2
         rates.y2[i] = v2
-        rates.v2[i] = net2 / p[at.MASS] + neglected_fraction * neglected[i]
+        rates.v2[i] = net2 / p.mass + neglected_fraction * neglected[i]
         rates.f2[i] = control_model.force_rate(u.active2[i], k2, v2, lp2 + ln2, index, gas_t)
         rates.k2[i] = control_model.stiffness_rate(f2, k2, v2, u.active2[i], u.pressurization2[i], lp2, ln2, index, gas_t)
         rates.y1[i] = v1
-        rates.v1[i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p[at.INVERSE_MASS], p[at.GRAVITY])
+        rates.v1[i] = mechanics.acceleration1(net1, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
         rates.f1[i] = control_model.force_rate(u.active1[i], k1, v1, lp1 + ln1, index, gas_t)
         rates.k1[i] = control_model.stiffness_rate(f1, k1, v1, u.active1[i], u.pressurization1[i], lp1, ln1, index, gas_t)
 
@@ -68,7 +67,7 @@ def _evaluate(state: ArrayLike, flows: ArrayLike, parameters: Parameters, fracti
     lanes = np.shape(state)[1] if np.ndim(state) == 2 else 1
     x, u = checked("state", state, (8, lanes), "SI"), checked("flows", flows, (4, lanes), "kg/s")
     rates, neglected = np.empty((8, lanes)), np.empty(lanes)
-    _rates(State(x), Flows(u), parameter_column(parameters), fraction, State(rates), neglected)
+    _rates(State(x), Flows(u), Rig(parameter_column(parameters)), fraction, State(rates), neglected)
     return rates, neglected
 
 

@@ -78,7 +78,8 @@ def spring_of(asked: Reference, i: int, mass: float, ratio: float) -> Spring:
 def derivatives(offset: Point, i: int, fx: float, fy: float, s: Spring) -> tuple[float, float, float, float]:
     """Acceleration and jerk of the offset of lane ``i`` under a held force over the mass."""
     # The rate of the force is left out here, and by whoever follows, for whom the two cancel.
-    x, y, vx, vy = offset.position[0, i], offset.position[1, i], offset.velocity[0, i], offset.velocity[1, i]
+    x, y = offset.position[0, i], offset.position[1, i]
+    vx, vy = offset.velocity[0, i], offset.velocity[1, i]
     ax, ay = fx - s.bxx * vx - s.bxy * vy - s.kxx * x - s.kxy * y, fy - s.bxy * vx - s.byy * vy - s.kxy * x - s.kyy * y
     jx, jy = -s.bxx * ax - s.bxy * ay - s.kxx * vx - s.kxy * vy, -s.bxy * ax - s.byy * ay - s.kxy * vx - s.kyy * vy
     return ax, ay, jx, jy
@@ -135,7 +136,8 @@ def forecast(
     The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
     from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
     """
-    z, mass, period, push = Point(offset.rows.copy()), about.mass, about.period, InPlane(force)
+    z, mass = Point(offset.rows.copy()), about.mass
+    period, push = about.period, InPlane(force)
     for i in range(force.shape[1]):
         spring, tick = spring_of(asked, i, mass, about.damping_ratio), 1
         for k in range(len(ticks)):

@@ -12,26 +12,25 @@ from baselines.valve_inverse import driving_flows
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import control_model, valves
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 
 
 @helper
 def predicted_pressure(
-    pressure: float, opening: float, area: float, length: float, length_rate: float, period: float, p: Array
+    pressure: float, opening: float, area: float, length: float, length_rate: float, period: float, p: Rig
 ) -> float:
     """Pressure of a chamber after one period of a valve's ``opening``, Pa, by (6); ``length`` is that of its air, m."""
-    supply = valves.supply_conductance(opening, p[at.CONDUCTANCE], p[at.LEAKAGE])
-    exhaust = valves.exhaust_conductance(opening, p[at.CONDUCTANCE], p[at.LEAKAGE])
+    supply = valves.supply_conductance(opening, p.conductance, p.leakage)
+    exhaust = valves.exhaust_conductance(opening, p.conductance, p.leakage)
     fill, drain = driving_flows(pressure, p)
     flow = supply * fill - exhaust * drain
-    whole, gas_t = max(length, 0.0) + p[at.DEAD_VOLUME] / area, p[at.GAS] * p[at.TEMPERATURE]
-    filled = period * control_model.polytropic_rate_p(pressure, flow, 0.0, area, whole, p[at.INDEX], gas_t)
-    pressed = period * control_model.polytropic_rate_p(pressure, 0.0, length_rate, area, whole, p[at.INDEX], gas_t)
+    whole, gas_t = max(length, 0.0) + p.dead_volume / area, p.gas * p.temperature
+    filled = period * control_model.polytropic_rate_p(pressure, flow, 0.0, area, whole, p.index, gas_t)
+    pressed = period * control_model.polytropic_rate_p(pressure, 0.0, length_rate, area, whole, p.index, gas_t)
     # However long the period: no flow goes beyond the pressure that drives it, and no stroke empties a chamber.
-    filled = max(min(p[at.ATMOSPHERE] - pressure, 0.0), min(max(p[at.SUPPLY] - pressure, 0.0), filled))
+    filled = max(min(p.atmosphere - pressure, 0.0), min(max(p.supply - pressure, 0.0), filled))
     expected: float = max(pressure + filled + pressed, 0.5 * pressure)
     return expected
 
@@ -46,20 +45,20 @@ class Chambers(Rows):
 
 @helper
 def observe(
-    chambers: Chambers, measured: Array, joints: Joints, p: Array, period: float, fraction: float, fresh: Array
+    chambers: Chambers, measured: Array, joints: Joints, p: Rig, period: float, fraction: float, fresh: Array
 ) -> None:  # fmt: skip
     """Carries ``chambers`` on by one period to whose end pressures (4, N), Pa, were ``measured``, with a trust ``fraction`` in
     them.
 
     ``joints`` are those of its start. Where ``fresh`` (N,) is 1 valves are shut and pressures as measured.
     """
-    kept = exact.exp(-period / p[at.TAU])
+    kept = exact.exp(-period / p.tau)
     # Of the way that is left to the command, the mean over the period.
-    mean = (1.0 - kept) * p[at.TAU] / period
+    mean = (1.0 - kept) * p.tau / period
     for chamber in range(4):
         cylinder, sign = chamber // 2, 1.0 - 2.0 * (chamber % 2)
-        half = p[at.HALF_L1] if cylinder == 0 else p[at.HALF_L2]
-        area_p, area_n = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        half = p.half_l1 if cylinder == 0 else p.half_l2
+        area_p, area_n = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
         area = area_p if chamber % 2 == 0 else area_n
         for i in range(fresh.shape[0]):
             opening = chambers.opening[chamber, i]

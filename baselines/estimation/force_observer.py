@@ -13,9 +13,8 @@ from __future__ import annotations
 from baselines.estimation import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.compiled.records import Rows, rows
 
 FRICTION_FRACTION = 0.9
@@ -39,22 +38,22 @@ class Hand(Rows):
 
 
 @helper
-def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Array, period: float, fresh: Array) -> None:
+def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig, period: float, fresh: Array) -> None:
     """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R."""
     share, left = period / (1.0 / QUICKNESS + period), PerPiston(unexplained)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
-            p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
+            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
+            p.sin_gamma3, p.cos_gamma3,
         )  # fmt: skip
         new = fresh[i] > 0.0
         for cylinder in range(2):
-            most = (p[at.FC1] if cylinder == 0 else p[at.FC2]) / p[at.BRISTLE_S0]
+            most = (p.fc1 if cylinder == 0 else p.fc2) / p.s0
             moved = joints.position[cylinder, i] - hand.before[cylinder, i]
             bristle = 0.0 if new else max(-most, min(most, hand.bristle[cylinder, i] + moved))
             hand.bristle[cylinder, i], hand.before[cylinder, i] = bristle, joints.position[cylinder, i]
-        f1 = left.first[i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[0, i]
-        f2 = left.second[i] + FRICTION_FRACTION * p[at.BRISTLE_S0] * hand.bristle[1, i]
+        f1 = left.first[i] + FRICTION_FRACTION * p.s0 * hand.bristle[0, i]
+        f2 = left.second[i] + FRICTION_FRACTION * p.s0 * hand.bristle[1, i]
         across, along = -f1 / kappa, f2
         x, y = across * cosine + along * sine, across * sine - along * cosine
         hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])

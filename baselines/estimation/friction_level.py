@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from baselines.estimation.rows import Belief
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, rows
@@ -48,7 +47,7 @@ def learn(
     p, period = about.rig, about.period
     for i in range(fresh.shape[0]):
         for cylinder in range(2):
-            coulomb = p[at.FC1] if cylinder == 0 else p[at.FC2]
+            coulomb = p.fc1 if cylinder == 0 else p.fc2
             if fresh[i] > 0.0:
                 friction.level[cylinder, i], friction.offset[cylinder, i], friction.sliding[cylinder, i] = 1.0, 0.0, 0.0
             if coulomb <= 0.0:

@@ -26,9 +26,8 @@ from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints, Measurement, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import piston_motion, pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -62,7 +61,7 @@ STIR = 1.9
 
 
 @helper
-def begin(pistons: Pistons, i: int, point: Point, p: Array, joints: Joints) -> None:
+def begin(pistons: Pistons, i: int, point: Point, p: Rig, joints: Joints) -> None:
     """Starts lane ``i`` anew where the one lane of ``point`` places the pistons; ``joints`` is scratch."""
     past = pistons.past
     piston_motion(point.rows, p, joints.rows, 1)
@@ -76,14 +75,15 @@ def begin(pistons: Pistons, i: int, point: Point, p: Array, joints: Joints) -> N
 
 
 @helper
-def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Array, period: float) -> float:
+def predict(pistons: Pistons, i: int, pressures: Array, given: Given, p: Rig, period: float) -> float:
     """Carries positions and speeds of lane ``i`` on by one period of the model; returns kappa where it began."""
     position, speed = pistons.position, pistons.speed
-    y1, y2, v1, v2 = position[0, i], position[1, i], speed[0, i], speed[1, i]
+    y1, y2 = position[0, i], position[1, i]
+    v1, v2 = speed[0, i], speed[1, i]
     a1, a2, kappa = accelerations(pistons, i, pressures, given, p)
     a1, a2 = a1 + pistons.disturbance[0, i], a2 + pistons.disturbance[1, i]
-    position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p[at.HALF_L1]), p[at.HALF_L1])
-    position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p[at.HALF_L2]), p[at.HALF_L2])
+    position[0, i] = min(max(y1 + period * (v1 + 0.5 * period * a1), -p.half_l1), p.half_l1)
+    position[1, i] = min(max(y2 + period * (v2 + 0.5 * period * a2), -p.half_l2), p.half_l2)
     speed[0, i], speed[1, i] = v1 + period * a1, v2 + period * a2
     return kappa
 
@@ -110,7 +110,8 @@ def correct(
 
     A low-passed innovation beyond what is ``explained`` of each piston, m, ends its rest.
     """
-    (explained1, explained2), past, slot, period = explained, pistons.past, int(pistons.slot[i]), about.period
+    (explained1, explained2), past = explained, pistons.past
+    slot, period = int(pistons.slot[i]), about.period
     depth, periods = past.shape[0] // 2, age / period
     back = min(int(periods), depth - 2)
     part = min(periods - back, 1.0)
@@ -166,7 +167,7 @@ def observe(pistons: Pistons, signals: Signals, pressures: Array, given: Given, 
 def measured_joints(measurement: Measurement, lane_parameters: Array) -> Array:
     """y1, y2 (m), v1, v2 (m/s), (4, N), where position and velocity are measured at every control period."""
     joints = np.empty((Joints.size, measurement.position.shape[1]))
-    pistons_at(np.concatenate([measurement.position, measurement.velocity]), lane_parameters, joints)
+    pistons_at(np.concatenate([measurement.position, measurement.velocity]), Rig(lane_parameters), joints)
     return joints
 
 

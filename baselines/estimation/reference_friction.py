@@ -10,32 +10,31 @@ import numpy as np
 from birthsim_env.loop.signals import Joints, Motion
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.inverse_kinematics import piston_motion
 
 
 @helper
-def bristle(z: float, speed: float, coulomb: float, static: float, p: Array, period: float) -> float:
+def bristle(z: float, speed: float, coulomb: float, static: float, p: Rig, period: float) -> float:
     """Deflection after one period at a piston's ``speed``, m."""
-    level = friction.stribeck_level(speed, coulomb, static, p[at.STRIBECK])
-    most: float = level / p[at.BRISTLE_S0]
-    deflection: float = z + period * friction.bristle_rate(speed, z, level, p[at.BRISTLE_S0])
+    level = friction.stribeck_level(speed, coulomb, static, p.stribeck)
+    most: float = level / p.s0
+    deflection: float = z + period * friction.bristle_rate(speed, z, level, p.s0)
     return max(-most, min(most, deflection))
 
 
 @helper
-def _rub(joints: Joints, p: Array, period: float, bristles: Array, drag: Array) -> None:
+def _rub(joints: Joints, p: Rig, period: float, bristles: Array, drag: Array) -> None:
     for cylinder in range(2):
-        coulomb, static = (p[at.FC1], p[at.FS1]) if cylinder == 0 else (p[at.FC2], p[at.FS2])
+        coulomb, static = (p.fc1, p.fs1) if cylinder == 0 else (p.fc2, p.fs2)
         for i in range(bristles.shape[1]):
             z = bristle(bristles[cylinder, i], joints.speed[cylinder, i], coulomb, static, p, period)
-            bristles[cylinder, i], drag[cylinder, i] = z, p[at.BRISTLE_S0] * z
+            bristles[cylinder, i], drag[cylinder, i] = z, p.s0 * z
 
 
 @helper
-def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -> None:
+def rub(motion: Motion, p: Rig, period: float, bristles: Array, drag: Array) -> None:
     """Carries ``bristles`` (2, N) on by one period of ``motion`` and writes what they hold back, ``drag`` (2, N), N.
 
     N is at most that of a block.
@@ -46,7 +45,7 @@ def rub(motion: Motion, p: Array, period: float, bristles: Array, drag: Array) -
 
 
 @kernel
-def forecast(ahead: Array, p: Array, steps: Array, bristles: Array, drag: Array) -> None:
+def forecast(ahead: Array, p: Rig, steps: Array, bristles: Array, drag: Array) -> None:
     """Writes the friction ``drag`` (M, 2, N), N, along a motion ``ahead`` (M, 4, N) with x, y, vx, vy at the ends of the M
     ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them."""
     z, lanes = bristles.copy(), bristles.shape[1]

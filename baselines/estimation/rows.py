@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 
 
 class Pistons(Joints):
@@ -35,4 +35,4 @@ class Belief(Numbers):
     period = number("s", "control period")
     bandwidth = number("1/s", "bandwidth of the observer")
     noise = number("m", "standard deviation of a position sample")
-    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
+    rig = part(Rig, "the rig as described")

@@ -12,8 +12,8 @@ from birthsim_env.loop.rows import HANDED, POSITION, Seen
 from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, Array, parameter_column
-from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row
 from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -51,18 +51,11 @@ def compliant_motion(rig: Parameters) -> LawStage:
     return LawStage(_comply, compliance(rig), Point.lane())
 
 
-class Located(Numbers):
-    """Constants of the stage that finds the pistons where speeds are measured."""
-
-    rig = rows(" ".join(PARAMETER_NAMES), PARAMETER_UNITS, "parameter of the rig")
-
-
 @kernel
-def _measure(world: int, seen: Seen, memory: int, about: Located, tables: int, lane: int, n: int) -> int:
+def _measure(world: int, seen: Seen, memory: int, rig: Rig, tables: int, lane: int, n: int) -> int:
     """Writes the joints that are measured."""
-    s = Seen(seen.rows[:, :n])
-    joints = Estimate(s.handed[: Estimate.size]).joints
-    piston_motion(s.rows[POSITION : POSITION + Point.size], about.rig, joints.rows, n)
+    joints = Estimate(seen.handed[: Estimate.size]).joints
+    piston_motion(seen.rows[POSITION : POSITION + Point.size], rig, joints.rows, n)
     return 0
 
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter, savgol_filter
 
 from baselines.identification.trial import Trial
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.dynamics import steps_in
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
@@ -94,7 +94,7 @@ def _guess(trial: Trial, rig: Parameters, starts: NDArray[np.intp], fresh: NDArr
         for axis in range(2):
             motion[axis, w], motion[2 + axis, w] = _parabola(taken[near] - now, trial.positions[axis, fresh[near]])
     joints = np.empty((4, len(starts)))
-    pistons_at(motion, column, joints)
+    pistons_at(motion, Rig(column), joints)
     state[[at.Y1, at.Y2, at.V1, at.V2]] = joints
     for z, v, level in ((at.Z1, at.V1, at.FC1), (at.Z2, at.V2, at.FC2)):
         state[z] = np.tanh(state[v] / 0.01) * column[level] / column[at.BRISTLE_S0]

@@ -20,7 +20,7 @@ from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerPis
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -35,11 +35,11 @@ _OUTWARD = np.array([[1.0], [-1.0], [1.0], [-1.0]])
 
 
 @kernel
-def _along(force: InPlane, joints: Joints, p: Array, along: PerPiston) -> None:
+def _along(force: InPlane, joints: Joints, p: Rig, along: PerPiston) -> None:
     for i in range(force.x.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT],
-            p[at.SIN_GAMMA3], p[at.COS_GAMMA3],
+            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
+            p.sin_gamma3, p.cos_gamma3,
         )  # fmt: skip
         along.first[i] = mechanics.user_force1(force.x[i], force.y[i], kappa, sine, cosine)
         along.second[i] = mechanics.user_force2(force.x[i], force.y[i], sine, cosine)
@@ -64,7 +64,7 @@ class AirSpring:
         Pa, and the ``hand``'s force (2, N), N."""
         (joints, here), (_, there) = self._lengths(position), self._lengths(reference.position)
         forces, along = pressures * self._areas, np.empty_like(hand)
-        _along(InPlane(np.ascontiguousarray(hand)), joints, self._p, PerPiston(along))
+        _along(InPlane(np.ascontiguousarray(hand)), joints, Rig(self._p), PerPiston(along))
         stroke = np.repeat(here[::2] + here[1::2], 2, axis=0)
         balanced = forces + _OUTWARD * np.repeat(along, 2, axis=0) * here / stroke
         self._forces = np.where(np.isnan(self._forces), balanced, self._forces)
@@ -75,5 +75,5 @@ class AirSpring:
     def _lengths(self, position: Array) -> tuple[Joints, Array]:
         """Pistons, which stand still, and lengths of the chambers, dead volumes included, m, (4, N)."""
         joints = Joints(np.empty((Joints.size, position.shape[1])))
-        pistons_at(np.concatenate([position, np.zeros_like(position)]), self._p, joints.rows)
+        pistons_at(np.concatenate([position, np.zeros_like(position)]), Rig(self._p), joints.rows)
         return joints, self._middle + _OUTWARD * np.repeat(joints.position, 2, axis=0)

@@ -32,7 +32,7 @@ from baselines.limiter.air_spring import AirSpring
 from baselines.limiter.past import Past
 from baselines.limiter.port_energy import PortEnergy
 from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
@@ -141,7 +141,7 @@ class PortLimiter:
         if not brake.any():
             return openings
         joints = np.empty_like(openings)
-        pistons_at(np.concatenate([measurement.position, relative]), self._p, joints)
+        pistons_at(np.concatenate([measurement.position, relative]), Rig(self._p), joints)
         against = np.repeat(np.sign(joints[2:]), 2, axis=0) * np.array([-1.0, 1.0, -1.0, 1.0])[:, None]
         return np.asarray((1.0 - brake) * openings + brake * against)
 

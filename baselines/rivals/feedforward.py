@@ -17,9 +17,8 @@ from baselines.staged import LawStage
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import InPlane
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
 from birthsim_env.physics.inverse_kinematics import piston_reference
 from birthsim_env.physics.rig.parameters import Parameters
@@ -53,26 +52,26 @@ def friction_ahead(speed: float, acceleration: float, coulomb: float, viscous: f
 
 
 @helper
-def needed_forces(tracked: Tracked, hand: Array, p: Array, fraction: float, n: int) -> None:
+def needed_forces(tracked: Tracked, hand: Array, p: Rig, fraction: float, n: int) -> None:
     """Writes what is needed for the motion and its pistons, while the ``hand`` pushes with (2, N), N."""
     wanted, motion, needed, push = tracked.wanted, tracked.motion, tracked.needed, InPlane(hand)
     for i in range(n):
         y1, y2, v1, v2 = wanted.position[0, i], wanted.position[1, i], wanted.speed[0, i], wanted.speed[1, i]
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
-            y1, y2, p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
-        m = p[at.MASS]
+        m = p.mass
         ax, ay, jx, jy = motion.acceleration[0, i], motion.acceleration[1, i], m * motion.jerk[0, i], m * motion.jerk[1, i]
-        px, py = m * ax - push.x[i], m * (ay + p[at.GRAVITY]) - push.y[i]
+        px, py = m * ax - push.x[i], m * (ay + p.gravity) - push.y[i]
         along, across = sine * px - cosine * py, -cosine * px - sine * py
         turn = -2.0 * r4 * v1 / root
         growth = v2 / r2 + v1 / r4 + 2.0 * r4 * w / s2 * v1
         along_rate = sine * jx - cosine * jy - turn * across
         across_rate = -cosine * jx - sine * jy + turn * along
-        drag1, drag1_rate = friction_ahead(v1, wanted.acceleration[0, i], fraction * p[at.FC1], p[at.FV1])
-        drag2, drag2_rate = friction_ahead(v2, wanted.acceleration[1, i], fraction * p[at.FC2], p[at.FV2])
-        needed.force[0, i] = kappa * across + p[at.ATMOSPHERE] * (p[at.AREA_P1] - p[at.AREA_N1]) + drag1
-        needed.force[1, i] = along + p[at.ATMOSPHERE] * (p[at.AREA_P2] - p[at.AREA_N2]) + drag2
+        drag1, drag1_rate = friction_ahead(v1, wanted.acceleration[0, i], fraction * p.fc1, p.fv1)
+        drag2, drag2_rate = friction_ahead(v2, wanted.acceleration[1, i], fraction * p.fc2, p.fv2)
+        needed.force[0, i] = kappa * across + p.atmosphere * (p.area_p1 - p.area_n1) + drag1
+        needed.force[1, i] = along + p.atmosphere * (p.area_p2 - p.area_n2) + drag2
         needed.rate[0, i] = kappa * (across_rate + growth * across) + drag1_rate
         needed.rate[1, i] = along_rate + drag2_rate
         needed.kappa[i] = kappa
@@ -82,7 +81,7 @@ class Constants(Numbers):
     """Of the stage."""
 
     fraction = number("1", "how much of the Coulomb friction is fed forward")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @kernel

@@ -25,10 +25,9 @@ from baselines.rivals.feedforward import Tracked
 from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
-from birthsim_env.physics.compiled.records import Numbers, number, rows
+from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.records import Numbers, number, part, rows
 from birthsim_env.physics.rig.parameters import Parameters
 
 RATE_TOLERANCE = 1000.0
@@ -93,7 +92,7 @@ class Constants(Numbers):
     dead_zone = number("m", "at the end effector")
     pneumatic_gain = number("1/s", "c4")
     table = rows(8 * SCHEDULE, "SI", "gains (8, SCHEDULE) over kappa: four of cylinder 1, then of cylinder 2")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @kernel
@@ -105,7 +104,7 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     lowest, step, zone, c4 = about.lowest, about.step, about.dead_zone, about.pneumatic_gain
     for cylinder in range(2):
         row, gain = 2 * cylinder, 4 * cylinder
-        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0

@@ -22,10 +22,9 @@ from baselines.rivals.tracking import Integrals, TrackingController, beyond, car
 from baselines.valve_inverse import CylinderAir, air_at, driving_flows
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import valves
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper, kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS
-from birthsim_env.physics.compiled.records import Numbers, number, rows
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.compiled.records import Numbers, number, part
 
 
 @helper
@@ -56,7 +55,7 @@ class Constants(Numbers):
     integral_rate = number("1/s", "a")
     pressure_gain = number("1/s", "b")
     dead_zone = number("m", "at the end effector")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @kernel
@@ -66,15 +65,15 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     setpoint = seen.asked.pneumatic_stiffness
     wanted, needed, position, speed = tracked.wanted, tracked.needed, tracked.joints.position, tracked.joints.speed
     bandwidth, damping, zone = about.bandwidth, about.damping, about.dead_zone
-    index, gas_t = p[at.INDEX], p[at.GAS] * p[at.TEMPERATURE]
-    low, high = p[at.ATMOSPHERE], p[at.SUPPLY]
+    index, gas_t = p.index, p.gas * p.temperature
+    low, high = p.atmosphere, p.supply
     for cylinder in range(2):
         row = 2 * cylinder
-        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
+        ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
-            spring = p[at.MASS] * scale * scale * bandwidth * bandwidth
+            spring = p.mass * scale * scale * bandwidth * bandwidth
             error, error_rate = wanted.position[cylinder, i] - y, wanted.speed[cylinder, i] - v
             force = needed.force[cylinder, i]
             summed = held(memory, cylinder, i, pp * ap - pn * an - force)
@@ -86,8 +85,8 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
             flow_p = flow_for(about.pressure_gain * (pp_set - pp), pp, ap, air.length_p, v, index, gas_t)
             flow_n = flow_for(about.pressure_gain * (pn_set - pn), pn, an, air.length_n, -v, index, gas_t)
             (fill_p, drain_p), (fill_n, drain_n) = driving_flows(pp, p), driving_flows(pn, p)
-            opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p[at.CONDUCTANCE], p[at.LEAKAGE])
-            opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, p[at.CONDUCTANCE], p[at.LEAKAGE])
+            opening_p = valves.opening_for_flow(flow_p, fill_p, drain_p, p.conductance, p.leakage)
+            opening_n = valves.opening_for_flow(flow_n, fill_n, drain_n, p.conductance, p.leakage)
             opening[row, i], opening[row + 1, i] = opening_p, opening_n
             rate = spring * about.integral_rate * beyond(error, zone / scale) if given == force else 0.0
             carry_on(memory, cylinder, i, summed, rate, about.period, (opening_p, opening_n))

@@ -22,10 +22,9 @@ from baselines.rivals.feedforward import Tracked
 from baselines.rivals.tracking import Integrals, TrackingController, beyond, carry_on, held
 from baselines.valve_inverse import air_at, stiffness_of, two_valve_openings
 from birthsim_env.loop.rows import Seen
-from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS
-from birthsim_env.physics.compiled.records import Numbers, number, rows
+from birthsim_env.physics.compiled.lanes import Rig
+from birthsim_env.physics.compiled.records import Numbers, number, part
 
 
 class Constants(Numbers):
@@ -37,7 +36,7 @@ class Constants(Numbers):
     layer_rate = number("1/s", "b")
     dead_zone = number("m", "at the end effector")
     pneumatic_gain = number("1/s", "c4")
-    rig = rows(PARAMETERS, "SI", "parameters of the rig")
+    rig = part(Rig, "the rig as described")
 
 
 @kernel
@@ -50,12 +49,12 @@ def control(world: int, seen: Seen, memory: Integrals, about: Constants, tables:
     zone, c4 = about.dead_zone, about.pneumatic_gain
     for cylinder in range(2):
         row = 2 * cylinder
-        ap, an = (p[at.AREA_P1], p[at.AREA_N1]) if cylinder == 0 else (p[at.AREA_P2], p[at.AREA_N2])
-        viscous = p[at.FV1] if cylinder == 0 else p[at.FV2]
+        ap, an = (p.area_p1, p.area_n1) if cylinder == 0 else (p.area_p2, p.area_n2)
+        viscous = p.fv1 if cylinder == 0 else p.fv2
         for i in range(n):
             y, v, pp, pn = position[cylinder, i], speed[cylinder, i], pressure[row, i], pressure[row + 1, i]
             scale = needed.kappa[i] if cylinder == 0 else 1.0
-            mass = p[at.MASS] * scale * scale
+            mass = p.mass * scale * scale
             excess = pp * ap - pn * an - needed.force[cylinder, i]
             error, error_rate = y - wanted.position[cylinder, i], v - wanted.speed[cylinder, i]
             second = (excess - viscous * error_rate) / mass

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
-from birthsim_env.loop.stage import block, numbers, scratch
+from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, V1, V2, Y1, Y2
+from birthsim_env.physics.compiled.lanes import STATES, V1, V2, Y1, Y2, Rig
 from birthsim_env.physics.equilibrium import balance
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.inverse_kinematics import piston_motion
@@ -17,10 +17,10 @@ SHOWN = Info.size + inside.ROWS
 
 
 @kernel
-def begin(world: World, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """Puts the pistons on the reference, in balance, as ``Simulation.begin``. Constants: the rig as its owner describes it."""
+def begin(world: World, seen: Seen, memory: int, described: Rig, tables: int, lane: int, n: int) -> int:
+    """Puts the pistons on the reference, in balance, as ``Simulation.begin``. ``described`` is what its owner knows."""
     p, x, joints = world.rig[:, :n], world.state[:, :n], scratch(4)
-    piston_motion(seen.reference.rows, numbers(constants, PARAMETERS), joints, n)
+    piston_motion(seen.reference.rows, described, joints, n)
     for i in range(n):
         for row in range(STATES):
             x[row, i] = 0.0

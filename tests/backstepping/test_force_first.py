@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 from baselines.valve_inverse import CylinderAir, force_first_openings, two_valve_openings
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import derived_law
 
@@ -29,7 +29,7 @@ def openings_of_both(cases: Array, ap: float, an: float, stroke: float, p: Array
 def openings(cases: Array) -> tuple[Array, Array]:
     """Force first and neither first, (2, N) each, of cylinder 2."""
     u = np.empty((4, cases.shape[1]))
-    openings_of_both(cases, *derived_law.areas(RIG.cylinder2), LENGTH, parameter_column(RIG), u)
+    openings_of_both(cases, *derived_law.areas(RIG.cylinder2), LENGTH, Rig(parameter_column(RIG)), u)
     assert np.abs(u).max() <= 1
     return u[:2], u[2:]
 
@@ -137,7 +137,7 @@ def test_it_serves_each_cylinder_with_its_own_areas() -> None:
     other = Parameters().replace({"cylinder2.piston_diameter": 0.032, "cylinder2.rod_diameter": 0.012})
     cylinder: Cylinder = other.cylinder2
     cases, u = drawn(50, 800.0, seed=4), np.empty((4, 50))
-    openings_of_both(cases, cylinder.area_p, cylinder.area_n, cylinder.stroke, parameter_column(other), u)
+    openings_of_both(cases, cylinder.area_p, cylinder.area_n, cylinder.stroke, Rig(parameter_column(other)), u)
     inside = np.abs(u).max(axis=0) < 1
     assert inside.sum() > 20
     for case, opening in zip(cases.T[inside], u[:2].T[inside], strict=True):

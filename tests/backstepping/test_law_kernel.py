@@ -9,8 +9,7 @@ from baselines.backstepping import law
 from baselines.valve_inverse import air_at
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.lanes import parameter_column
+from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
 
@@ -23,7 +22,7 @@ def test_lanes_without_gains_are_counted_once_each(ratio: float) -> None:
     seen, at_rest = Seen(np.zeros((Seen.size, lanes))), Joints(np.zeros((Joints.size, lanes)))
     seen.asked.position[0], seen.asked.stiffness[:], seen.pressure[:] = 0.5, stiffness, 3e5
     seen.asked.pneumatic_stiffness[0], seen.asked.pneumatic_stiffness[1] = 4400.0, 2200.0
-    served = parameter_column(Parameters())
+    served = Rig(parameter_column(Parameters()))
     few = law.command(seen, at_rest, served, options, lanes)
     alone = [
         law.command(Seen(seen.rows[:, [k]].copy()), Joints(at_rest.rows[:, [k]].copy()), served, options, 1)
@@ -34,8 +33,8 @@ def test_lanes_without_gains_are_counted_once_each(ratio: float) -> None:
 
 
 def test_no_chamber_counts_as_shorter_than_two_millimetres() -> None:
-    p = parameter_column(Parameters())
-    for k, half in enumerate((p[at.HALF_L1], p[at.HALF_L2])):
+    p = Rig(parameter_column(Parameters()))
+    for k, half in enumerate((p.half_l1, p.half_l2)):
         beyond = ((0.03, half + 0.03, half - 0.03), (half - 0.0015, 2 * half - 0.0015, 0.002), (-2 * half, 0.002, 3 * half))
         for y, length_p, length_n in beyond:
             air = air_at(k, 3e5, 3e5, y, 0.0, p)

@@ -11,8 +11,7 @@ from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.lanes import parameter_column
+from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD = 1e-3
@@ -83,19 +82,19 @@ def test_a_law_that_starts_later_tares_nothing():
 @pytest.mark.parametrize("slides", [0.0, 0.02])
 def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
     """Both pistons rest, or slide against friction of which the observer takes off its fraction."""
-    p, hand = parameter_column(Parameters()), np.array([7.0, -4.0])
+    p, hand = Rig(parameter_column(Parameters())), np.array([7.0, -4.0])
     found, fresh, y = Hand(np.zeros((Hand.size, 1))), np.ones(1), np.array([0.02, -0.01])
     for k in range(1500):
         moved = slides if k >= 500 else 0.0
         y = y + moved * PERIOD
         pose = geometry.pose(
-            y[0], y[1], p[at.K1], p[at.K2], p[at.D_SQUARES], p[at.D_PRODUCT], p[at.SIN_GAMMA3], p[at.COS_GAMMA3]
+            y[0], y[1], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
         kappa, sine, cosine = pose[5:]
         push = hand if k >= 500 else np.zeros(2)
         left = np.array([mechanics.user_force1(*push, kappa, sine, cosine), mechanics.user_force2(*push, sine, cosine)])
         # Unknown friction is what the fraction leaves out of the believed one.
-        left -= force_observer.FRICTION_FRACTION * np.array([p[at.FC1], p[at.FC2]]) * np.sign(moved)
+        left -= force_observer.FRICTION_FRACTION * np.array([p.fc1, p.fc2]) * np.sign(moved)
         joints = np.array([*y, moved, moved])[:, None]
         force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), left[:, None], p, PERIOD, fresh)
         fresh[:] = 0.0

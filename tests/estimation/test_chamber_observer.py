@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from baselines.estimation.chamber_observer import Chambers, observe
 from birthsim_env.loop.signals import Joints
-from birthsim_env.physics.compiled.lanes import SPOOLS, Array, parameter_column
+from birthsim_env.physics.compiled.lanes import SPOOLS, Array, Rig, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law
@@ -39,7 +39,7 @@ class Observer:
     """The kernel with what a stage keeps for it, over N lanes."""
 
     def __init__(self, rig: Parameters, bandwidth: float, lanes: int = 1, period: float = PERIOD) -> None:
-        self._numbers = (parameter_column(rig), period, 1.0 - math.exp(-bandwidth * period))
+        self._numbers = (Rig(parameter_column(rig)), period, 1.0 - math.exp(-bandwidth * period))
         self._chambers, self.fresh = Chambers(np.zeros((Chambers.size, lanes))), np.ones(lanes)
         self.spools, self.openings = self._chambers.spool, self._chambers.opening
 

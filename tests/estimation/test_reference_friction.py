@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from baselines.estimation import reference_friction
 from birthsim_env.loop.signals import Motion
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Cylinder, Parameters
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
@@ -23,7 +23,7 @@ class Friction:
     """The kernels with the bristles that a stage keeps for them, over N lanes."""
 
     def __init__(self, lanes: int = 1, rig: Parameters = RIG) -> None:
-        self._p, self._period, self.bristles = parameter_column(rig), rig.electronics.control_period, np.zeros((2, lanes))
+        self._p, self._period, self.bristles = Rig(parameter_column(rig)), rig.electronics.control_period, np.zeros((2, lanes))
 
     def update(self, motion: Array) -> Array:
         drag = np.empty_like(self.bristles)

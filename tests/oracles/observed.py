@@ -55,5 +55,6 @@ class Measured:
         point, lanes = Point(np.concatenate([seen.position, seen.velocity])), seen.position.shape[1]
         joints = Joints(np.empty((Joints.size, lanes)))
         known = given(lanes, force, believed, None, 0.0)
-        disturbance_observer.observe(self.pistons, point, np.ascontiguousarray(seen.pressures), known, self._belief, joints)
+        air = np.ascontiguousarray(seen.pressures)
+        disturbance_observer.observe(self.pistons, point, air, known, self._belief, joints, lanes)
         return joints.rows

@@ -6,7 +6,7 @@ import numpy as np
 
 from agents.residual import authority, unexplained
 from birthsim_env.loop.signals import Joints, Mask, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles.observed import Measured, Sampled
 
@@ -31,7 +31,8 @@ class AuthorityLimiter:
         self._limiter.rows[:, lanes] = authority.Limiter.lane(left=1.0)[:, None]
 
     def update(self, joints: Array, reference: Reference) -> None:
-        authority.limit_authority(Joints(joints), reference, self._p, self._period, authority.LEVEL, self._limiter)
+        p, lanes = Rig(self._p), joints.shape[1]
+        authority.limit_authority(Joints(joints), reference, p, self._period, authority.LEVEL, self._limiter, lanes)
 
 
 class UnexplainedForceObserver:
@@ -61,4 +62,4 @@ class UnexplainedForceObserver:
         self.joints = np.ascontiguousarray(observer.update(measurement, force, np.zeros_like(force)))
         disturbance = np.ascontiguousarray(observer.pistons.disturbance)
         ways, met = unexplained.Moved(self._seen), unexplained.Forces(self.met)
-        unexplained.remember(Joints(self.joints), disturbance, self._p, self._period, ways, met)
+        unexplained.remember(Joints(self.joints), disturbance, Rig(self._p), self._period, ways, met, disturbance.shape[1])

@@ -8,7 +8,7 @@ import pytest
 
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
-from birthsim_env.physics.compiled.lanes import FC1, MASS, parameter_column
+from birthsim_env.physics.compiled.lanes import FC1, MASS, Rig, parameter_column
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.strength import carried
@@ -128,7 +128,7 @@ def test_what_is_carried_is_newtons_law():
             rise = []
             for speed in (1e-3, -1e-3):
                 joints = np.empty((4, 1))
-                pistons_at(np.concatenate([place[:, [lane]], np.zeros((2, 1))]), parameter_column(rig), joints)
+                pistons_at(np.concatenate([place[:, [lane]], np.zeros((2, 1))]), Rig(parameter_column(rig)), joints)
                 moved = joints[:2, 0] + speed * np.eye(2)[k]
                 rise.append(end_effector(moved, rig)[1])
             force = rig.mechanics.mass * rig.mechanics.gravity * (rise[0] - rise[1]) / 2e-3

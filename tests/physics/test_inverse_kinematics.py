@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array, parameter_column
+from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import piston_motion, piston_reference
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -45,7 +45,7 @@ def test_piston_reference_is_the_inverse_geometry_and_its_three_derivatives(rig:
     target[:2] = points(rig, 25, rng)
     target[2:] = rng.normal(0, np.array([1, 1, 8, 8, 80, 80])[:, None], (6, 25))
     joints = np.empty((8, 25))
-    piston_reference(target, parameter_column(rig), joints, target.shape[1])
+    piston_reference(target, Rig(parameter_column(rig)), joints, target.shape[1])
     with mpmath.workdps(60):
         for lane in range(25):
             x, y = ([mpmath.mpf(c) for c in target[axis::2, lane]] for axis in (0, 1))
@@ -66,7 +66,7 @@ def test_a_resting_target_rests_in_the_joints_too(rig: Parameters) -> None:
     target = np.zeros((8, 40))
     target[:2] = points(rig, 40, np.random.default_rng(1))
     joints = np.empty((8, 40))
-    piston_reference(target, parameter_column(rig), joints, target.shape[1])
+    piston_reference(target, Rig(parameter_column(rig)), joints, target.shape[1])
     assert np.all(joints[2:] == 0)
     np.testing.assert_allclose(geometry.end_effector(joints[:2], rig), target[:2], rtol=0, atol=1e-14)
 
@@ -78,7 +78,7 @@ def test_piston_motion_undoes_the_direct_model_and_the_jacobian(rig: Parameters)
     plant.state[[Y1, Y2]] = rng.uniform([[-0.099], [-0.199]], [[0.099], [0.199]], (2, 500))
     plant.state[[V1, V2]] = rng.uniform(-2, 2, (2, 500))
     seen, joints = plant.end_effector(), np.empty((4, 500))
-    piston_motion(seen, parameter_column(rig), joints, 500)
+    piston_motion(seen, Rig(parameter_column(rig)), joints, 500)
     np.testing.assert_allclose(joints, plant.state[[Y1, Y2, V1, V2]], rtol=0, atol=1e-13)
     inverse = np.linalg.inv(np.moveaxis(geometry.jacobian(joints[:2], rig), 2, 0))
     np.testing.assert_allclose(joints[2:], np.einsum("nij,jn->in", inverse, seen[2:]), rtol=0, atol=1e-12)
@@ -93,5 +93,5 @@ def test_piston_motion_by_points(rig: Parameters) -> None:
     pose = by_points.pose_from_lengths(y1 + rig.geometry.k1, y2 + rig.geometry.k2, rig.geometry)
     velocity, _ = by_points.cartesian_velocity(pose, y2 + rig.geometry.k2, v1, v2)
     joints = np.empty((4, 200))
-    piston_motion(np.concatenate([pose.end_effector, velocity]), parameter_column(rig), joints, 200)
+    piston_motion(np.concatenate([pose.end_effector, velocity]), Rig(parameter_column(rig)), joints, 200)
     np.testing.assert_allclose(joints, [y1, y2, v1, v2], rtol=0, atol=1e-12)

@@ -67,7 +67,7 @@ def test_the_target_moves_so_that_a_hand_at_rest_feels_what_was_asked_for() -> N
     powers[0, 50:100] = 0.0
     before = reference.rows.copy()
     changed = Reference(before.copy())
-    stiffen(force, powers, changed)
+    stiffen(force, powers, changed, powers.shape[1])
     np.testing.assert_array_equal(changed.rows[:, :50], before[:, :50])
     np.testing.assert_array_equal(changed.rows[[0, 8], 50:100], before[[0, 8], 50:100])
     np.testing.assert_array_equal(np.delete(changed.rows, [0, 1, 8, 9], axis=0), np.delete(before, [0, 1, 8, 9], axis=0))
@@ -86,7 +86,7 @@ def test_the_law_is_made_no_stiffer_and_no_softer_than_its_bounds_unless_that_is
     rows[8:10] = [[1000, 3000, 3000, 8000, 8000, 4000, 1500, 300]] * 2
     powers = np.array([[0.5, 0.5, -0.5, 0.5, -0.5, 1.0, -2.0, -2.0]] * 2)
     changed = Reference(rows.copy())
-    stiffen(np.zeros((2, 8)), powers, changed)
+    stiffen(np.zeros((2, 8)), powers, changed, 8)
     np.testing.assert_allclose(changed.stiffness, [[2000, 4000, 1500, 8000, 4000, 4000, 500, 300]] * 2)
 
 

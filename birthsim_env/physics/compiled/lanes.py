@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from birthsim_env.physics import valves
 from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.records import Numbers, number
 from birthsim_env.physics.rig.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -36,30 +37,81 @@ SPOOLS = (S1P, S1N, S2P, S2N)
 SHORTEST_TUBE = 0.05
 """m. A shorter tube has the lag of one of this length, 0.15 ms, which steps of 0.25 ms follow."""
 
-PARAMETER_NAMES = (
-    *("d_squares", "d_product", "sin_gamma3", "cos_gamma3", "k1", "k2", "half_l1", "half_l2"),
-    *("mass", "gravity", "stop_stiffness", "stop_damping"),
-    *("lugre", "fc1", "fc2", "fs1", "fs2", "fv1", "fv2", "stribeck", "s0", "s1", "sign_speed"),
-    *("elasto_plastic", "breakaway", "steepness"),
-    *("area_p1", "area_n1", "area_p2", "area_n2", "perimeter1", "perimeter2", "dead_volume", "h_wall", "g12"),
-    *("conductance", "critical", "leakage", "tau", "supply", "atmosphere", "temperature"),
-    *("gas", "gamma", "index", "rho0", "t0"),
-    *("knee", "laminar", "coldness", "inverse_supply", "inverse_atmosphere", "spool_rate", "sign_slope", "inverse_mass"),
-    *("deadband", "play", "opening_limit"),
-    *("source", "line", "line_gain", "mode_rate", "mode_damping", "handle", "tube_rate"),
-)
-PARAMETER_UNITS = (
-    *("m2", "m2", "1", "1", "m", "m", "m", "m"),
-    *("kg", "m/s2", "N/m", "N s/m"),
-    *("1", "N", "N", "N", "N", "N s/m", "N s/m", "m/s", "N/m", "N s/m", "m/s"),
-    *("1", "1", "1"),
-    *("m2", "m2", "m2", "m2", "m", "m", "m3", "W/(m2 K)", "W/K"),
-    *("m3/(s Pa)", "1", "m3/(s Pa)", "s", "Pa", "Pa", "K"),
-    *("J/(kg K)", "1", "1", "kg/m3", "K"),
-    *("1", "1", "1", "1/Pa", "1/Pa", "1/s", "s/m", "1/kg"),
-    *("1", "1", "1"),
-    *("Pa", "m3/(s Pa)", "Pa/kg", "1/s", "1", "1", "1/s"),
-)
+
+class Rig(Numbers):
+    """The parameters of one rig, as controllers and plants compute with them.
+
+    Those from ``knee`` to ``inverse_mass`` spare divisions; those from ``source`` on are of ``physics.options``.
+    """
+
+    d_squares = number("m2", "d3^2 + d6^2")
+    d_product = number("m2", "2 d3 d6")
+    sin_gamma3 = number("1", "sin(gamma3)")
+    cos_gamma3 = number("1", "cos(gamma3)")
+    k1 = number("m", "offset of cylinder 1")
+    k2 = number("m", "offset of cylinder 2")
+    half_l1 = number("m", "half the stroke of cylinder 1")
+    half_l2 = number("m", "half the stroke of cylinder 2")
+    mass = number("kg", "moved mass")
+    gravity = number("m/s2", "gravity")
+    stop_stiffness = number("N/m", "of the end stops")
+    stop_damping = number("N s/m", "of the end stops")
+    lugre = number("1", "1 with the friction law of that name, else 0")
+    fc1 = number("N", "Coulomb friction")
+    fc2 = number("N", "Coulomb friction")
+    fs1 = number("N", "static friction")
+    fs2 = number("N", "static friction")
+    fv1 = number("N s/m", "viscous friction")
+    fv2 = number("N s/m", "viscous friction")
+    stribeck = number("m/s", "Stribeck speed")
+    s0 = number("N/m", "bristle stiffness")
+    s1 = number("N s/m", "bristle damping")
+    sign_speed = number("m/s", "width of the smoothed sign")
+    elasto_plastic = number("1", "1 with the friction law of that name, else 0")
+    breakaway = number("1", "breakaway deflection over the steady one")
+    steepness = number("1", "1/(1 - breakaway)")
+    area_p1 = number("m2", "of a piston")
+    area_n1 = number("m2", "of a piston")
+    area_p2 = number("m2", "of a piston")
+    area_n2 = number("m2", "of a piston")
+    perimeter1 = number("m", "of a piston")
+    perimeter2 = number("m", "of a piston")
+    dead_volume = number("m3", "of a chamber, with that of its tube")
+    h_wall = number("W/(m2 K)", "heat transfer of the walls")
+    g12 = number("W/K", "conductance of a piston")
+    conductance = number("m3/(s Pa)", "sonic conductance")
+    critical = number("1", "critical pressure ratio")
+    leakage = number("m3/(s Pa)", "leakage conductance")
+    tau = number("s", "time constant of a spool")
+    supply = number("Pa", "pressure at the valves now")
+    atmosphere = number("Pa", "pressure of the surroundings")
+    temperature = number("K", "of supply and surroundings")
+    gas = number("J/(kg K)", "gas constant")
+    gamma = number("1", "ratio of heat capacities")
+    index = number("1", "polytropic index of the control model")
+    rho0 = number("kg/m3", "reference density")
+    t0 = number("K", "reference temperature")
+    knee = number("1", "1/(1 - critical)")
+    laminar = number("1", "of ``valves.laminar_slope``")
+    coldness = number("1", "T0/T of supply and surroundings")
+    inverse_supply = number("1/Pa", "1/supply")
+    inverse_atmosphere = number("1/Pa", "1/atmosphere")
+    spool_rate = number("1/s", "1/tau")
+    sign_slope = number("s/m", "1/sign_speed")
+    inverse_mass = number("1/kg", "1/mass")
+    deadband = number("1", "of a spool")
+    play = number("1", "of a spool")
+    opening_limit = number("1", "of a spool")
+    source = number("Pa", "supply pressure to begin with and before the line")
+    line = number("m3/(s Pa)", "conductance of the line")
+    line_gain = number("Pa/kg", "r T/V of the reservoir")
+    mode_rate = number("1/s", "2 pi f of the soft structure")
+    mode_damping = number("1", "damping ratio of the soft structure")
+    handle = number("1", "the handle's share of the mass")
+    tube_rate = number("1/s", "c/L of the tubes")
+
+
+PARAMETER_NAMES, PARAMETER_UNITS = tuple(Rig.groups), tuple(group.units[0] for group in Rig.groups.values())
 PARAMETERS = len(PARAMETER_NAMES)
 (
     D_SQUARES, D_PRODUCT, SIN_GAMMA3, COS_GAMMA3, K1, K2, HALF_L1, HALF_L2, MASS, GRAVITY, STOP_STIFFNESS, STOP_DAMPING,
@@ -72,17 +124,7 @@ PARAMETERS = len(PARAMETER_NAMES)
 
 
 def parameter_column(parameters: Parameters) -> Array:
-    """One lane's column of the parameter array: (PARAMETERS,), SI units.
-
-    ``d_squares`` is d3^2 + d6^2, ``d_product`` 2 d3 d6; ``lugre`` and ``elasto_plastic`` are 1 for the friction law of that
-    name and 0 else, both 0 for Coulomb; ``steepness`` is 1/(1 - breakaway). Rows from ``knee`` to
-    ``inverse_mass`` spare divisions: ``knee`` is
-    1/(1 - critical), ``laminar`` that of ``valves.laminar_slope``, ``coldness`` T0/T of supply and surroundings, which are
-    equally warm, ``spool_rate`` 1/tau, ``sign_slope`` 1/sign_speed. Rows from ``source`` on are those of ``physics.options``:
-    ``supply`` is the pressure at the valves now, ``source`` what it begins with and what stands before the line, ``line`` the
-    line's conductance, ``line_gain`` r T/V of the reservoir, ``mode_rate`` 2 pi f, ``handle`` the handle's share of the mass,
-    ``tube_rate`` c/L; the dead volume has that of the tube in it.
-    """
+    """``Rig`` of one rig: one lane's column of the parameter array, (PARAMETERS,), SI units."""
     return np.array(rows_of(parameters), dtype=np.float64)
 
 

@@ -8,6 +8,7 @@ so that LLVM vectorises loops over its lanes. A layout is described by ``groups`
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 from llvmlite import ir
@@ -17,7 +18,6 @@ from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_builtin, lower_constant, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr, make_callable_template
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
-from numba.np.arrayobj import make_array, populate_array
 
 from birthsim_env.physics.compiled.compilation import BLOCK
 
@@ -185,29 +185,37 @@ def _of_block(context: Any, builder: Any, record: Block, value: Any, name: str) 
 @lower_getattr_generic(Record)
 def _of_array(context: Any, builder: Any, record: Record, value: Any, name: str) -> Any:
     """A view, a number, or the record of a part."""
-    rows = cgutils.create_struct_proxy(record)(context, builder, value).rows
+    rows = builder.extract_value(value, 0)
     if name == "rows":
         return impl_ret_borrowed(context, builder, record.array, rows)
-    whole, group = make_array(record.array)(context, builder, rows), record.layout.groups[name]
-    shape, strides = cgutils.unpack_tuple(builder, whole.shape), cgutils.unpack_tuple(builder, whole.strides)
-    data = cgutils.pointer_add(builder, whole.data, builder.mul(strides[0], WORD(group.first)), whole.data.type)
+    group, place = record.layout.groups[name], context.data_model_manager[record.array].get_field_position
+    fields = (builder.extract_value(rows, place(field)) for field in ("data", "shape", "strides", "meminfo"))
+    data, shape, strides, owner = fields
+    shape, strides = cgutils.unpack_tuple(builder, shape), cgutils.unpack_tuple(builder, strides)
+    data = cgutils.pointer_add(builder, data, builder.mul(strides[0], WORD(group.first)), data.type)
     shape[0] = WORD(group.count) if group.place.stop else builder.sub(shape[0], WORD(group.first))
     kind = record.of(group)
     if not group.layout:
-        return _view(context, builder, kind, data, shape, strides, whole.meminfo)
-    return _record(context, builder, kind, _view(context, builder, record.array, data, shape, strides, whole.meminfo))
+        return _view(context, builder, kind, data, shape, strides, owner)
+    return _record(context, builder, kind, _view(context, builder, record.array, data, shape, strides, owner))
 
 
 def _record(context: Any, builder: Any, record: Record, array: Any) -> Any:
-    made = cgutils.create_struct_proxy(record)(context, builder)
-    made.rows = array
-    return made._getvalue()
+    return builder.insert_value(ir.Constant(context.get_value_type(record), ir.Undefined), array, 0)
 
 
 def _view(context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, owner: Any = None) -> Any:
     """An array of the last of ``shape`` and ``strides``, or the number at a place."""
     if not isinstance(kind, types.Array):
         return builder.load(data)
-    made, axes = make_array(kind)(context, builder), slice(-kind.ndim, None)
-    populate_array(made, data, shape[axes], strides[axes], WORD(8), owner)
-    return impl_ret_borrowed(context, builder, kind, made._getvalue())
+    axes = slice(-kind.ndim, None)
+    fields = {
+        "data": data, "shape": cgutils.pack_array(builder, shape[axes], WORD), "itemsize": WORD(8),
+        "strides": cgutils.pack_array(builder, strides[axes], WORD), "nitems": functools.reduce(builder.mul, shape[axes]),
+    }  # fmt: skip
+    if owner is not None:
+        fields["meminfo"] = owner
+    place, made = context.data_model_manager[kind].get_field_position, context.get_constant_null(kind)
+    for field, part in fields.items():
+        made = builder.insert_value(made, part, place(field))
+    return impl_ret_borrowed(context, builder, kind, made)
