@@ -25,10 +25,10 @@ Each equation is computed in one place and compared with something independent. 
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim study accuracy` compares it with a second model of the
-rig in other coordinates and states, which SciPy's DOP853 integrates with a tolerance of 1e-11. Rigs are the nominal one,
-extreme and random corners of the ranges, and random ones. Motions last 0.5 s: short puffs make both pistons stick and slip,
-or valves open to 0.7 and the hand jerks with 80 N. The error is the largest at any of 50 marks.
+The plant takes classical Runge-Kutta steps of {step:g} ms. A second model of the rig has other coordinates and states, and
+SciPy's DOP853 integrates it with a tolerance of 1e-11 (`birthsim study accuracy`). Rigs are the nominal one, extreme and
+random corners of the ranges, and random ones. In motions of 0.5 s short puffs make both pistons stick and slip, or valves
+open to 0.7 and a hand of 80 N jerks. The error is the largest at any of 50 marks.
 
 {worst}
 
