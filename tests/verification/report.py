@@ -25,7 +25,7 @@ Each equation is computed in one place and compared with something independent. 
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. A second model of the rig has other coordinates and states, and
+The plant moves in classical Runge-Kutta steps of {step:g} ms each. A second model has other coordinates and states, and
 SciPy's DOP853 integrates it with a tolerance of 1e-11 (`birthsim study accuracy`). Rigs are the nominal one, extreme and
 random corners of the ranges, and random ones. In motions of 0.5 s short puffs make both pistons stick and slip, or valves
 open to 0.7 and a hand of 80 N jerks. The error is the largest at any of 50 marks.
