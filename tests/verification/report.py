@@ -15,7 +15,7 @@ HERE = Path(__file__).parent
 INTRODUCTION = """# Verification
 
 How the physics and the controllers were checked, and what was found. `make verify` measures accuracy and balances and writes
-this page from `tests/verification/`; `make verify-slow` also measures mutation scores and coverage ({minutes} minutes).
+this page; `make verify-slow` also measures mutation scores and coverage ({minutes} minutes).
 """
 
 EQUATIONS = """## Equations
@@ -46,8 +46,8 @@ chambers hold. The gap is the largest relative difference of any chamber at any 
 
 MUTATION = """## Mutation scores
 
-`python -m tests.mutation` changes one operator, number or function name at a time ("one in 3": every third) and runs the
-module's tests, uncompiled, until one fails. The score is the share of changes that some test notices. Slow tests are left
+One operator, number or function name is changed at a time ("one in 3": every third), and the module's tests run, uncompiled,
+until one fails. The score is the share of changes that some test notices. Slow tests are left
 out, so all tests notice at least as much. Data, interfaces and estimators have no score.
 """
 
