@@ -5,7 +5,7 @@ import numpy as np
 
 class PD:
     def __init__(self, parameters):
-        self.parameters = parameters  # the rig, for laws that need a model
+        self.parameters = parameters  # the rig, for controllers that need a model
 
     def reset(self, lanes=None):
         pass

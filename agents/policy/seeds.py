@@ -79,10 +79,9 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     """
     feasible = np.asarray(law.required_strength_ratio) < 1.0
     lines = [
-        f"{int(feasible.sum())} of {len(feasible)} episodes are within the rig's strength; {len(residuals)} training seeds. "
-        "IQM: interquartile mean, with 95 % intervals over seeds and episodes.",
+        f"{int(feasible.sum())} of {len(feasible)} episodes are within the rig's strength; {len(residuals)} training seeds.",
         "",
-        f"| metric | unit | statistic | {law.controller} | residual | 95 % interval |",
+        f"| metric | unit | statistic | {law.controller} | residual | 95 % interval over seeds and episodes |",
         "|---|---|---|---|---|---|",
     ]
 
@@ -99,7 +98,7 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
         lines.append(f"| {metric} | {UNITS[metric]} | {name} | {shown} | {low} to {high} |")
 
     for metric in SHOWN:
-        rows(metric, "IQM", interquartile_mean)
+        rows(metric, "interquartile mean", interquartile_mean)
     for name, statistic in (
         ("pooled RMS", pooled),
         ("median", _fraction(0.5)),
@@ -110,25 +109,24 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
     base = sizes(law, "settled_rms")
     matrix = np.stack([sizes(one, "settled_rms") for one in residuals])
     both = np.stack([np.broadcast_to(base, matrix.shape), matrix], axis=-1)
-    lines.append("")
-    for name, statistic in (("Pooled", pooled), ("Interquartile mean of the", interquartile_mean)):
+    for name, statistic in (("pooled RMS", pooled), ("interquartile mean", interquartile_mean)):
 
         def less(values: Array, statistic: Callable[[Array], float] = statistic) -> float:
             return 100 * (1 - statistic(values[..., 1]) / statistic(values[..., 0]))
 
-        off = less(both[:, feasible])
-        if not np.isfinite(off):
-            lines.append(f"{name} settled error: most episodes are lost.  ")
-            continue
-        low, high = crossed_interval(less, both[:, feasible])
-        lines.append(f"{name} settled error: {off:.1f} % less than {law.controller} ({low:.1f} to {high:.1f} %).  ")
+        off, interval = less(both[:, feasible]), ""
+        if np.isfinite(off):
+            low, high = crossed_interval(less, both[:, feasible])
+            interval = f"{low:.1f} to {high:.1f}"
+        shown = f"{off:.1f}" if interval else "most episodes are lost"
+        lines.append(f"| settled_rms | % | less, {name} | | {shown} | {interval} |")
     each = ", ".join(number(pooled(row[feasible])) for row in matrix)
     lost = ", ".join(str(sum(one.lost)) for one in residuals)
+    whole = f"pooled RMS of all {len(feasible)} episodes"
     lines += [
-        f"Pooled error of each seed: {each} mm. Lost: {sum(law.lost)} by {law.controller}, {lost} by the seeds "
-        f"(in the pooled error as {LOST_ERROR:g} mm).  ",
-        f"Pooled over all {len(feasible)} episodes, those beyond the rig's strength too: {number(pooled(base))} mm by "
-        f"{law.controller}, {number(pooled(matrix))} mm with the residual.",
+        f"| settled_rms | mm | pooled RMS of each seed | | {each} | |",
+        f"| settled_rms | mm | {whole} | {number(pooled(base))} | {number(pooled(matrix))} | |",
+        f"| lost | | episodes; {LOST_ERROR:g} mm in a pooled RMS | {sum(law.lost)} | {lost} | |",
     ]
     return "\n".join(lines)
 

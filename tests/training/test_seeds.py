@@ -68,7 +68,8 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
     text = seed_table(law, residuals)
     assert "3 of 4 episodes are within the rig's strength; 2 training seeds" in text
-    assert f"Pooled error of each seed: 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} mm. Lost: 0 by law, 0, 1 by the seeds" in text
+    assert f"| pooled RMS of each seed | | 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} | |" in text
+    assert "| lost | | episodes; 100 mm in a pooled RMS | 0 | 0, 1 | |" in text
     assert "| settled_rms | mm | median | 2 | 1 |" in text
     assert "| settled_rms | mm | max | 2 | lost |" in text
     assert pooled(np.array([3.0, 4.0])) == pytest.approx(np.sqrt(12.5))
@@ -78,7 +79,7 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
 def test_where_most_episodes_are_lost_the_table_says_so():
     law = evaluation("law", [1.0, 2.0, 3.0, 4.0])
     text = seed_table(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2)
-    assert "Interquartile mean of the settled error: most episodes are lost." in text
+    assert "less, interquartile mean | | most episodes are lost |" in text
     assert "inf" not in text
 
 

@@ -14,71 +14,57 @@ HERE = Path(__file__).parent
 
 INTRODUCTION = """# Verification
 
-This page says how the physics and the laws were checked, and what the checks found. The page is generated: edit
-`tests/verification/`, not this file. `make verify` measures accuracy and balances and writes the page anew.
-`make verify-slow` also measures mutation scores and coverage. The mutants and the coverage below took {minutes} minutes;
-the choice of the tests comes on top.
+How the physics and the controllers were checked, and what was found. `make verify` measures accuracy and balances and writes
+this page; `make verify-slow` also measures mutation scores and coverage ({minutes} minutes).
 """
 
 EQUATIONS = """## Equations
 
-Numbers in brackets are the paper's. Each equation is computed in one place and compared with something independent.
+Each equation is computed in one place and compared with something independent. Numbers in brackets are the paper's.
 """
 
 ACCURACY = """## Accuracy of the integrator
 
-The plant takes classical Runge-Kutta steps of {step:g} ms. `birthsim study accuracy` compares it with a second model of the
-rig. That model has other coordinates and other states, and SciPy's DOP853 integrates it with a tolerance of 1e-11.
-
-- The rigs are the nominal one, two extreme corners of the ranges of randomisation, random corners, and random draws.
-- Two motions of 0.5 s are measured. In the first, short puffs of air make both pistons stick and slip. In the second, valves
-  open to 0.7 and the hand jerks with 80 N.
-- The error is the largest at any of the 50 marks.
+The plant moves in classical Runge-Kutta steps of {step:g} ms each. A second model has other coordinates and states, and
+SciPy's DOP853 integrates it with a tolerance of 1e-11 (`birthsim study accuracy`). Rigs are the nominal one, extreme and
+random corners of the ranges, and random ones. In motions of 0.5 s short puffs make both pistons stick and slip, or valves
+open to 0.7 and a hand of 80 N jerks. The error is the largest at any of 50 marks.
 
 {worst}
 
-A tracker's noise is 100 um, so integration adds nothing that a sensor could see. On some drawn rigs steps of 0.5 ms are
-unstable or wrong by millimetres, so 0.25 ms is not too small. Where friction reverses or a valve shuts, the equations have
-kinks. There no method keeps its order, and adaptive methods lose their advantage. {itself}
+A tracker's noise is 100 um. On some random rigs steps of 0.5 ms are unstable or wrong by millimetres, so 0.25 ms is not too
+small. At kinks, where friction reverses or a valve shuts, no method keeps its order. {itself}
 
 ![Error against step and cost](accuracy.png)
 """
 
 BALANCES = """## Balances
 
-Mass and energy must balance. The test adds up flows, work and heat of every chamber in the same Runge-Kutta stages as the
-plant. Then it compares the sums with what the chambers hold. The gap is the largest relative difference of any chamber at
-any mark of 20 ms.
+The test adds up flows, work and heat of every chamber in the plant's Runge-Kutta stages, and compares the sums with what the
+chambers hold. The gap is the largest relative difference of any chamber at any mark of 20 ms.
 """
 
 MUTATION = """## Mutation scores
 
-`python -m tests.mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
-until one fails. The score is the share of changes that some test notices. "One in 3" means that every third change was tried.
-Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of
-data and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.
+One operator, number or function name is changed at a time ("one in 3": every third), and the module's tests run, uncompiled,
+until one fails. The score is the share of changes that some test notices. Slow tests are left
+out, so all tests notice at least as much. Data, interfaces and estimators have no score.
 """
 
 SURVIVORS = """### Survivors
 
-A survivor is a change that no test noticed. Each has a verdict.
-
-- Equivalent: no input tells the change from the original, or it only makes scratch space larger.
-- Numerical: it changes results by less than any tolerance that means something.
-- Out of reach: only inputs that callers exclude tell the two apart.
-- Missing test: a test would notice.
+No test noticed these changes. Equivalent: no input shows the change. Numerical: it is below any meaningful tolerance. Out of
+reach: only inputs that callers exclude show it. Missing test: a test would notice.
 """
 
 COVERAGE = """## Coverage
 
-The lines of compiled code cannot be counted. So the kernels run as plain Python here, under the {tests} tests that the
-mutation tester uses. Tests that are too slow uncompiled are left out; they run compiled in `make test`.
+The kernels run as plain Python here, under the {tests} tests of the mutation scores.
 """
 
 PROMISES = """## Promises
 
-The table lists what the documentation promises, and the tests that check it. A bound is what those tests allow. Another
-test checks that every test named here exists, and that every bound stands in its file.
+What the documentation promises, and the tests that check it. A bound is what those tests allow.
 """
 
 
@@ -163,7 +149,7 @@ def balances() -> str:
     more = (
         f"Insulated chambers, squeezed by up to {squeezed}, keep P V^gamma to {adiabat['drift']:.1e}.\n\n"
         "Kinetic and potential energy change by the work of pressures and hand less that of friction. Over 2 s and "
-        f"{mechanical[0]['work_j']:.0f} J the gap, relative to the work, is {gaps}. Trapezoids of one step sum up the work."
+        f"{mechanical[0]['work_j']:.0f} J the relative gap is {gaps}."
     )
     heads = ["motion", "lanes", "step (ms)", "gap of mass", "gap of energy"]
     return f"{BALANCES}\n{basis(found)}\n{table(heads, rows)}\n{more}\n"
