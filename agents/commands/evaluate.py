@@ -12,20 +12,10 @@ from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
 from baselines.bench.evaluation_data import data
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import (
-    EPISODES,
-    JOBS,
-    RANDOMIZE,
-    add_processes,
-    check_environment,
-    check_world,
-    policy_of,
-    run,
-    seed_number,
-    shown_arguments,
-    whole_up_to,
-)
+from baselines.commands.parts import add_parts, add_set, environment_parts
+from baselines.commands.settings import EPISODES, JOBS, RANDOMIZE
+from baselines.commands.shared import add_processes, run, seed_number, shown_arguments, whole_up_to
+from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
 from baselines.registry import controller_names
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks

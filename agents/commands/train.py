@@ -13,7 +13,9 @@ import gymnasium
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.training.time_split import told
-from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
+from baselines.commands.settings import RANDOMIZE
+from baselines.commands.shared import run, seed_number, whole
+from baselines.commands.worlds import check_world
 from baselines.work.files import make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.parts.drawn.randomization import described

@@ -14,8 +14,10 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, check_environment, finite_number, policy_of, run, seed_number
+from baselines.commands.parts import add_parts, add_set, environment_parts
+from baselines.commands.settings import RANDOMIZE
+from baselines.commands.shared import finite_number, run, seed_number
+from baselines.commands.worlds import check_environment, policy_of, with_options
 from baselines.registry import controller_names, make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file

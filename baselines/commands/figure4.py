@@ -12,8 +12,9 @@ from PIL import Image
 from tqdm import tqdm
 
 import birthsim_env
-from baselines.commands.parts import add_set, with_options
+from baselines.commands.parts import add_set
 from baselines.commands.shared import run
+from baselines.commands.worlds import with_options
 from baselines.registry import controller_names, make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file, whole_results, write_json

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import Any
 
-from baselines.registry import known_options, split_options
 from birthsim_env.parts.hands.moving_hands import HANDS
 
 
@@ -49,24 +47,3 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         help="gains and other options of the controllers named, of those that have them, such as --set bandwidth=60; one of "
         "several controllers takes them by name: 'pid[bandwidth=60]'",
     )
-
-
-def with_options(names: Sequence[str], entries: Sequence[str]) -> list[str]:
-    """Controllers' names with what ``--set`` gives to those that have it; ``ValueError`` for what none of them has."""
-    if not entries:
-        return list(names)
-    known = {name: known_options(name) for name in names}
-    for entry in entries:
-        option, equals, value = entry.partition("=")
-        if not (equals and value and option.isidentifier()):
-            raise ValueError(f"--set {entry!r}; allowed: GAIN=VALUE")
-        if not any(have is None or option in have for have in known.values()):
-            listed = "; ".join(f"{name}: {', '.join(have or ()) or 'nothing'}" for name, have in known.items())
-            raise ValueError(f"--set {entry!r}; allowed for {listed}")
-    found = []
-    for name, have in known.items():
-        own = [entry for entry in entries if have is None or entry.partition("=")[0] in have]
-        plain, given = split_options(name)
-        listed = ",".join([*(f"{key}={value}" for key, value in given.items()), *own])
-        found.append(f"{plain}[{listed}]" if listed else plain)
-    return found

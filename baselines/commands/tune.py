@@ -26,8 +26,9 @@ from tqdm import tqdm
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import check_world, run, seed_number, whole_up_to
+from baselines.commands.parts import add_parts, add_set, environment_parts
+from baselines.commands.shared import run, seed_number, whole_up_to
+from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
 from baselines.work.files import own_folder, whole_results, write_json

@@ -27,7 +27,7 @@ def test_help_fits_80_columns_and_ends_with_an_example(words, monkeypatch, capsy
     status, printed, complained = call(words[0], monkeypatch, capsys, *words[1:], "--help")
     assert (status, complained) == (0, "")
     lines = printed.rstrip().splitlines()
-    assert printed.startswith(f"usage: birthsim {words[0]}")
+    assert printed.lower().startswith(f"usage: birthsim {words[0]}")
     assert [line for line in lines if len(line) > 80] == []
     assert [line for line in lines if line.startswith("example: ")] == lines[-1:]
     assert lines[-1].startswith(f"example: birthsim {' '.join(words)}")
