@@ -16,8 +16,10 @@ class Settings(Parts):
     controller: Controller = "admittance"
     set: Gains = field(default_factory=list)
     seed: Seed = 0
+    """Of the episode."""
     sensors: Sensors = "ideal"
     randomize: Randomize = "none"
+    """What the seed draws."""
     parameters: RigFile = None
     out: Path
     """Folder for episode.png and .svg."""

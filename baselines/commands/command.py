@@ -28,8 +28,9 @@ class Ended(KeyboardInterrupt):
 
 def program(name: str, settings: type[S], example: str = "") -> App:
     """What reads the settings of the command ``name`` and returns them; its help ends with the example."""
+    about = "\n\n".join(" ".join(part.split()) for part in (settings.__doc__ or "").split("\n\n"))
     app = App(
-        name=name, help=settings.__doc__, help_format="plaintext", help_epilogue=f"example: {example}" if example else None,
+        name=name, help=about, help_format="plaintext", help_epilogue=f"example: {example}" if example else None,
         version_flags=(), default_parameter=Parameter(negative=(), negative_iterable=()), result_action="return_value",
         config=_file if issubclass(settings, Settings) else None, exit_on_error=False, print_error=False, verbose=False,
     )  # fmt: skip

@@ -56,7 +56,7 @@ def number(unit: str, above: float = -math.inf, most: float = math.inf) -> Param
     return Parameter(converter=read, metavar=unit)
 
 
-def cluster(_: type, name: str | None) -> None:
+def check_cluster(_: type, name: str | None) -> None:
     """``ray`` or ``ray:ADDRESS``."""
     kind, colon, address = (name or "ray").partition(":")
     if kind != "ray" or (colon and not address):
@@ -64,20 +64,23 @@ def cluster(_: type, name: str | None) -> None:
 
 
 Env = Annotated[str, Parameter(group=WORLD, metavar="ID", help="Environment.")]
-Seed = Annotated[int, whole(0, 2**32 - 1), Parameter(help="Seed of what is random.")]
+Seed = Annotated[int, whole(0, 2**32 - 1)]
 """A seed that NumPy and PyTorch take."""
 Kind = Literal["ideal", "lab", "honest"]
 """The names of ``birthsim_env.parts.sensors.sensors.SENSORS``."""
 Sensors = Annotated[Kind, Parameter(group=WORLD, help="Sensor model.")]
-Randomize = Annotated[
-    Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD, help="What a seed draws anew.")
-]
+Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[Path | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
-NAMED = Parameter(
-    group=CONTROL, metavar="NAME", help="Name, with options as in 'admittance[learn=false]', or path/to/file.py:Class."
+NAMES = (
+    "backstepping, admittance, pid, lqr, sliding-mode, nonlinear-mpc, residual or another registered name, with options as in "
+    "'admittance[learn=false]', or path/to/file.py:Class."
 )
-Controller = Annotated[str, NAMED]
-Controllers = Annotated[list[str] | None, NAMED, Parameter(alias="--controllers", consume_multiple=True)]
+"""Help of an option that names controllers."""
+Controller = Annotated[str, Parameter(group=CONTROL, metavar="NAME", help=f"One of {NAMES}")]
+Controllers = Annotated[
+    list[str] | None,
+    Parameter(group=CONTROL, metavar="NAME", alias="--controllers", consume_multiple=True, help=f"One or more of {NAMES}"),
+]
 Gains = Annotated[
     list[str],
     Parameter(
@@ -98,6 +101,13 @@ class Settings:
 
     config: Annotated[Path | None, Parameter(metavar="FILE")] = None
     """TOML file of these options, as episodes = 64; what is typed counts more."""
+
+    def shown(self) -> dict[str, Any]:
+        """What results depend on, as JSON."""
+        return {
+            name: value if value is None or isinstance(value, bool | int | list) else str(value)
+            for name, value in vars(self).items() if name not in ("out", "jobs", "cluster", "config")
+        }  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -123,5 +133,5 @@ class Processes(Settings):
 
     jobs: Annotated[int, whole(1, JOBS_AT_MOST), Parameter(group=PROCESSES)] = JOBS
     """Processes side by side."""
-    cluster: Annotated[str | None, Parameter(group=PROCESSES, metavar="ray[:ADDRESS]", validator=cluster)] = None
+    cluster: Annotated[str | None, Parameter(group=PROCESSES, metavar="ray[:ADDRESS]", validator=check_cluster)] = None
     """Ray's workers instead, of a running cluster or of this machine."""
