@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from baselines.commands.settings import Controller, Env, Gains, Parts, Randomize, RigFile, Seed, Sensors
+from baselines.commands.settings import Controller, Env, Parts, Randomize, RigFile, Seed, Sensors, Set
 
 
 @dataclass(kw_only=True)
@@ -14,7 +14,7 @@ class Settings(Parts):
 
     env: Env = "BirthSIM/Circle-v1"
     controller: Controller = "admittance"
-    set: Gains = field(default_factory=list)
+    set: Set = field(default_factory=list)
     seed: Seed = 0
     """Of the episode."""
     sensors: Sensors = "ideal"

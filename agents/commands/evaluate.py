@@ -19,13 +19,13 @@ from baselines.commands.settings import (
     RANDOMIZE,
     Controllers,
     Env,
-    Gains,
     Parts,
     Processes,
     Randomize,
     RigFile,
     Seed,
     Sensors,
+    Set,
     whole,
 )
 from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
@@ -48,7 +48,7 @@ class Settings(Parts, Processes):
     controller: Controllers = None
     policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
     """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""
-    set: Gains = field(default_factory=list)
+    set: Set = field(default_factory=list)
     episodes: Annotated[int, whole(1, EPISODES)] = 32
     """Episodes of each controller."""
     seed: Seed = 0

@@ -12,7 +12,7 @@ from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Toml
 from cyclopts.exceptions import CycloptsError, UnknownOptionError, UnusedCliTokensError
 
-from baselines.commands.settings import Settings
+from baselines.commands.settings import Configured
 from baselines.commands.start import endings
 
 S = TypeVar("S")
@@ -31,12 +31,20 @@ def program(name: str, settings: type[S], example: str = "") -> App:
     about = "\n\n".join(" ".join(part.split()) for part in (settings.__doc__ or "").split("\n\n"))
     app = App(
         name=name, help=about, help_format="plaintext", help_epilogue=f"example: {example}" if example else None,
-        version_flags=(), default_parameter=Parameter(negative=(), negative_iterable=()), result_action="return_value",
-        config=_file if issubclass(settings, Settings) else None, exit_on_error=False, print_error=False, verbose=False,
+        default_parameter=Parameter(negative=(), negative_iterable=(), show_default=_default), version_flags=(),
+        config=_file if issubclass(settings, Configured) else None, result_action="return_value",
+        exit_on_error=False, print_error=False, verbose=False,
     )  # fmt: skip
     app["--help"].show = False
     app.default(settings)
     return app
+
+
+def _default(value: Any) -> str | None:
+    """A default as a user would type it; nothing of a flag and of an empty list."""
+    if value is None or value is False:
+        return None
+    return " ".join(map(str, value)) or None if isinstance(value, list | tuple) else str(value)
 
 
 def _file(app: App, commands: tuple[str, ...], options: ArgumentCollection) -> None:
@@ -59,8 +67,10 @@ def _read_and_act(app: App, action: Callable[[Any], None]) -> None:
     try:
         given = app(sys.argv[1:])
     except CycloptsError as error:
+        said, option = str(error).rstrip("."), error.argument.name if error.argument else ""
+        place = "" if option.lstrip("-") in said else f"{option}: "
         known = f"; allowed: what {app.name[0]} --help lists" * isinstance(error, UnknownOptionError | UnusedCliTokensError)
-        raise ValueError(f"{str(error).rstrip('.')}{known}") from None
+        raise ValueError(f"{place}{said}{known}") from None
     if given is not None:  # help was asked for
         action(given)
 

@@ -70,33 +70,34 @@ Kind = Literal["ideal", "lab", "honest"]
 """The names of ``birthsim_env.parts.sensors.sensors.SENSORS``."""
 Sensors = Annotated[Kind, Parameter(group=WORLD, help="Sensor model.")]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
-RigFile = Annotated[Path | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
 NAMES = (
     "backstepping, admittance, pid, lqr, sliding-mode, nonlinear-mpc, residual or another registered name, with options as in "
     "'admittance[learn=false]', or path/to/file.py:Class."
 )
 """Help of an option that names controllers."""
-Controller = Annotated[str, Parameter(group=CONTROL, metavar="NAME", help=f"One of {NAMES}")]
+Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
 Controllers = Annotated[
     list[str] | None,
-    Parameter(group=CONTROL, metavar="NAME", alias="--controllers", consume_multiple=True, help=f"One or more of {NAMES}"),
+    CONTROLLER,
+    Parameter(alias="--controllers", consume_multiple=True, help=f"One or more of {NAMES}"),
 ]
-Gains = Annotated[
+Set = Annotated[
     list[str],
     Parameter(
-        group=CONTROL, metavar="GAIN=VALUE", consume_multiple=True, show_default=False,
+        group=CONTROL, metavar="GAIN=VALUE", consume_multiple=True,
         help="Gains and other options of the controllers that have them, such as --set bandwidth=60; one of several takes "
         "them by name: 'pid[bandwidth=60]'.",
     ),
 ]  # fmt: skip
-Flag = Annotated[bool, Parameter(show_default=False)]
 
 RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
 """``Randomize`` -> the environments' argument ``randomize``."""
 
 
 @dataclass(kw_only=True)
-class Settings:
+class Configured:
     """What every command with options has."""
 
     config: Annotated[Path | None, Parameter(metavar="FILE")] = None
@@ -111,7 +112,7 @@ class Settings:
 
 
 @dataclass(kw_only=True)
-class Parts(Settings):
+class Parts(Configured):
     """Parts of a user's own, instead of the environment's."""
 
     reference: Annotated[str | None, Parameter(group=WORLD, metavar="PART")] = None
@@ -128,7 +129,7 @@ class Parts(Settings):
 
 
 @dataclass(kw_only=True)
-class Processes(Settings):
+class Processes(Configured):
     """Where work is done."""
 
     jobs: Annotated[int, whole(1, JOBS_AT_MOST), Parameter(group=PROCESSES)] = JOBS

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import sys
 
 import gymnasium
 import numpy as np
@@ -37,8 +36,7 @@ def command(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
         patch.setattr(figure4_command, "record_run", kept)
-        patch.setattr(sys, "argv", ["birthsim figure4", "--out", str(out)])
-        figure4_command.main()
+        figure4_command.main(figure4_command.Settings(out=out))
     return out, records[0], printed.getvalue()
 
 
