@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from baselines.bench.statistics import number
-from baselines.commands.shared import run
+from baselines.commands.settings import Configured
 from baselines.work.files import make_folder, write_json, write_text
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim explain",
-        description="Look into a trained residual: its correction against the weight that the law leaves out and against "
-        "friction, the frictionless circle, and the stiffness test per setpoint on rigs drawn at random.",
-    )
-    parser.add_argument(
-        "--policy",
-        default="circle",
-        help="a folder of birthsim train, or a name that comes with the package (default: %(default)s)",
-    )
-    parser.add_argument("--no-pushes", action="store_true", help="leave out the stiffness test, which takes minutes")
-    parser.add_argument(
-        "--out", type=Path, required=True, help="folder for correction.png and .svg, residual.md, residual.json"
-    )
-    run(parser, _explain)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Look into a trained residual: its correction against the weight that the controller leaves out and against friction, the
+    frictionless circle, and the stiffness test per setpoint on rigs drawn at random.
+    """
+
+    policy: Annotated[str, Parameter(metavar="DIR")] = "circle"
+    """A folder that birthsim train wrote, or the name of what is shipped."""
+    no_pushes: bool = False
+    """Leave out the stiffness test, which takes minutes."""
+    out: Path
+    """Folder for correction.png and .svg, residual.md, residual.json."""
 
 
-def _explain(arguments: argparse.Namespace) -> None:
+def main(settings: Settings) -> None:
+    """Compute, draw and write it."""
     try:
         from agents.policy.controller import ResidualController
         from agents.policy.files import load_policy
@@ -45,22 +42,22 @@ def _explain(arguments: argparse.Namespace) -> None:
     from baselines.registry import make_controller
     from birthsim_env.physics.rig.parameters import Parameters
 
-    places = policy_folders(arguments.policy)
+    places = policy_folders(settings.policy)
     policies = [load_policy(place) for place in places]
     if any(policy.settings.law == NO_LAW for policy in policies):
-        raise ValueError(f"--policy {arguments.policy!r} drives the valves by itself; allowed: one that corrects a law")
+        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a law")
     names = [place.name for place in places]
     weights = [inspection.weight_over_workspace(policy) for policy in policies]
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]
     slopes = [float(np.polyfit(weight[1], weight[0], 1)[0]) for weight in weights]
     circles = [inspection.frictionless_circle(policy) for policy in policies]
-    folder = make_folder(arguments.out)
+    folder = make_folder(settings.out)
     draw_corrections(weights[0], correlations[0], inspection.friction_along_circle(policies[0]), folder)
     law = policies[0].settings.law
     laws = dict.fromkeys(("backstepping", law))  # the paper's, and the one underneath
     controllers: list[tuple[str, Any]] = [(name, make_controller(name, Parameters())) for name in laws]
     controllers += [(name, ResidualController(policy=place)) for name, place in zip(names, places, strict=True)]
-    rows = [] if arguments.no_pushes else inspection.rendered(controllers)
+    rows = [] if settings.no_pushes else inspection.rendered(controllers)
     lines = [
         "Without friction, held still at 128 places with masses of 2 to 5 kg: correction on cylinder 2 over m g cos(theta1).",
         "Circle of 100 mm without friction: settled RMS error on x.",
