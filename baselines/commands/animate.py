@@ -48,7 +48,7 @@ class Settings(Parts):
     """
 
     env: Env = "BirthSIM/Forceps-v1"
-    controller: Annotated[tuple[str, str], CONTROLLER, Parameter(alias="--controllers")] = (
+    controller: Annotated[tuple[str, str], CONTROLLER, Parameter(alias="--controllers", metavar="NAME NAME")] = (
         "backstepping",
         "admittance-backstepping",
     )

@@ -71,6 +71,8 @@ Kind = Literal["ideal", "lab", "honest"]
 Sensors = Annotated[Kind, Parameter(group=WORLD, help="Sensor model.")]
 Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
 RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+MANY = Parameter(consume_multiple=True)
+"""An option takes several values."""
 CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
 NAMES = (
     "backstepping, admittance, pid, lqr, sliding-mode, nonlinear-mpc, residual or another registered name, with options as in "
@@ -80,13 +82,15 @@ NAMES = (
 Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
 Controllers = Annotated[
     list[str] | None,
+    MANY,
     CONTROLLER,
-    Parameter(alias="--controllers", consume_multiple=True, help=f"One or more of {NAMES}"),
+    Parameter(alias="--controllers", metavar="NAME...", help=f"One or more of {NAMES}"),
 ]
 Set = Annotated[
     list[str],
+    MANY,
     Parameter(
-        group=CONTROL, metavar="GAIN=VALUE", consume_multiple=True,
+        group=CONTROL, metavar="GAIN=VALUE...",
         help="Gains and other options of the controllers that have them, such as --set bandwidth=60; one of several takes "
         "them by name: 'pid[bandwidth=60]'.",
     ),
