@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import gymnasium
 from cyclopts import Parameter
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.training.time_split import told
 from baselines.commands.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
-from baselines.commands.worlds import check_world
+from baselines.commands.worlds import check_environment, check_world
 from baselines.work.files import make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.parts.drawn.randomization import described
@@ -61,9 +60,7 @@ class Settings:
 def main(settings: Settings) -> None:
     """Train every seed and report."""
     training, residual = _settings(settings)
-    known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" in name)
-    if training.environment not in known:
-        raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
+    check_environment(training.environment, residual=True)
     rig = load_parameters(settings.parameters)
     check_world(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors)
     first = training.seed if settings.seed is None else settings.seed

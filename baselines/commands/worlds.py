@@ -11,9 +11,9 @@ from baselines.registry import known_options, split_options
 from birthsim_env.physics.rig.values import near
 
 
-def check_environment(name: str) -> None:
-    """Raises ``ValueError`` for an id that is none of the experiments."""
-    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and "Residual" not in one)
+def check_environment(name: str, residual: bool = False) -> None:
+    """Raises ``ValueError`` for an id that is none of the experiments, or else of those with a law inside."""
+    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and ("Residual" in one) == residual)
     if name not in known:
         raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
 

@@ -49,12 +49,17 @@ def test_help_of_all_fits_80_columns_and_names_every_command_at_once():
 @pytest.mark.parametrize(
     ("line", "asked"),
     [
-        (("evalute",), "command = 'evalute' (did you mean 'evaluate'?); allowed: run, live, "),
-        (("export", "--to", "fmux"), "--to 'fmux' (did you mean 'fmu'?); allowed: onnx, wasm, "),
+        (("evalute",), "command = 'evalute' (did you mean 'evaluate'?); allowed: what birthsim --help"),
+        (("export", "--to", "fmux"), "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help"),
+        (("nothing",), "command = 'nothing'; allowed: run, live, "),
+        (("export", "--to", "stone"), "--to 'stone'; allowed: onnx, wasm, "),
         (("export",), "--to is missing; allowed: onnx, wasm, "),
         (("evaluate", "--episods", "3", "--out", "x"), "--episods. Did you mean --episodes?"),
-        (("evaluate", "--controller", "backsteping", "--out", "x"), "'backsteping' (did you mean 'backstepping'?); allowed: "),
-        (("run", "--env", "BirthSIM/Forcep-v1", "--out", "x"), "(did you mean 'BirthSIM/Forceps-v1'?); allowed: "),
+        (
+            ("evaluate", "--controller", "backsteping", "--out", "x"),
+            "(did you mean 'backstepping'?); allowed: a registered name",
+        ),
+        (("run", "--env", "BirthSIM/Forcep-v1", "--out", "x"), "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/"),
     ],
 )
 def test_what_is_mistyped_is_asked_about(line, asked, monkeypatch, capsys, tmp_path):
@@ -188,7 +193,7 @@ BAD = [
     ("figure4", ("--sensors", "perfect"), ("--sensors", "perfect", "ideal", "lab", "honest")),
     ("figure4", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("figure4", ("--out", "{tmp}/own.py"), "own.py'"),
-    ("train", ("--env", "BirthSIM/Circle-v1"), "--env 'BirthSIM/Circle-v1'; allowed: BirthSIM/CircleResidual-v1, "),
+    ("train", ("--env", "BirthSIM/Circle-v1"), ("--env 'BirthSIM/Circle-v1'", "; allowed: BirthSIM/CircleResidual-v1, ")),
     ("train", ("--env", "Pendulum-v1"), "--env 'Pendulum-v1'; allowed: BirthSIM/CircleResidual-v1, "),
     ("train", ("--steps", "0"), ("--steps", "'0'", "allowed: a whole number ", "1")),
     ("train", ("--steps", "1e6"), ("--steps", "'1e6'", "allowed: a whole number ", "1")),
