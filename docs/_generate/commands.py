@@ -54,8 +54,8 @@ def _of(name: str, package: str, module: str, example: str) -> str:
     loaded = load("birthsim", package, module)
     if not hasattr(loaded, "Settings"):
         return _section(name, parser_of(package, module), example)
-    text = program(name, loaded.Settings).generate_docs(heading_level=2, usage_name="birthsim")
-    return f"{text.rstrip()}\n\nExample: `birthsim {example}`"
+    _, _, text = program(name, loaded.Settings).generate_docs(usage_name="birthsim").partition("\n")
+    return f"## `{name}`\n{text.rstrip()}\n\nExample: `birthsim {example}`"
 
 
 def _section(name: str, parser: argparse.ArgumentParser, example: str) -> str:
