@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from baselines.bench.statistics import number
 from baselines.commands.settings import Configured
+from baselines.commands.tables import aligned, markdown
 from baselines.work.files import make_folder, write_json, write_text
 
 
@@ -61,28 +62,32 @@ def main(settings: Settings) -> None:
     lines = [
         "Without friction, held still at 128 places with masses of 2 to 5 kg: correction on cylinder 2 over m g cos(theta1).",
         "Circle of 100 mm without friction: settled RMS error on x.",
-        "",
-        f"| policy | correlation | slope | circle: {law} (mm) | with the policy (mm) |",
-        "|---|---|---|---|---|",
+        f"Without a policy the circle's error is that of {law}.",
     ]
-    for name, correlation, slope, (alone, helped) in zip(names, correlations, slopes, circles, strict=True):
-        lines.append(f"| {name} | {correlation:.3f} | {slope:.2f} | {alone:.2f} | {helped:.3f} |")
-    if rows:
-        lines += [
-            "",
-            f"Stiffness test on rigs drawn at random, {rows[0]['cases']} pushes per setpoint: median (95 %).",
-            "",
-            "| setpoint (N/m) | controller | error of the stiffness (%) | hunting x (mm) | hunting y (mm) | lost |",
-            "|---|---|---|---|---|---|",
-        ]
-    for row in rows:
-        figures = " | ".join(
-            f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})"
-            for label in ("error_percent", "hunting_x_mm", "hunting_y_mm")
-        )
-        lines.append(f"| {row['setpoint']:g} | {row['controller']} | {figures} | {row['lost']} |")
-    text = "\n".join(lines)
-    write_text(folder / "residual.md", text + "\n")
+    learned: list[tuple[str, ...]] = [
+        (name, f"{correlation:.3f}", f"{slope:.2f}", f"{alone:.2f}", f"{helped:.3f}")
+        for name, correlation, slope, (alone, helped) in zip(names, correlations, slopes, circles, strict=True)
+    ]
+    tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]] = [
+        ("\n".join(lines), ("policy", "correlation", "slope", "circle, mm", "with the policy, mm"), learned)
+    ]
+    head = ("controller", "error, %", "hunts on x, mm", "on y, mm", "lost")
+    labels = ("error_percent", "hunting_x_mm", "hunting_y_mm")
+    for setpoint in dict.fromkeys(row["setpoint"] for row in rows):
+        there = [row for row in rows if row["setpoint"] == setpoint]
+        felt = [
+            (
+                row["controller"], *(f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})" for label in labels),
+                str(row["lost"]),
+            )
+            for row in there
+        ]  # fmt: skip
+        title = f"Stiffness test at {setpoint:g} N/m on rigs drawn at random, {there[0]['cases']} pushes: median (95 %)."
+        tables.append((title, head, felt))
+    marked = [f"{title}\n\n{markdown(top, cells)}\n" for title, top, cells in tables]
+    write_text(folder / "residual.md", "\n".join(marked))
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
     write_json(folder / "residual.json", content)
-    print(f"{text}\n\nwritten to {folder}/: correction.png and .svg, residual.md, residual.json")
+    for title, top, cells in tables:
+        print(f"{title}\n\n{aligned(top, cells)}\n")
+    print(f"written to {folder}/: correction.png and .svg, residual.md, residual.json")

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 import birthsim_env
 from baselines.commands.settings import Configured, Controller, RigFile, Sensors, Set
+from baselines.commands.tables import aligned
 from baselines.commands.worlds import with_options
 from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
@@ -115,8 +116,6 @@ def main(settings: Settings) -> None:
             "and a rig that keep it"
         )
     print(f"Fig. 4 with {controller}, {settings.sensors} sensors, {result['duration_s']:g} s\n")
-    print(f"{'':44}{'x or 1':>10}{'y or 2':>10}")
-    for name, values in result.items():
-        if isinstance(values, list):
-            print(f"{name:44}{values[0]:10.3f}{values[1]:10.3f}")
+    rows = [(name, *(f"{value:.3f}" for value in values)) for name, values in result.items() if isinstance(values, list)]
+    print(aligned(("", "x or 1", "y or 2"), rows))
     print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json, rig.png")

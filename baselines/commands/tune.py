@@ -28,6 +28,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
 from baselines.commands.settings import CONTROLLER, WORLD, Kind, Parts, RigFile, Seed, Set, whole
+from baselines.commands.tables import aligned
 from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
@@ -265,13 +266,10 @@ def main(settings: Settings) -> None:
             write_json(results / "trials.json", {**setting, "trials": trials})
             write_json(results / "gains.json", {**setting, **best, **place})
     print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
-    print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
-    for part, value in best["parts"].items():
-        print(f"{part:28}{first['parts'][part]:12.4g}{value:12.4g}")
-    print(f"{'sum':28}{first['cost']:12.4g}{best['cost']:12.4g}")
-    print(f"\n{'gain':28}{'start':>12}{'best':>12}{'lowest':>12}{'highest':>12}")
-    for gain, value in best["gains"].items():
-        print(f"{gain:28}{start[gain]:12.4g}{value:12.4g}{bounds[gain][0]:12.4g}{bounds[gain][1]:12.4g}")
+    spent = [{**one["parts"], "sum": one["cost"]} for one in (first, best)]
+    print(aligned(("cost, mm", "start", "best"), [(part, *(f"{one[part]:.3f}" for one in spent)) for part in spent[0]]))
+    gains = [(gain, *(f"{each:.4g}" for each in (start[gain], value, *bounds[gain]))) for gain, value in best["gains"].items()]
+    print(f"\n{aligned(('gain', 'start', 'best', 'lowest', 'highest'), gains)}")
     print(f"\nwritten to {settings.out}/: gains.json, trials.json")
     if interrupt is not None:
         raise interrupt

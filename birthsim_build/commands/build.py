@@ -5,11 +5,13 @@ from __future__ import annotations
 import platform
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
+from baselines.commands.tables import aligned
 from baselines.registry import LISTED, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
@@ -105,15 +107,18 @@ def _shipped() -> list[str]:
 
 
 def _show(report: Report) -> None:
+    sizes: list[tuple[str, str]] = []
     for name, value in report.items():
         if name == "estimate":
-            for law, found in value.items():
-                said = f"{found['operations']:,.0f} operations; at most {found['most']:,.0f} cycles, an estimate"
-                print(f"{law:60}{found['cycles']:>12,.0f} cycles a period; {said}")
-        elif isinstance(value, dict):
-            for key, size in value.items():
-                print(f"{name + ' ' + key:60}{size:>12,} bytes")
+            continue
+        if isinstance(value, dict):
+            sizes += [(f"{name} {key}", f"{size:,}") for key, size in value.items()]
         elif isinstance(value, int):
-            print(f"{name:60}{value:>12,} bytes")
+            sizes.append((name, f"{value:,}"))
         else:
-            print(f"{name:60}{', '.join(value) or 'nothing' if isinstance(value, list) else value:>12}")
+            said = ", ".join(value) or "nothing" if isinstance(value, list) else value
+            print(fill(f"{name}: {said}", 80, subsequent_indent="    "))
+    print(aligned(("", "bytes"), sizes))
+    if laws := report.get("estimate"):
+        counts = [(law, *(f"{found[one]:,.0f}" for one in ("operations", "cycles", "most"))) for law, found in laws.items()]
+        print(f"\n{aligned(('a period, estimated', 'operations', 'cycles', 'at most'), counts)}")
