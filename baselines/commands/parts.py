@@ -1,39 +1,10 @@
-"""Options of the commands for parts of a user's own: reference, hand, and the gains of controllers."""
+"""The option ``--set`` of the studies, which argparse still reads."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
-from birthsim_env.parts.hands.moving_hands import HANDS
-
-
-def add_parts(parser: argparse.ArgumentParser) -> None:
-    """Add ``--reference``, ``--stiffness`` and ``--user-force``."""
-    parser.add_argument(
-        "--reference",
-        metavar="PART",
-        help="your own instead of the environment's: a CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a "
-        "birthsim_env.Trajectory or of a function of time that returns (x, y)",
-    )
-    parser.add_argument(
-        "--stiffness",
-        metavar="FILE",
-        help="setpoints of your own instead of the environment's: a CSV file of time, x, y, stiffness (s, m, m, N/m); "
-        "--reference takes the same file",
-    )
-    parser.add_argument(
-        "--user-force",
-        metavar="PART",
-        help=f"your own hand instead of the environment's: {', '.join(HANDS)}, a CSV file of time, Fx, Fy (s, N, N), or "
-        "path/to/file.py:Name of a birthsim_env.UserForce or of a function of time that returns (Fx, Fy)",
-    )
-
-
-def environment_parts(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The environments' arguments that ``add_parts`` reads, as far as they are given."""
-    parts = {"reference": arguments.reference, "stiffness": arguments.stiffness, "user_force": arguments.user_force}
-    return {name: part for name, part in parts.items() if part is not None}
+from baselines.commands.worlds import with_options as with_options
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

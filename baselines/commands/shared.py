@@ -1,4 +1,4 @@
-"""Options of the commands that argparse reads: studies."""
+"""Options of the commands that argparse still reads: studies and the page. It has under one name what they import."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 from baselines.commands.command import act
-from baselines.commands.settings import JOBS, JOBS_AT_MOST, MOST
+from baselines.commands.settings import EPISODES as EPISODES
+from baselines.commands.settings import JOBS as JOBS
+from baselines.commands.settings import JOBS_AT_MOST, MOST
+from baselines.commands.worlds import policy_of as policy_of
 from birthsim_env.physics.rig.values import near, shown
 
 

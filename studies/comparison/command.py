@@ -8,10 +8,8 @@ from typing import Any
 
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable
-from baselines.commands.parts import add_set
-from baselines.commands.settings import EPISODES, JOBS
-from baselines.commands.shared import add_processes, run, seed_number, shown_arguments, whole_up_to
-from baselines.commands.worlds import with_options
+from baselines.commands.parts import add_set, with_options
+from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
 from baselines.registry import CONTROLLERS, SLOW, bare_name
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, code_stamp, run_tasks

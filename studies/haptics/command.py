@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings
-from baselines.commands.parts import add_set
-from baselines.commands.settings import JOBS
-from baselines.commands.shared import add_processes, run, seed_number, shown_arguments, whole_up_to
-from baselines.commands.worlds import with_options
+from baselines.commands.parts import add_set, with_options
+from baselines.commands.shared import JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
 from baselines.work.files import finite, make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import run_tasks
 from birthsim_env.parts.sensors.sensors import SENSORS

@@ -12,8 +12,7 @@ import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.statistics import number, penalize_lost, quantile
-from baselines.commands.settings import EPISODES
-from baselines.commands.shared import run, seed_number, whole_up_to
+from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
 from baselines.registry import make_controller
 from baselines.work.files import make_folder, write_text
 from birthsim_env.parts.scenarios import environment_id

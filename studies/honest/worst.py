@@ -14,8 +14,7 @@ import numpy as np
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost
-from baselines.commands.settings import EPISODES
-from baselines.commands.shared import finite_number, run, seed_number, whole_up_to
+from baselines.commands.shared import EPISODES, finite_number, run, seed_number, whole_up_to
 from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.statistics import quantile
-from baselines.commands.settings import JOBS
-from baselines.commands.shared import add_processes, finite_number, run, seed_number, whole_up_to
+from baselines.commands.shared import JOBS, add_processes, finite_number, run, seed_number, whole_up_to
 from baselines.identification.quantities import QUANTITIES
 from baselines.work.files import make_folder, write_text
 from baselines.work.tasks import run_tasks

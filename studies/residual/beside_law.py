@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from agents.residual.privileged import acting
 from agents.residual.settings import LAWS, ResidualSettings, is_one_of
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, number, quantile
-from baselines.commands.settings import EPISODES
-from baselines.commands.shared import run, seed_number, whole_up_to
+from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
 from baselines.work.tasks import Result
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array

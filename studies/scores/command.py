@@ -14,9 +14,7 @@ from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
-from baselines.commands.settings import EPISODES, JOBS
-from baselines.commands.shared import add_processes, run, seed_number, whole_up_to
-from baselines.commands.worlds import policy_of
+from baselines.commands.shared import EPISODES, JOBS, add_processes, policy_of, run, seed_number, whole_up_to
 from baselines.registry import UNCONTROLLED, make_controller
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, code_stamp, run_tasks

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.commands.settings import JOBS
-from baselines.commands.shared import add_processes, run
+from baselines.commands.shared import JOBS, add_processes, run
 from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, run_tasks
 from studies.sweeps.plan import Point, Sweep, load_sweep
