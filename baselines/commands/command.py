@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn, TypeVar
 
 from cyclopts import App, ArgumentCollection, Parameter
-from cyclopts.config import Toml
+from cyclopts.config import Dict
 from cyclopts.exceptions import CycloptsError, UnknownOptionError, UnusedCliTokensError
 
 from baselines.commands.settings import Configured
@@ -50,12 +50,10 @@ def _default(value: Any) -> str | None:
 def _file(app: App, commands: tuple[str, ...], options: ArgumentCollection) -> None:
     """Fill in what ``--config`` says in TOML and the command line does not."""
     for token in options["--config"].tokens:
-        try:
-            Toml(token.value, must_exist=True, use_commands_as_keys=False)(app, commands, options)
-        except CycloptsError as error:
-            if type(error) is CycloptsError:  # of the whole file, which it does not name
-                error.msg = f"--config {token.value!r}: {error.msg}"
-            raise
+        from birthsim_env.physics.rig.reading import read_toml  # loads the whole package
+
+        said = read_toml("--config", token.value)
+        Dict(said, source=f"--config {token.value!r}", use_commands_as_keys=False)(app, commands, options)
 
 
 def perform_with(name: str, settings: type[S], action: Callable[[S], None], example: str) -> None:
@@ -67,7 +65,7 @@ def _read_and_act(app: App, action: Callable[[Any], None]) -> None:
     try:
         given = app(sys.argv[1:])
     except CycloptsError as error:
-        said, option = str(error).rstrip("."), error.argument.name if error.argument else ""
+        said, option = " ".join(str(error).split()).rstrip("."), error.argument.name if error.argument else ""
         place = "" if option.lstrip("-") in said else f"{option}: "
         known = f"; allowed: what {app.name[0]} --help lists" * isinstance(error, UnknownOptionError | UnusedCliTokensError)
         raise ValueError(f"{place}{said}{known}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -20,7 +21,7 @@ from birthsim.export import FORMS
 from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.console import ROOT
+from tests.console import ROOT, assert_says, call
 
 EXAMPLES = {
     **{name: (one.package, one.module, one.example.split()[1:]) for name, one in COMMANDS.items()},
@@ -44,15 +45,42 @@ def test_an_example_is_read_and_says_the_same_as_toml(name, tmp_path):
     assert replace(read, config=None) == typed
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("sensor = 'lab'", ("sensor", "--sensors", "own.toml")),
+        ("sensors = 'la'", ("sensors", "la", "ideal", "lab", "honest", "own.toml")),
+        ("seed = -1", ("seed", "'-1'", "a whole number from 0 to 4294967295")),
+        ("seed = 3.0", ("seed", "'3.0'", "a whole number from 0 to 4294967295")),
+        ("seed = [1, 2]", ("seed", "own.toml")),
+        ("[world]\nseed = 3", ("[world][seed]", "own.toml", "birthsim run --help")),
+        ("seed =", ("--config", "own.toml", "no TOML")),
+    ],
+)
+def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_path):
+    (tmp_path / "own.toml").write_text(content)
+    status, _, complained = call("run", monkeypatch, capsys, "--config", tmp_path / "own.toml", "--out", tmp_path / "x")
+    assert status == 2
+    assert complained.count("\n") == 1
+    assert_says(said, complained)
+
+
+def test_what_is_typed_counts_more_than_toml(tmp_path):
+    (tmp_path / "own.toml").write_text("seed = 4\nset = ['bandwidth=60']\nuser-force = 'sine'\nrandomize = 'all'\n")
+    read = program("birthsim run", load("birthsim", "birthsim", "run").Settings)
+    given = read(
+        ["--config", str(tmp_path / "own.toml"), "--out", "x", "--seed", "5", *["--set", "a=1", "b=2", "--set", "c=3"]]
+    )
+    assert (given.seed, given.set, given.user_force, given.randomize) == (5, ["a=1", "b=2", "c=3"], "sine", "all")
+
+
 def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
     assert set(get_args(Kind)) == {"ideal", "lab", "honest"} <= set(SENSORS)  # other tests register another one
     assert set(get_args(get_args(Randomize)[0])) == set(RANDOMIZE)
     assert set(RANDOMIZE.values()) == set(WORDS)
     assert [name for name in CONTROLLERS if name not in NAMES] == []
-    done = subprocess.run(
-        [sys.executable, "-m", "birthsim", "run", "--help"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert [name for name in HANDS if f"{name}," not in done.stdout and f"{name};" not in done.stdout] == []
+    _, printed, _ = call("run", monkeypatch, capsys, "--help")
+    assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
 
 
 def test_help_of_an_episode_loads_nothing_that_is_slow():
