@@ -10,7 +10,7 @@ from typing import Any, NoReturn, TypeVar
 
 from cyclopts import App, ArgumentCollection, Parameter
 from cyclopts.config import Dict
-from cyclopts.exceptions import CycloptsError, UnknownOptionError, UnusedCliTokensError
+from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownOptionError, UnusedCliTokensError
 
 from baselines.commands.settings import Configured
 from baselines.commands.start import endings
@@ -67,7 +67,8 @@ def _read_and_act(app: App, action: Callable[[Any], None]) -> None:
     except CycloptsError as error:
         said, option = " ".join(str(error).split()).rstrip("."), error.argument.name if error.argument else ""
         place = "" if option.lstrip("-") in said else f"{option}: "
-        known = f"; allowed: what {app.name[0]} --help lists" * isinstance(error, UnknownOptionError | UnusedCliTokensError)
+        missing = isinstance(error, MissingArgumentError | UnknownOptionError | UnusedCliTokensError)
+        known = f"; allowed: what {app.name[0]} --help lists" * missing
         raise ValueError(f"{place}{said}{known}") from None
     if given is not None:  # help was asked for
         action(given)

@@ -119,12 +119,24 @@ class Configured:
 class Parts(Configured):
     """Parts of a user's own, instead of the environment's."""
 
-    reference: Annotated[str | None, Parameter(group=WORLD, metavar="PART")] = None
-    """CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a function of time or of what birthsim_env has for it."""
+    reference: Annotated[
+        str | None,
+        Parameter(
+            group=WORLD, metavar="PART",
+            help="A CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a birthsim_env.Trajectory or of a function of "
+            "time that returns (x, y).",
+        ),
+    ] = None  # fmt: skip
     stiffness: Annotated[str | None, Parameter(group=WORLD, metavar="FILE")] = None
     """CSV file of time, x, y, stiffness (s, m, m, N/m) of the setpoints; --reference takes the same file."""
-    user_force: Annotated[str | None, Parameter(group=WORLD, metavar="PART")] = None
-    """Hand: steps, sine, noise, guided; a CSV file of time, Fx, Fy (s, N, N); or path/to/file.py:Name, as above."""
+    user_force: Annotated[
+        str | None,
+        Parameter(
+            group=WORLD, metavar="PART",
+            help="The hand: steps, sine, noise, guided, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
+            "birthsim_env.UserForce or of a function of time that returns (Fx, Fy).",
+        ),
+    ] = None  # fmt: skip
 
     def parts(self) -> dict[str, Any]:
         """The environments' arguments, as far as they are given."""
