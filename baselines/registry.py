@@ -124,7 +124,9 @@ def _factory(name: str) -> Factory:
     if name.rpartition(":")[0].endswith(".py"):
         return partial(_own, name, from_file("controller", name))
     names = controller_names()
-    raise ValueError(f"controller = {shown(name)}{near(name, names)}; allowed: {', '.join(names)}, or path/to/file.py:Class")
+    asked = near(name, names)
+    allowed = "a registered name" if asked else ", ".join(names)
+    raise ValueError(f"controller = {shown(name)}{asked}; allowed: {allowed}, or path/to/file.py:Class")
 
 
 def known_options(name: str) -> list[str] | None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
 import re
 import shutil
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
-
-from baselines.commands.shared import run
 
 ABOUT = {
     "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
@@ -22,17 +20,13 @@ ABOUT = {
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "chromium-headless-shell")
 
 
-def main() -> None:
-    """Entry point."""
-    run(
-        argparse.ArgumentParser(
-            prog="birthsim doctor", description="Say what works on this machine, and what to install for the rest."
-        ),
-        _doctor,
-    )
+@dataclass
+class Settings:
+    """Say what works on this machine, and what to install for the rest."""
 
 
-def _doctor(_: argparse.Namespace) -> None:
+def main(_: Settings) -> None:
+    """Print it."""
     from birthsim_env.physics.compiled.compilation import cache_folder
 
     print(f"{'Python':12}{platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} processors")

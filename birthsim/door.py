@@ -81,9 +81,9 @@ def main() -> None:
     if name not in COMMANDS:
         from birthsim_env.physics.rig.values import near, shown
 
-        print(
-            f"birthsim: error: command = {shown(name)}{near(name, COMMANDS)}; allowed: {', '.join(COMMANDS)}", file=sys.stderr
-        )
+        asked = near(name, COMMANDS)
+        allowed = "what birthsim --help lists" if asked else ", ".join(COMMANDS)
+        print(f"birthsim: error: command = {shown(name)}{asked}; allowed: {allowed}", file=sys.stderr)
         raise SystemExit(2)
     sys.argv[1:] = rest
     package, module, _, example = COMMANDS[name]

@@ -34,8 +34,9 @@ def main() -> None:
         print("\n".join([*lines, "", "birthsim export --to FORM --help has a form's options."]))
         raise SystemExit(0)
     else:
-        said = "is missing" if form is None else f"{shown(form)}{near(form, FORMS)}"
-        print(f"birthsim export: error: --to {said}; allowed: {', '.join(FORMS)}", file=sys.stderr)
+        said, asked = ("is missing", "") if form is None else (shown(form), near(form, FORMS))
+        allowed = "what birthsim export --help lists" if asked else ", ".join(FORMS)
+        print(f"birthsim export: error: --to {said}{asked}; allowed: {allowed}", file=sys.stderr)
         raise SystemExit(2)
 
 

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
 from tqdm import tqdm
 
-from baselines.commands.shared import run
 from baselines.registry import LISTED, SLOW, make_controller
 from baselines.staged import NO_ACTION, driving
 from birthsim_env.physics.rig.parameters import Parameters
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim warmup", description="Compile the kernels of every controller that is not slow; they stay in the cache."
-    )
-    run(parser, _warm)
+@dataclass
+class Settings:
+    """Compile the kernels of every controller that is not slow; they stay in the cache."""
 
 
-def _warm(_: argparse.Namespace) -> None:
+def main(_: Settings) -> None:
+    """Step each controller once."""
     rig, began = Parameters(), time.perf_counter()
     names = [name for name in LISTED if name not in SLOW]
     with tqdm(names, desc="compiling", unit=" controllers", leave=False) as bar:

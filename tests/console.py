@@ -67,6 +67,12 @@ def strict(path):
     return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
 
 
+def assert_says(parts, line):
+    """A refusal names the option, the value and what is allowed: ``parts`` of its line."""
+    missing = [part for part in ((parts,) if isinstance(parts, str) else parts) if part not in line]
+    assert missing == [], line
+
+
 def assert_picture(folder, name):
     assert (folder / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
     assert (folder / f"{name}.png").stat().st_size > 20_000

@@ -23,6 +23,7 @@ import numpy as np
 import tomli_w
 from tqdm import tqdm
 
+from baselines.commands.start import perform
 from birthsim_env.physics.rig.parameters import load_parameters
 
 COMMANDS = ("evaluate", "train", "tune", "animate", "live")
@@ -70,12 +71,11 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
             if command == "live":
                 _live(path)
                 return "works", ""
-            module = f"{'agents' if command in ('evaluate', 'train') else 'baselines'}.commands.{command}"
+            package = "agents" if command in ("evaluate", "train") else "baselines"
             place = out.with_suffix(".webp") if command == "animate" else out
             argv = [f"birthsim {command}", *lines[command], "--parameters", str(path), "--out", str(place)]
             with patch.object(sys, "argv", argv):
-                __import__(module)
-                sys.modules[module].main()
+                perform(f"birthsim {command}", package, f"commands.{command}")
         return "works", ""
     except SystemExit as end:
         line = [text for text in re.split(r"[\r\n]+", complained.getvalue()) if "error:" in text or "Error" in text]

@@ -1,21 +1,16 @@
-"""Recurrent students learn from privileged policies to act without what those are told.
-
-birthsim distill --teacher DIR --seeds 5 --out DIR, where DIR/seed_0 ... hold the teachers, one for each
-student. A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are
-not done.
-"""
+"""birthsim distill: recurrent students of privileged policies, where TEACHER/seed_0 ... hold one teacher for each student."""
 
 from __future__ import annotations
 
-import argparse
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from cyclopts import Parameter
 from tqdm import tqdm
 
-from baselines.commands.shared import run, seed_number, whole, whole_up_to
+from baselines.commands.settings import PROCESSES, Configured, RigFile, Seed, whole
 from baselines.work.files import finite, make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
@@ -32,40 +27,51 @@ TAUGHT = ("environment", "sensors", "randomize", "validation_lanes")
 """What a student's training has in common with its teacher's."""
 
 
-def main() -> None:
-    """Entry point."""
-    own = Lessons()
-    parser = argparse.ArgumentParser(prog="birthsim distill", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--teacher", type=Path, required=True, metavar="DIR", help="privileged policies: seed_0 ... in it")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--hidden", type=whole_up_to(512), default=own.hidden, help="cells of memory (default: %(default)s)")
-    parser.add_argument("--rounds", type=whole_up_to(1000), default=own.rounds, help="of 256 episodes (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="first seed, of teacher, weights and worlds (default: 0)")
-    parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
-    parser.add_argument("--jobs", type=whole, default=1, help="seeds taught side by side (default: 1)")
-    parser.add_argument("--out", type=Path, required=True, help="folder; each seed has one in it with its policy and curve")
-    run(parser, _distill)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Recurrent students learn from privileged policies to act without what those are told.
+
+    A folder gets the best student so far after every round. Interrupted, the same command goes on with the seeds that are not
+    done.
+    """
+
+    teacher: Annotated[Path, Parameter(metavar="DIR")]
+    """Privileged policies: seed_0 ... in it."""
+    hidden: Annotated[int, whole(1, 512)] = Lessons.hidden
+    """Cells of memory."""
+    rounds: Annotated[int, whole(1, 1000)] = Lessons.rounds
+    """Rounds of 256 episodes."""
+    seed: Seed = 0
+    """First seed, of teacher, weights and worlds."""
+    seeds: Annotated[int, whole()] = 1
+    """Number of seeds, one after the other from --seed on."""
+    jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
+    """Seeds taught side by side."""
+    parameters: RigFile = None
+    out: Path
+    """Folder; each seed has one in it with its policy and curve."""
 
 
-def _distill(arguments: argparse.Namespace) -> None:
-    rig, work = load_parameters(arguments.parameters), []
-    for k in range(arguments.seeds):
-        lessons = Lessons(arguments.hidden, arguments.rounds, arguments.seed + k)
-        place = arguments.teacher / f"seed_{lessons.seed}"
+def main(settings: Settings) -> None:
+    """Teach every seed and print what it reached."""
+    rig, work = load_parameters(settings.parameters), []
+    for k in range(settings.seeds):
+        lessons = Lessons(settings.hidden, settings.rounds, settings.seed + k)
+        place = settings.teacher / f"seed_{lessons.seed}"
         teacher = load_policy(place)
         if not teacher.training.get("privileged", False):
             raise ValueError(f"--teacher: {str(place)!r} is not privileged; allowed: policies trained with privileged = true")
-        work.append((teacher, lessons, rig, arguments.out / f"seed_{lessons.seed}", k % arguments.jobs))
-    make_folder(arguments.out)
+        work.append((teacher, lessons, rig, settings.out / f"seed_{lessons.seed}", k % settings.jobs))
+    make_folder(settings.out)
     results: dict[int, dict[str, Any]] = {}
-    side_by_side(_one, work, arguments.jobs, results.__setitem__)
+    side_by_side(_one, work, settings.jobs, results.__setitem__)
     for k, (_, lessons, *_) in enumerate(work):
         figures, law = results[k]["policy"], results[k]["law"]
         print(
             f"seed {lessons.seed}: {figures['pooled_mm']:.2f} mm pooled, 95 % {figures['tail_mm']:.2f} mm, {figures['lost']} "
             f"lost; law {law['pooled_mm']:.2f} mm"
         )
-    print(f"written to {arguments.out}/")
+    print(f"written to {settings.out}/")
 
 
 def _one(teacher: Policy, lessons: Lessons, rig: Parameters, folder: Path, position: int) -> dict[str, Any]:

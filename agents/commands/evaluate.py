@@ -2,104 +2,85 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium
+from cyclopts import Parameter
 
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
 from baselines.bench.evaluation_data import data
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import (
+from baselines.commands.settings import (
+    CONTROL,
     EPISODES,
-    JOBS,
     RANDOMIZE,
-    add_processes,
-    check_environment,
-    check_world,
-    policy_of,
-    run,
-    seed_number,
-    shown_arguments,
-    whole_up_to,
+    Controllers,
+    Env,
+    Parts,
+    Processes,
+    Randomize,
+    RigFile,
+    Seed,
+    Sensors,
+    Set,
+    whole,
 )
-from baselines.registry import controller_names
+from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
 from baselines.work.files import make_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks
 from birthsim_env.parts.drawn.randomization import described
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim evaluate",
-        description="Evaluate controllers: the same seeds, so the same worlds, for each of them.",
-        epilog="Without --policy every named controller runs; with it the trained residual runs beside those named, or else "
-        "beside the paper's law and the one that it sits on. What the output folder holds of the same settings, rig and "
-        "code is kept, so that an interrupted run goes on.",
-    )
-    parser.add_argument("--env", default="BirthSIM/Circle-v1", help="environment id (default: %(default)s)")
-    parser.add_argument(
-        "--controller",
-        "--controllers",
-        nargs="+",
-        metavar="NAME",
-        help=f"one or more of {', '.join(controller_names())}, with options as in 'admittance[learn=false]', or "
-        "path/to/file.py:Class (default: backstepping, with --policy "
-        "residual)",
-    )
-    parser.add_argument(
-        "--policy",
-        help="for the controller 'residual': a folder that birthsim train wrote, of one training seed or of several, or the "
-        "name of what comes with the package, such as circle (default: that of the scenario)",
-    )
-    parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=32, help="per controller (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the first episode (default: %(default)s)")
-    parser.add_argument("--sensors", choices=tuple(SENSORS), default="ideal", help="default: %(default)s")
-    parser.add_argument(
-        "--randomize",
-        choices=tuple(RANDOMIZE),
-        default="all",
-        help="what differs between episodes: the plant, the scenario, both (default) or nothing; sensors: the scenario and the "
-        "figures of honest sensors",
-    )
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    add_parts(parser)
-    add_set(parser)
-    add_processes(parser)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        help="folder for evaluation.json, .md and .csv, and figures",
-    )
-    run(parser, _evaluate)
+@dataclass(kw_only=True)
+class Settings(Parts, Processes):
+    """Evaluate controllers: the same seeds, so the same worlds, for each of them.
+
+    Without --controller and --policy it is backstepping. With --policy the trained residual runs beside the controllers named,
+    or else beside the paper's and the one that it corrects. What the output folder holds of the same settings, rig and code is
+    kept, so that an interrupted run goes on.
+    """
+
+    env: Env = "BirthSIM/Circle-v1"
+    controller: Controllers = None
+    policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
+    """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""
+    set: Set = field(default_factory=list)
+    episodes: Annotated[int, whole(1, EPISODES)] = 32
+    """Episodes of each controller."""
+    seed: Seed = 0
+    """Seed of the first episode."""
+    sensors: Sensors = "ideal"
+    randomize: Randomize = "all"
+    """What differs between episodes; sensors: the scenario, and the figures of honest sensors."""
+    parameters: RigFile = None
+    out: Path
+    """Folder for evaluation.json, .md and .csv, and figures."""
 
 
-def _evaluate(arguments: argparse.Namespace) -> None:
-    arguments.controller = arguments.controller or (["backstepping"] if arguments.policy is None else ["residual"])
-    rig = load_parameters(arguments.parameters)
-    if not (arguments.env.startswith("BirthSIM/") and arguments.env in gymnasium.registry):  # one with a law inside may be
-        check_environment(arguments.env)
-    names = list(arguments.controller)
-    if "residual" in names and arguments.policy is None:
-        arguments.policy = policy_of(arguments.env)
-    policies, laws, learned_with = _policies(arguments.policy)
+def main(settings: Settings) -> None:
+    """Run the episodes that the folder lacks; write and print tables."""
+    settings.controller = settings.controller or (["backstepping"] if settings.policy is None else ["residual"])
+    rig = load_parameters(settings.parameters)
+    if not (settings.env.startswith("BirthSIM/") and settings.env in gymnasium.registry):  # one with a law inside may be
+        check_environment(settings.env)
+    names = settings.controller
+    if "residual" in names and settings.policy is None:
+        settings.policy = policy_of(settings.env)
+    policies, laws, learned_with = _policies(settings.policy)
     if policies:
         names = ["backstepping", *laws] if names == ["residual"] else names
         names = list(dict.fromkeys([*names, "residual"]))
-    names = with_options([name for name in names if name != "residual"], arguments.set)
+    names = with_options([name for name in names if name != "residual"], settings.set)
     world = {
-        "sensors": arguments.sensors, "randomize": RANDOMIZE[arguments.randomize], **environment_parts(arguments),
+        "sensors": settings.sensors, "randomize": RANDOMIZE[settings.randomize], **settings.parts(),
     }  # fmt: skip
-    span = arguments.episodes, arguments.seed
-    pieces = {name: evaluation_tasks(name, controller_settings(name, rig), arguments.env, world, *span) for name in names}
-    check_world(arguments.env, parameters=rig, **world)  # which compiles: names are looked at before
+    span = settings.episodes, settings.seed
+    pieces = {name: evaluation_tasks(name, controller_settings(name, rig), settings.env, world, *span) for name in names}
+    check_world(settings.env, parameters=rig, **world)  # which compiles: names are looked at before
     known = len(pieces)
     if policies:
         from agents.policy.files import WEIGHTS
@@ -109,14 +90,13 @@ def _evaluate(arguments: argparse.Namespace) -> None:
         own = {
             "controller": "residual", "source": file_hash(str(place / WEIGHTS)), "rig": rig.to_dict(), "policy": str(place),
         }  # fmt: skip
-        pieces[name] = evaluation_tasks(name, own, arguments.env, world, *span, work=evaluate_learned)
-    folder, drawn = make_folder(arguments.out), described(rig, world["randomize"], world["sensors"])
+        pieces[name] = evaluation_tasks(name, own, settings.env, world, *span, work=evaluate_learned)
+    folder, drawn = make_folder(settings.out), described(rig, world["randomize"], world["sensors"])
     print(drawn)
-    if learned_with - {arguments.sensors}:
-        print(f"the policy was trained with {', '.join(sorted(learned_with))} sensors; here they are {arguments.sensors}")
-    jobs = arguments.jobs or JOBS
+    if learned_with - {settings.sensors}:
+        print(f"the policy was trained with {', '.join(sorted(learned_with))} sensors; here they are {settings.sensors}")
     done, failures = run_tasks(
-        [task for tasks in pieces.values() for task in tasks], folder, jobs, "episodes", arguments.cluster
+        [task for tasks in pieces.values() for task in tasks], folder, settings.jobs, "episodes", settings.cluster
     )
     if failures:
         name, problem = next(iter(failures.items()))
@@ -125,9 +105,9 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     # pyplot takes half a second to load; a user who mistypes an argument should not wait for it.
     from baselines.figures.runs import error_over_time
 
-    caption = f"{arguments.env}, {arguments.episodes} episodes from seed {arguments.seed}, {arguments.sensors} sensors, "
-    caption += f"--randomize {arguments.randomize}"
-    caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in environment_parts(arguments).items())
+    caption = f"{settings.env}, {settings.episodes} episodes from seed {settings.seed}, {settings.sensors} sensors, "
+    caption += f"--randomize {settings.randomize}"
+    caption += "".join(f", {name.replace('_', ' ')}: {part}" for name, part in settings.parts().items())
     classical, learned = evaluations[:known], evaluations[known:]
     seeds, pictures = "", "error_over_time"
     if len(learned) > 1:
@@ -143,9 +123,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     with whole_results(folder) as place:
         write_text(place / "evaluation.csv", data(evaluations))
         write_text(place / "evaluation.md", f"{caption}\n\n{drawn}\n\n{table(evaluations)}\n{seeds}")
-        write_json(
-            place / "evaluation.json", {"arguments": shown_arguments(arguments), "rig": rig.to_dict(), "results": results}
-        )
+        write_json(place / "evaluation.json", {"arguments": settings.shown(), "rig": rig.to_dict(), "results": results})
         # The only file that differs from run to run.
         write_json(place / "times.json", {"us_per_lane_and_call": {one.controller: one.cost for one in evaluations}})
         error_over_time(evaluations, caption, place)

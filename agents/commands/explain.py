@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from baselines.bench.statistics import number
-from baselines.commands.shared import run
+from baselines.commands.settings import Configured
+from baselines.commands.tables import aligned, markdown
 from baselines.work.files import make_folder, write_json, write_text
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim explain",
-        description="Look into a trained residual: its correction against the weight that the law leaves out and against "
-        "friction, the frictionless circle, and the stiffness test per setpoint on rigs drawn at random.",
-    )
-    parser.add_argument(
-        "--policy",
-        default="circle",
-        help="a folder of birthsim train, or a name that comes with the package (default: %(default)s)",
-    )
-    parser.add_argument("--no-pushes", action="store_true", help="leave out the stiffness test, which takes minutes")
-    parser.add_argument(
-        "--out", type=Path, required=True, help="folder for correction.png and .svg, residual.md, residual.json"
-    )
-    run(parser, _explain)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Look into a trained residual: its correction against the weight that the controller leaves out and against friction, the
+    frictionless circle, and the stiffness test per setpoint on rigs drawn at random.
+    """
+
+    policy: Annotated[str, Parameter(metavar="DIR")] = "circle"
+    """A folder that birthsim train wrote, or the name of what is shipped."""
+    no_pushes: bool = False
+    """Leave out the stiffness test, which takes minutes."""
+    out: Path
+    """Folder for correction.png and .svg, residual.md, residual.json."""
 
 
-def _explain(arguments: argparse.Namespace) -> None:
+def main(settings: Settings) -> None:
+    """Compute, draw and write it."""
     try:
         from agents.policy.controller import ResidualController
         from agents.policy.files import load_policy
@@ -45,47 +43,51 @@ def _explain(arguments: argparse.Namespace) -> None:
     from baselines.registry import make_controller
     from birthsim_env.physics.rig.parameters import Parameters
 
-    places = policy_folders(arguments.policy)
+    places = policy_folders(settings.policy)
     policies = [load_policy(place) for place in places]
     if any(policy.settings.law == NO_LAW for policy in policies):
-        raise ValueError(f"--policy {arguments.policy!r} drives the valves by itself; allowed: one that corrects a law")
+        raise ValueError(f"--policy {settings.policy!r} drives the valves by itself; allowed: one that corrects a law")
     names = [place.name for place in places]
     weights = [inspection.weight_over_workspace(policy) for policy in policies]
     correlations = [float(np.corrcoef(*weight)[0, 1]) for weight in weights]
     slopes = [float(np.polyfit(weight[1], weight[0], 1)[0]) for weight in weights]
     circles = [inspection.frictionless_circle(policy) for policy in policies]
-    folder = make_folder(arguments.out)
+    folder = make_folder(settings.out)
     draw_corrections(weights[0], correlations[0], inspection.friction_along_circle(policies[0]), folder)
     law = policies[0].settings.law
     laws = dict.fromkeys(("backstepping", law))  # the paper's, and the one underneath
     controllers: list[tuple[str, Any]] = [(name, make_controller(name, Parameters())) for name in laws]
     controllers += [(name, ResidualController(policy=place)) for name, place in zip(names, places, strict=True)]
-    rows = [] if arguments.no_pushes else inspection.rendered(controllers)
+    rows = [] if settings.no_pushes else inspection.rendered(controllers)
     lines = [
         "Without friction, held still at 128 places with masses of 2 to 5 kg: correction on cylinder 2 over m g cos(theta1).",
         "Circle of 100 mm without friction: settled RMS error on x.",
-        "",
-        f"| policy | correlation | slope | circle: {law} (mm) | with the policy (mm) |",
-        "|---|---|---|---|---|",
+        f"Without a policy the circle's error is that of {law}.",
     ]
-    for name, correlation, slope, (alone, helped) in zip(names, correlations, slopes, circles, strict=True):
-        lines.append(f"| {name} | {correlation:.3f} | {slope:.2f} | {alone:.2f} | {helped:.3f} |")
-    if rows:
-        lines += [
-            "",
-            f"Stiffness test on rigs drawn at random, {rows[0]['cases']} pushes per setpoint: median (95 %).",
-            "",
-            "| setpoint (N/m) | controller | error of the stiffness (%) | hunting x (mm) | hunting y (mm) | lost |",
-            "|---|---|---|---|---|---|",
-        ]
-    for row in rows:
-        figures = " | ".join(
-            f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})"
-            for label in ("error_percent", "hunting_x_mm", "hunting_y_mm")
-        )
-        lines.append(f"| {row['setpoint']:g} | {row['controller']} | {figures} | {row['lost']} |")
-    text = "\n".join(lines)
-    write_text(folder / "residual.md", text + "\n")
+    learned: list[tuple[str, ...]] = [
+        (name, f"{correlation:.3f}", f"{slope:.2f}", f"{alone:.2f}", f"{helped:.3f}")
+        for name, correlation, slope, (alone, helped) in zip(names, correlations, slopes, circles, strict=True)
+    ]
+    tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]] = [
+        ("\n".join(lines), ("policy", "correlation", "slope", "circle, mm", "with the policy, mm"), learned)
+    ]
+    head = ("controller", "error, %", "hunts on x, mm", "on y, mm", "lost")
+    labels = ("error_percent", "hunting_x_mm", "hunting_y_mm")
+    for setpoint in dict.fromkeys(row["setpoint"] for row in rows):
+        there = [row for row in rows if row["setpoint"] == setpoint]
+        felt = [
+            (
+                row["controller"], *(f"{number(row[f'{label}_median'])} ({number(row[f'{label}_q95'])})" for label in labels),
+                str(row["lost"]),
+            )
+            for row in there
+        ]  # fmt: skip
+        title = f"Stiffness test at {setpoint:g} N/m on rigs drawn at random, {there[0]['cases']} pushes: median (95 %)."
+        tables.append((title, head, felt))
+    marked = [f"{title}\n\n{markdown(top, cells)}\n" for title, top, cells in tables]
+    write_text(folder / "residual.md", "\n".join(marked))
     content = {"policies": names, "correlations": correlations, "slopes": slopes, "circles_mm": circles, "rendered": rows}
     write_json(folder / "residual.json", content)
-    print(f"{text}\n\nwritten to {folder}/: correction.png and .svg, residual.md, residual.json")
+    for title, top, cells in tables:
+        print(f"{title}\n\n{aligned(top, cells)}\n")
+    print(f"written to {folder}/: correction.png and .svg, residual.md, residual.json")

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Literal
 
-from baselines.commands.shared import run
+from cyclopts import Parameter
 
-FORMATS = ("onnx",)
-
-
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim export",
-        description="Write a trained policy with its normalisation as one file, checked against PyTorch and NumPy.",
-        epilog="The file says what its inputs and outputs are; examples/onnx_policy.py runs one with the law at 1 kHz.",
-    )
-    parser.add_argument(
-        "policy",
-        metavar="POLICY",
-        help="folder that birthsim train wrote, or the name of what comes with the package, such as "
-        "circle; of several seeds the best in validation is taken",
-    )
-    parser.add_argument("--to", choices=FORMATS, required=True, help="the form of the file")
-    parser.add_argument("--out", type=Path, help="file (default: policy.onnx in the policy's folder)")
-    run(parser, _export)
+from baselines.commands.settings import Configured
 
 
-def _export(arguments: argparse.Namespace) -> None:
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Write a trained policy with its normalisation as one file, checked against PyTorch and NumPy.
+
+    The file says what its inputs and outputs are; examples/onnx_policy.py runs one with the controller at 1 kHz.
+    """
+
+    policy: Annotated[str, Parameter(metavar="DIR")] = field(kw_only=False)
+    """Folder that birthsim train wrote, or the name of what is shipped, such as circle; of several seeds the best."""
+    to: Literal["onnx"]
+    """Form of the file."""
+    out: Path | None = None
+    """File, else policy.onnx in the policy's folder."""
+
+
+def main(settings: Settings) -> None:
+    """Write the file and say what was compared."""
     try:
         # PyTorch takes seconds to load; it and the rest come with extras only.
         from agents.policy.files import load_policy
@@ -36,9 +35,9 @@ def _export(arguments: argparse.Namespace) -> None:
         from agents.policy.seeds import best_policy
     except ImportError as error:
         raise ValueError(f"{error}; exporting needs the extras agents and onnx: pip install 'birthsim[agents,onnx]'") from error
-    folder = best_policy(arguments.policy)
+    folder = best_policy(settings.policy)
     policy = load_policy(folder)
-    path = arguments.out or folder / f"policy.{arguments.to}"
+    path = settings.out or folder / f"policy.{settings.to}"
     exported = export_onnx(policy, path)
     print(f"{path}: {exported.size} bytes, {policy.network.inputs} observation entries to {policy.network.outputs} actions")
     print(

@@ -2,92 +2,94 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import gymnasium
+from cyclopts import Parameter
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
 from agents.training.time_split import told
-from baselines.commands.shared import RANDOMIZE, check_world, run, seed_number, whole
+from baselines.commands.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
+from baselines.commands.worlds import check_environment, check_world
 from baselines.work.files import make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.parts.drawn.randomization import described
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim train",
-        description="Train residual policies on top of a control law, by PPO, SAC or TQC.",
-        epilog="Options override what the configuration says, and have its values by default. The best policy on validation "
-        "worlds is kept whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command "
-        "goes on, and ends with the same policy.",
-    )
-    listed = ", ".join(configuration_names())
-    parser.add_argument("--config", default="circle", help=f"{listed}, or a TOML file (default: %(default)s)")
-    parser.add_argument("--env", help="residual environment")
-    parser.add_argument("--algorithm", choices=ALGORITHMS, help="how it learns")
-    laws = f"law underneath, one of {', '.join(LAWS)}; {LAWS[-1]}: the policy drives the valves by itself"
-    parser.add_argument("--law", metavar="NAME", help=laws)
-    parser.add_argument("--impedance", choices=tuple(IMPEDANCES), help="what an action sets beside forces")
-    parser.add_argument("--steps", type=whole, help="policy steps per seed")
-    parser.add_argument(
-        "--until", type=float, metavar="PERCENT", help="end once the error in validation is so far below the paper's law"
-    )
-    parser.add_argument("--seed", type=seed_number, help="first seed (default: the configuration's, 0)")
-    parser.add_argument("--seeds", type=whole, default=1, help="how many, one after the other from --seed on (default: 1)")
-    parser.add_argument("--jobs", type=whole, default=1, help="seeds trained side by side (default: 1)")
-    parser.add_argument("--sensors", choices=tuple(SENSORS), help="sensor model")
-    parser.add_argument("--randomize", choices=tuple(RANDOMIZE), help="what training varies")
-    parser.add_argument("--authority", type=float, help="bound of the residual force, N")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument(
-        "--out", type=Path, required=True, help="folder; each seed has one in it with its policy, checkpoint, curve and events"
-    )
-    run(parser, _train)
+@dataclass(kw_only=True)
+class Settings:
+    """Train residual policies on top of a controller, by PPO, SAC or TQC.
+
+    Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
+    whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
+    the same policy.
+    """
+
+    config: Annotated[str, Parameter(metavar="NAME", help=f"{', '.join(configuration_names())}, or a TOML file.")] = "circle"
+    algorithm: Annotated[str | None, Parameter(choices=ALGORITHMS)] = None
+    """How it learns."""
+    law: Annotated[str | None, Parameter(choices=LAWS)] = None
+    """Controller underneath; none: the policy drives the valves by itself."""
+    impedance: Annotated[str | None, Parameter(choices=tuple(IMPEDANCES))] = None
+    """What an action sets beside forces."""
+    authority: Annotated[float | None, Parameter(metavar="N")] = None
+    """Bound of the residual force."""
+    steps: Annotated[int | None, whole()] = None
+    """Policy steps of each seed."""
+    until: Annotated[float | None, Parameter(metavar="PERCENT")] = None
+    """End once the error in validation is so far below that of the paper's controller."""
+    seed: Seed | None = None
+    """First seed, else the configuration's, 0."""
+    seeds: Annotated[int, whole()] = 1
+    """Number of seeds, one after the other from --seed on."""
+    jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
+    """Seeds trained side by side."""
+    out: Path
+    """Folder; each seed has one in it with its policy, checkpoint, curve and events."""
+    env: Env | None = None
+    sensors: Sensors | None = None
+    randomize: Randomize | None = None
+    """What training varies."""
+    parameters: RigFile = None
 
 
-def _train(arguments: argparse.Namespace) -> None:
-    training, residual = _settings(arguments)
-    known = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" in name)
-    if training.environment not in known:
-        raise ValueError(f"--env {training.environment!r}; allowed: {', '.join(known)}")
-    rig = load_parameters(arguments.parameters)
+def main(settings: Settings) -> None:
+    """Train every seed and report."""
+    training, residual = _settings(settings)
+    check_environment(training.environment, residual=True)
+    rig = load_parameters(settings.parameters)
     check_world(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors)
-    first = training.seed if arguments.seed is None else arguments.seed
-    seeds = range(first, first + arguments.seeds)
-    make_folder(arguments.out)
+    first = training.seed if settings.seed is None else settings.seed
+    seeds = range(first, first + settings.seeds)
+    make_folder(settings.out)
     work = [
-        (replace(training, seed=seed), residual, arguments.out / f"seed_{seed}", rig, k % arguments.jobs)
+        (replace(training, seed=seed), residual, settings.out / f"seed_{seed}", rig, k % settings.jobs)
         for k, seed in enumerate(seeds)
     ]
     print(described(rig, training.randomize, training.sensors))
     results: dict[int, dict[str, Any]] = {}
     try:
-        side_by_side(_one, work, arguments.jobs, results.__setitem__)
+        side_by_side(_one, work, settings.jobs, results.__setitem__)
     except BaseException:
-        if arguments.jobs > 1:
+        if settings.jobs > 1:
             print(file=sys.stderr)  # the bar of a process that has been ended has no end of line
         raise
     _report(training, residual, list(seeds), [results[k] for k in range(len(work))])
-    print(f"written to {arguments.out}/")
+    print(f"written to {settings.out}/")
 
 
-def _settings(arguments: argparse.Namespace) -> tuple[TrainingSettings, ResidualSettings]:
+def _settings(settings: Settings) -> tuple[TrainingSettings, ResidualSettings]:
     """The configuration, with what the options say instead."""
-    training, residual = load_configuration(arguments.config)
+    training, residual = load_configuration(settings.config)
     said = {
-        "environment": arguments.env, "algorithm": arguments.algorithm, "steps": arguments.steps, "sensors": arguments.sensors,
-        "until": arguments.until, "randomize": None if arguments.randomize is None else RANDOMIZE[arguments.randomize],
+        "environment": settings.env, "algorithm": settings.algorithm, "steps": settings.steps, "sensors": settings.sensors,
+        "until": settings.until, "randomize": None if settings.randomize is None else RANDOMIZE[settings.randomize],
     }  # fmt: skip
-    allowed = {"law": arguments.law, "impedance": arguments.impedance, "authority": arguments.authority}
+    allowed = {"law": settings.law, "impedance": settings.impedance, "authority": settings.authority}
     return (
         override(training, **{name: value for name, value in said.items() if value is not None}),
         override(residual, **{name: value for name, value in allowed.items() if value is not None}),

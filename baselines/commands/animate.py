@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import gymnasium
 import numpy as np
+from cyclopts import Parameter
 from PIL import Image
 from tqdm import tqdm
 
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import RANDOMIZE, check_environment, finite_number, policy_of, run, seed_number
-from baselines.registry import controller_names, make_controller
+from baselines.commands.settings import CONTROLLER, RANDOMIZE, Env, Parts, Randomize, RigFile, Seed, Sensors, Set, number
+from baselines.commands.worlds import check_environment, policy_of, with_options
+from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file
 from birthsim_env.drawing.rendering import PairRenderer, Scene
 from birthsim_env.parts.drawn.randomization import described
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-
-RATES = (10, 20, 25, 50)
-"""Frames per second whose period is a whole number of the 10 ms that a GIF counts in."""
 
 SAMPLE = 0.005
 """s between the points of the error's curve."""
@@ -45,36 +41,33 @@ class Take:
     errors: list[float] = field(default_factory=list)
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim animate",
-        description="Two controllers beside each other on the same rig under the same hand, in real time: linkage, magnifier "
-        "(the same for both) and error from the compliant target.",
+@dataclass(kw_only=True)
+class Settings(Parts):
+    """Two controllers beside each other on the same rig under the same hand, in real time: linkage, magnifier (the same for
+    both) and error from the compliant target.
+    """
+
+    env: Env = "BirthSIM/Forceps-v1"
+    controller: Annotated[tuple[str, str], CONTROLLER, Parameter(alias="--controllers", metavar="NAME NAME")] = (
+        "backstepping",
+        "admittance-backstepping",
     )
-    parser.add_argument("--env", default="BirthSIM/Forceps-v1", help="environment id (default: %(default)s)")
-    parser.add_argument(
-        "--controller",
-        "--controllers",
-        nargs=2,
-        default=("backstepping", "admittance-backstepping"),
-        metavar="NAME",
-        help=f"two of {', '.join(controller_names())}, or path/to/file.py:Class; residual is the policy that "
-        "comes with the package for the environment (default: the paper's law and the best one)",
-    )
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the world (default: %(default)s)")
-    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
-    parser.add_argument(
-        "--randomize", default="all", choices=tuple(RANDOMIZE), help="what the seed draws (default: %(default)s)"
-    )
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    add_parts(parser)
-    add_set(parser)
-    parser.add_argument("--begin", type=finite_number, default=0.5, help="s into the episode (default: %(default)s)")
-    parser.add_argument("--end", type=finite_number, default=6.5, help="s into the episode (default: %(default)s)")
-    parser.add_argument("--rate", type=int, default=25, choices=RATES, help="frames per second (default: %(default)s)")
-    parser.add_argument("--out", type=Path, required=True, help="file to write, .webp or .gif")
-    run(parser, _animate)
+    """Two names or path/to/file.py:Class; residual is the policy that is shipped for the environment."""
+    set: Set = field(default_factory=list)
+    seed: Seed = 0
+    """Of the world."""
+    sensors: Sensors = "ideal"
+    randomize: Randomize = "all"
+    """What the seed draws."""
+    parameters: RigFile = None
+    begin: Annotated[float, number("S")] = 0.5
+    """Time in the episode at which it begins."""
+    end: Annotated[float, number("S")] = 6.5
+    """Time in the episode at which it ends."""
+    rate: Annotated[Literal[10, 20, 25, 50], Parameter(metavar="HZ")] = 25
+    """Frames per second: the period is a whole number of the 10 ms that a GIF counts in."""
+    out: Path
+    """File to write, .webp or .gif."""
 
 
 def take(env: Any, seed: int, span: Span, rate: int, progress: Callable[[int], Any]) -> Take:
@@ -136,32 +129,33 @@ def save(frames: list[Image.Image], rate: int, path: Path) -> None:
             still[0].save(file, **{**options, "append_images": still[1:]})
 
 
-def _animate(arguments: argparse.Namespace) -> None:
-    path, span = arguments.out, (arguments.begin, arguments.end)
+def main(settings: Settings) -> None:
+    """Run both, draw them, write the animation."""
+    path, span = settings.out, (settings.begin, settings.end)
     if path.suffix not in (".webp", ".gif"):
         raise ValueError(f"--out {str(path)!r}; allowed: a file that ends in .webp or .gif")
-    rig = load_parameters(arguments.parameters)
-    check_environment(arguments.env)
+    rig = load_parameters(settings.parameters)
+    check_environment(settings.env)
     make = partial(
-        gymnasium.make, arguments.env, parameters=rig, sensors=arguments.sensors, randomize=RANDOMIZE[arguments.randomize],
-        policy_period=rig.electronics.control_period, **environment_parts(arguments),
+        gymnasium.make, settings.env, parameters=rig, sensors=settings.sensors, randomize=RANDOMIZE[settings.randomize],
+        policy_period=rig.electronics.control_period, **settings.parts(),
     )  # fmt: skip
     longest = make().get_wrapper_attr("duration")
     if not 0 <= span[0] < span[1] <= longest or span[1] - span[0] < 1:
         raise ValueError(f"--begin {span[0]:g} --end {span[1]:g}; allowed: from 0 to {longest:g} s, a second apart or more")
-    names = with_options(arguments.controller, arguments.set)
-    options = [{"policy": policy_of(arguments.env)} if name == "residual" else {} for name in names]
+    names = with_options(settings.controller, settings.set)
+    options = [{"policy": policy_of(settings.env)} if name == "residual" else {} for name in names]
     laws = [driving(make_controller(name, rig, **own), name) for name, own in zip(names, options, strict=True)]
-    print(described(rig, RANDOMIZE[arguments.randomize], arguments.sensors))
+    print(described(rig, RANDOMIZE[settings.randomize], settings.sensors))
     steps = round(span[1] / rig.electronics.control_period)
     with tqdm(total=2 * steps, desc="running", unit=" periods", leave=False) as bar:
-        takes = [take(make(actuation=law), arguments.seed, span, arguments.rate, bar.update) for law in laws]
+        takes = [take(make(actuation=law), settings.seed, span, settings.rate, bar.update) for law in laws]
     title = f"{takes[0].scenes[0].title}, in real time"
     with tqdm(total=len(takes[0].scenes), desc="drawing", unit=" frames", leave=False) as bar:
-        frames = draw(takes, rig, title, names, span, arguments.rate, bar.update)
+        frames = draw(takes, rig, title, names, span, settings.rate, bar.update)
     make_folder(path.parent)
-    save(frames, arguments.rate, path)
-    print(f"{arguments.env}, seed {arguments.seed}, {arguments.sensors} sensors, randomised: {arguments.randomize}")
+    save(frames, settings.rate, path)
+    print(f"{settings.env}, seed {settings.seed}, {settings.sensors} sensors, randomised: {settings.randomize}")
     for name, one in zip(names, takes, strict=True):
         rms, largest = 1e3 * np.sqrt(np.mean(np.square(one.errors))), 1e3 * np.max(one.errors)
         print(f"{name:28} error while it is shown: {rms:.2f} mm RMS, {largest:.2f} mm at most")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,12 @@ from PIL import Image
 from tqdm import tqdm
 
 import birthsim_env
-from baselines.commands.parts import add_set, with_options
-from baselines.commands.shared import run
-from baselines.registry import controller_names, make_controller
+from baselines.commands.settings import Configured, Controller, RigFile, Sensors, Set
+from baselines.commands.tables import aligned
+from baselines.commands.worlds import with_options
+from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
 from baselines.work.files import make_folder, whole_file, whole_results, write_json
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.success import SETTLED
@@ -32,20 +32,16 @@ FIELDS = (
 )
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim figure4", description="Reproduce Fig. 4 of Herzig et al. (IROS 2015).")
-    parser.add_argument(
-        "--controller",
-        default="backstepping",
-        metavar="NAME",
-        help=f"one of {', '.join(controller_names())}, or path/to/file.py:Class (default: the paper's)",
-    )
-    add_set(parser)
-    parser.add_argument("--sensors", default="ideal", choices=tuple(SENSORS), help="default: %(default)s")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for figure4.png and .svg, figure4.json, rig.png")
-    run(parser, _figure4)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Reproduce Fig. 4 of Herzig et al. (IROS 2015)."""
+
+    controller: Controller = "backstepping"
+    set: Set = field(default_factory=list)
+    sensors: Sensors = "ideal"
+    parameters: RigFile = None
+    out: Path
+    """Folder for figure4.png and .svg, figure4.json, rig.png."""
 
 
 def record_run(
@@ -100,15 +96,16 @@ def figures_of(record: dict[str, Array], rig: birthsim_env.Parameters) -> dict[s
     return result
 
 
-def _figure4(arguments: argparse.Namespace) -> None:
-    rig = load_parameters(arguments.parameters)
-    controller = with_options([arguments.controller], arguments.set)[0]
+def main(settings: Settings) -> None:
+    """Run the experiment, print its figures, draw it."""
+    rig = load_parameters(settings.parameters)
+    controller = with_options([settings.controller], settings.set)[0]
     make_controller(controller, rig)
-    folder = make_folder(arguments.out)
+    folder = make_folder(settings.out)
     from baselines.figures.runs import figure4
 
     with whole_results(folder) as place:
-        record = record_run(controller, arguments.sensors, rig, place / "rig.png")
+        record = record_run(controller, settings.sensors, rig, place / "rig.png")
         result = figures_of(record, rig)
         figure4(record, place)
         write_json(place / "figure4.json", result)
@@ -118,9 +115,7 @@ def _figure4(arguments: argparse.Namespace) -> None:
             f"into its stop, or a chamber left its range; {folder}/ has what came before. Allowed: a controller "
             "and a rig that keep it"
         )
-    print(f"Fig. 4 with {controller}, {arguments.sensors} sensors, {result['duration_s']:g} s\n")
-    print(f"{'':44}{'x or 1':>10}{'y or 2':>10}")
-    for name, values in result.items():
-        if isinstance(values, list):
-            print(f"{name:44}{values[0]:10.3f}{values[1]:10.3f}")
+    print(f"Fig. 4 with {controller}, {settings.sensors} sensors, {result['duration_s']:g} s\n")
+    rows = [(name, *(f"{value:.3f}" for value in values)) for name, values in result.items() if isinstance(values, list)]
+    print(aligned(("", "x or 1", "y or 2"), rows))
     print(f"\nwritten to {folder}/: figure4.png, figure4.svg, figure4.json, rig.png")

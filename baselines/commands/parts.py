@@ -1,41 +1,10 @@
-"""Options of the commands for parts of a user's own: reference, hand, and the gains of controllers."""
+"""The option ``--set`` of the studies, which argparse still reads."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from typing import Any
 
-from baselines.registry import known_options, split_options
-from birthsim_env.parts.hands.moving_hands import HANDS
-
-
-def add_parts(parser: argparse.ArgumentParser) -> None:
-    """Add ``--reference``, ``--stiffness`` and ``--user-force``."""
-    parser.add_argument(
-        "--reference",
-        metavar="PART",
-        help="your own instead of the environment's: a CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a "
-        "birthsim_env.Trajectory or of a function of time that returns (x, y)",
-    )
-    parser.add_argument(
-        "--stiffness",
-        metavar="FILE",
-        help="setpoints of your own instead of the environment's: a CSV file of time, x, y, stiffness (s, m, m, N/m); "
-        "--reference takes the same file",
-    )
-    parser.add_argument(
-        "--user-force",
-        metavar="PART",
-        help=f"your own hand instead of the environment's: {', '.join(HANDS)}, a CSV file of time, Fx, Fy (s, N, N), or "
-        "path/to/file.py:Name of a birthsim_env.UserForce or of a function of time that returns (Fx, Fy)",
-    )
-
-
-def environment_parts(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The environments' arguments that ``add_parts`` reads, as far as they are given."""
-    parts = {"reference": arguments.reference, "stiffness": arguments.stiffness, "user_force": arguments.user_force}
-    return {name: part for name, part in parts.items() if part is not None}
+from baselines.commands.worlds import with_options as with_options
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
@@ -49,24 +18,3 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         help="gains and other options of the controllers named, of those that have them, such as --set bandwidth=60; one of "
         "several controllers takes them by name: 'pid[bandwidth=60]'",
     )
-
-
-def with_options(names: Sequence[str], entries: Sequence[str]) -> list[str]:
-    """Controllers' names with what ``--set`` gives to those that have it; ``ValueError`` for what none of them has."""
-    if not entries:
-        return list(names)
-    known = {name: known_options(name) for name in names}
-    for entry in entries:
-        option, equals, value = entry.partition("=")
-        if not (equals and value and option.isidentifier()):
-            raise ValueError(f"--set {entry!r}; allowed: GAIN=VALUE")
-        if not any(have is None or option in have for have in known.values()):
-            listed = "; ".join(f"{name}: {', '.join(have or ()) or 'nothing'}" for name, have in known.items())
-            raise ValueError(f"--set {entry!r}; allowed for {listed}")
-    found = []
-    for name, have in known.items():
-        own = [entry for entry in entries if have is None or entry.partition("=")[0] in have]
-        plain, given = split_options(name)
-        listed = ",".join([*(f"{key}={value}" for key, value in given.items()), *own])
-        found.append(f"{plain}[{listed}]" if listed else plain)
-    return found

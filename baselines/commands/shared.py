@@ -1,67 +1,25 @@
-"""What the console commands share."""
+"""Options of the commands that argparse still reads: studies and the page. It has under one name what they import."""
 
 from __future__ import annotations
 
 import argparse
 import math
-import os
-import signal
-import sys
 import tomllib
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any
 
-import gymnasium
-
-from baselines.commands.start import endings
+from baselines.commands.command import act
+from baselines.commands.settings import EPISODES as EPISODES
+from baselines.commands.settings import JOBS as JOBS
+from baselines.commands.settings import JOBS_AT_MOST, MOST
+from baselines.commands.worlds import policy_of as policy_of
 from birthsim_env.physics.rig.values import near, shown
-
-RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
-"""The option --randomize -> the environments' argument ``randomize``."""
-
-
-class Ended(KeyboardInterrupt):
-    """A signal asks this process to end; ``number`` is the signal's."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.number = number
 
 
 def run(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace], None]) -> None:
-    """Parse, act, and turn what a user can mend into one line and exit status 2; a signal of ``endings`` into 128 + its number.
-
-    SIGTERM and SIGHUP end a command as Ctrl-C does: what is complete is kept, and no process or half a file stays behind.
-    """
+    """Parse, and act as ``command.act`` does."""
     arguments = _parsed(parser)
-    came: list[int] = []
-    words, said = endings(), False
-
-    def end(number: int, _: object) -> None:
-        came.append(number)
-        if len(came) > 1:
-            if not said:
-                os.write(2, f"{parser.prog}: {words[number]}\n".encode())
-            os._exit(128 + number)
-        raise Ended(number)
-
-    before = {number: signal.signal(number, end) for number in words}
-    try:
-        action(arguments)
-    except KeyboardInterrupt as error:
-        number, said = error.number if isinstance(error, Ended) else int(signal.SIGINT), True
-        _say(parser, words[number], 128 + number)
-    except Exception as error:
-        if came:
-            # Compiled code, in which the signal came, has made another error of it, and may not be fit to be left in order.
-            os.write(2, f"{parser.prog}: {words[came[0]]}\n".encode())
-            os._exit(128 + came[0])
-        _say(parser, _problem(error), 2)
-    finally:
-        # After a signal the process ends, and another one ends it at once.
-        if not came:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    act(parser.prog, lambda: action(arguments))
 
 
 def _parsed(parser: argparse.ArgumentParser) -> argparse.Namespace:
@@ -106,27 +64,6 @@ def _configure(parser: argparse.ArgumentParser, path: str, options: dict[str, ar
         action.required = False
 
 
-def _problem(error: Exception) -> str:
-    """What a user can mend; anything else is raised again."""
-    if isinstance(error, ValueError):
-        return f"error: {error}"
-    if isinstance(error, OSError):
-        place = "" if error.filename is None else f"{str(error.filename)!r}: "
-        return f"error: {place}{error.strerror or error}"
-    if isinstance(error, MemoryError):
-        return "error: out of memory; allowed: fewer lanes, episodes or jobs"
-    raise error
-
-
-def _say(parser: argparse.ArgumentParser, words: str, status: int) -> NoReturn:
-    print(f"{parser.prog}: {words}", file=sys.stderr)
-    raise SystemExit(status) from None
-
-
-MOST = 10**9
-"""Largest whole number that an option takes, where it has no lower limit of its own."""
-
-
 def whole_up_to(most: int) -> Callable[[str], int]:
     """A whole number from 1 to ``most``, for argparse."""
 
@@ -138,9 +75,6 @@ def whole_up_to(most: int) -> Callable[[str], int]:
 
     return whole_number
 
-
-EPISODES, JOBS_AT_MOST = 1_000_000, 256
-"""Most episodes of an evaluation, some 2 kB each, and most processes side by side."""
 
 whole = whole_up_to(MOST)
 """A whole number from 1 to ``MOST``, for argparse."""
@@ -172,10 +106,6 @@ def seed_number(text: str) -> int:
     return int(text)
 
 
-JOBS = 2
-"""Processes side by side, unless --jobs says otherwise."""
-
-
 def add_processes(parser: argparse.ArgumentParser) -> None:
     """Add ``--jobs`` and ``--cluster``."""
     parser.add_argument("--jobs", type=whole_up_to(JOBS_AT_MOST), help=f"processes side by side (default: {JOBS})")
@@ -194,25 +124,3 @@ def shown_arguments(arguments: argparse.Namespace) -> dict[str, Any]:
         key: value if value is None or isinstance(value, (bool, int, list)) else str(value)
         for key, value in vars(arguments).items() if key not in without
     }  # fmt: skip
-
-
-def check_environment(name: str) -> None:
-    """Raises ``ValueError`` for an id that is none of the experiments."""
-    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and "Residual" not in one)
-    if name not in known:
-        raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
-
-
-def check_world(environment: str, **arguments: Any) -> None:
-    """Raises ``ValueError`` for arguments with which no episode of an environment begins, before anything else is done."""
-    env: Any = gymnasium.make(environment, **arguments)
-    try:
-        env.reset(seed=0)
-    finally:
-        env.close()
-
-
-def policy_of(environment: str) -> str:
-    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v1`` ->
-    ``forceps``."""
-    return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()

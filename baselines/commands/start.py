@@ -36,18 +36,24 @@ def answer_signals(name: str) -> None:
 def perform(name: str, package: str, module: str, example: str = "") -> None:
     """Run a command that is called by ``name``; its help ends with the example."""
     sys.argv[0] = name
+    loaded = load(name, package, module)
     try:
-        _load(name, package, module).main()
+        if not hasattr(loaded, "Settings"):  # argparse reads its options
+            loaded.main()
+            return
+        from baselines.commands.command import perform_with
+
+        perform_with(name, loaded.Settings, loaded.main, example)
     except SystemExit as end:
         try:
-            if example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
+            if not hasattr(loaded, "Settings") and example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
                 print(f"\nexample: {example}", flush=True)
         except BrokenPipeError:  # who reads has seen enough, as head has; what is left goes nowhere
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise
 
 
-def _load(name: str, package: str, module: str) -> ModuleType:
+def load(name: str, package: str, module: str) -> ModuleType:
     """A command's module; what cannot be imported ends the process in one line, which ``name`` begins."""
     try:
         if package != "agents":

@@ -14,27 +14,28 @@ gains of a file. The next trials are drawn at random; Optuna's TPE sampler propo
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
 from baselines.bench.statistics import penalize_lost
-from baselines.commands.parts import add_parts, add_set, environment_parts, with_options
-from baselines.commands.shared import check_world, run, seed_number, whole_up_to
+from baselines.commands.settings import CONTROLLER, WORLD, Kind, Parts, RigFile, Seed, Set, whole
+from baselines.commands.tables import aligned
+from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
 from baselines.work.files import own_folder, whole_results, write_json
 from baselines.work.journal import open_journal
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.reading import read_json
@@ -205,49 +206,49 @@ def search(
         yield
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim tune",
-        description="Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on.",
-    )
-    parser.add_argument("--controller", required=True, metavar="NAME", help="a name, or path/to/file.py:Class, with TUNABLE")
-    parser.add_argument(
-        "--trials", type=whole_up_to(TRIALS), default=60, help="sets of gains to try, at most 100000 (default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the search (default: %(default)s)")
-    parser.add_argument("--sensors", default="both", choices=(*SENSORS, "both"), help="default: both, ideal and lab")
-    parser.add_argument("--start", type=Path, help="a gains.json, for trial 0 (default: the middle of every range)")
-    parser.add_argument(
-        "--lanes", type=whole_up_to(LANES), default=32, help=f"rigs of each scenario, at most {LANES} (default: %(default)s)"
-    )
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    add_parts(parser)
-    add_set(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for trials.journal, trials.json and gains.json")
-    run(parser, _tune)
+@dataclass(kw_only=True)
+class Settings(Parts):
+    """Tune a controller's gains on rigs drawn at random; interrupted (Ctrl-C), the same command carries on."""
+
+    controller: Annotated[str, CONTROLLER]
+    """A name, or path/to/file.py:Class, with TUNABLE."""
+    set: Set = field(default_factory=list)
+    trials: Annotated[int, whole(1, TRIALS)] = 60
+    """Sets of gains to try."""
+    seed: Seed = 0
+    """Of the search."""
+    sensors: Annotated[Kind | Literal["both"], Parameter(group=WORLD, metavar="CHOICE")] = "both"
+    """Sensor model; both: ideal and lab."""
+    start: Path | None = None
+    """A gains.json, for trial 0, else the middle of every range."""
+    lanes: Annotated[int, whole(1, LANES)] = 32
+    """Rigs of each scenario."""
+    parameters: RigFile = None
+    out: Path
+    """Folder for trials.journal, trials.json and gains.json."""
 
 
-def _tune(arguments: argparse.Namespace) -> None:
-    rig = load_parameters(arguments.parameters)
-    sensors = TUNED_FOR if arguments.sensors == "both" else (arguments.sensors,)
-    controller, own = with_options([arguments.controller], arguments.set)[0], environment_parts(arguments)
+def main(settings: Settings) -> None:
+    """Run the trials that the folder lacks, and print the best."""
+    rig = load_parameters(settings.parameters)
+    sensors = TUNED_FOR if settings.sensors == "both" else (settings.sensors,)
+    controller, own = with_options([settings.controller], settings.set)[0], settings.parts()
     bounds = {name: pair for name, pair in bounds_of(controller, rig).items() if name not in split_options(controller)[1]}
-    start = start_of(arguments.start, bounds)
+    start = start_of(settings.start, bounds)
     setting = {
-        "controller": controller, **own, "seed": arguments.seed, "sensors": list(sensors), "lanes": arguments.lanes,
+        "controller": controller, **own, "seed": settings.seed, "sensors": list(sensors), "lanes": settings.lanes,
         "bounds": {name: list(pair) for name, pair in bounds.items()}, "start": start, "rig": rig.to_dict(),
     }  # fmt: skip
     check_world("BirthSIM/Circle-v1", parameters=rig, randomize=True, **own)
     print(described(rig, True))
     check_optuna()
-    with own_folder(arguments.out) as folder:
+    with own_folder(settings.out) as folder:
         study = open_study(folder, setting)
-        kept = len(complete(study)[: arguments.trials])
-        bar = tqdm(total=arguments.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
+        kept = len(complete(study)[: settings.trials])
+        bar = tqdm(total=settings.trials, initial=kept, desc=f"tuning {controller}", unit=" trials", leave=False)
         interrupt: KeyboardInterrupt | None = None
         try:
-            numbers = (arguments.lanes, arguments.seed, arguments.trials)
+            numbers = (settings.lanes, settings.seed, settings.trials)
             for _ in search(study, controller, rig, start, bounds, sensors, *numbers, own):
                 bar.set_postfix_str(f"best {study.best_value:.3g} mm", refresh=False)
                 bar.update()
@@ -255,23 +256,20 @@ def _tune(arguments: argparse.Namespace) -> None:
             if not (kept := len(complete(study))):
                 raise
             interrupt = error
-            print(f"interrupted: {kept} of {arguments.trials} trials are kept; the same command carries on")
+            print(f"interrupted: {kept} of {settings.trials} trials are kept; the same command carries on")
         finally:
             bar.close()
-        trials = listed(study)[: arguments.trials]
+        trials = listed(study)[: settings.trials]
         first, best = trials[0], min(trials, key=lambda trial: trial["cost"])
         place = {"trial": trials.index(best), "trials": len(trials)}
         with whole_results(folder) as results:
             write_json(results / "trials.json", {**setting, "trials": trials})
             write_json(results / "gains.json", {**setting, **best, **place})
     print(f"{controller}, {', '.join(sensors)} sensors, best of {len(trials)} trials: number {place['trial']}\n")
-    print(f"{'cost, mm':28}{'start':>12}{'best':>12}")
-    for part, value in best["parts"].items():
-        print(f"{part:28}{first['parts'][part]:12.4g}{value:12.4g}")
-    print(f"{'sum':28}{first['cost']:12.4g}{best['cost']:12.4g}")
-    print(f"\n{'gain':28}{'start':>12}{'best':>12}{'lowest':>12}{'highest':>12}")
-    for gain, value in best["gains"].items():
-        print(f"{gain:28}{start[gain]:12.4g}{value:12.4g}{bounds[gain][0]:12.4g}{bounds[gain][1]:12.4g}")
-    print(f"\nwritten to {arguments.out}/: gains.json, trials.json")
+    spent = [{**one["parts"], "sum": one["cost"]} for one in (first, best)]
+    print(aligned(("cost, mm", "start", "best"), [(part, *(f"{one[part]:.3f}" for one in spent)) for part in spent[0]]))
+    gains = [(gain, *(f"{each:.4g}" for each in (start[gain], value, *bounds[gain]))) for gain, value in best["gains"].items()]
+    print(f"\n{aligned(('gain', 'start', 'best', 'lowest', 'highest'), gains)}")
+    print(f"\nwritten to {settings.out}/: gains.json, trials.json")
     if interrupt is not None:
         raise interrupt

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import platform
+from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
+from typing import Annotated
 
-from baselines.commands.shared import run, seed_number
+from cyclopts import Parameter
+
+from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
+from baselines.commands.tables import aligned
 from baselines.registry import LISTED, SLOW
 from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
@@ -19,36 +24,41 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim export",
-        description="Compile closed loops, laws alone and the plant alone into code that needs no Python: a WebAssembly module "
-        "with JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the laws alone.",
-        epilog="Every target computes the same bits as Python. The files are described in docs/build.md.",
-    )
-    parser.add_argument("--to", choices=("c", *BUILT), required=True, help="the target; c: this processor")
-    parser.add_argument("--env", nargs="+", help="environment ids (default: BirthSIM/Circle-v1); not for cortex-m7")
-    parser.add_argument("--sensors", nargs="+", choices=tuple(SENSORS), help="default: ideal")
-    parser.add_argument("--controller", nargs="+", metavar="NAME", help="compiled controllers (default: backstepping)")
-    parser.add_argument(
-        "--policy", nargs="+", default=[], help="residual policies besides: folders that birthsim train wrote, or names of "
-        "what comes with the package",
-    )  # fmt: skip
-    parser.add_argument("--all", action="store_true", help="all environments, sensors, compiled controllers and policies")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the episode that begins (default: %(default)s)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the files and build.json")
-    run(parser, _build)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Compile closed loops, controllers alone and the plant alone into code that needs no Python: a WebAssembly module with
+    JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the controllers alone.
+
+    Every target computes the same bits as Python. The files are described in docs/build.md.
+    """
+
+    to: Annotated[str, Parameter(choices=("c", *BUILT))]
+    """Target; c: this processor."""
+    env: Annotated[list[str], MANY, Parameter(group=WORLD, metavar="ID...")] = field(default_factory=list)
+    """Environments, else BirthSIM/Circle-v1; not for cortex-m7."""
+    sensors: Annotated[list[Kind], MANY, Parameter(group=WORLD)] = field(default_factory=list)
+    """Sensor models, else ideal."""
+    controller: Annotated[list[str], MANY, CONTROLLER, Parameter(metavar="NAME...")] = field(default_factory=list)
+    """Compiled controllers, else backstepping."""
+    policy: Annotated[list[str], MANY, Parameter(group=CONTROL, metavar="DIR...")] = field(default_factory=list)
+    """Residual policies besides: folders that birthsim train wrote, or names of what is shipped."""
+    all: bool = False
+    """All environments, sensors, compiled controllers and policies."""
+    parameters: RigFile = None
+    seed: Seed = 0
+    """Of the episode that begins."""
+    out: Path
+    """Folder for the files and build.json."""
 
 
-def _build(arguments: argparse.Namespace) -> None:
-    target = _this_processor() if arguments.to == "c" else arguments.to
-    bundle = _bundle(arguments)
+def main(settings: Settings) -> None:
+    """Build what is asked for, and say how large it is."""
+    target = _this_processor() if settings.to == "c" else settings.to
+    bundle = _bundle(settings)
     require_llvm()
     if target != "cortex-m7":
         require_linker()
-    folder = make_folder(arguments.out)
+    folder = make_folder(settings.out)
     with whole_results(folder) as place:
         if target == "wasm":
             report = build_wasm(bundle, place)
@@ -61,23 +71,23 @@ def _build(arguments: argparse.Namespace) -> None:
     print(f"written to {folder}")
 
 
-def _bundle(arguments: argparse.Namespace) -> Bundle:
-    named = [name for name in ("env", "sensors", "controller", "policy") if getattr(arguments, name)]
-    if arguments.all and named:
+def _bundle(settings: Settings) -> Bundle:
+    named = [name for name in ("env", "sensors", "controller", "policy") if getattr(settings, name)]
+    if settings.all and named:
         raise ValueError(f"--all with --{named[0]}; allowed: one of them")
-    alone = arguments.to == "cortex-m7"
-    if alone and arguments.env:
+    alone = settings.to == "cortex-m7"
+    if alone and settings.env:
         raise ValueError("--env with cortex-m7; allowed: without it, the object has the laws alone")
-    rig = load_parameters(arguments.parameters)
-    scenarios = list(SCENARIOS) if arguments.all else [scenario_of(one) for one in arguments.env or ["BirthSIM/Circle-v1"]]
-    sensors = list(SENSORS) if arguments.all else arguments.sensors or ["ideal"]
-    policies = _shipped() if arguments.all else arguments.policy
-    controllers = arguments.controller or ([] if policies else ["backstepping"])
+    rig = load_parameters(settings.parameters)
+    scenarios = list(SCENARIOS) if settings.all else [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
+    sensors = list(SENSORS) if settings.all else settings.sensors or ["ideal"]
+    policies = _shipped() if settings.all else settings.policy
+    controllers = settings.controller or ([] if policies else ["backstepping"])
     if RESIDUAL in controllers:
         raise ValueError("--controller residual; allowed: --policy NAME")
-    if arguments.all:
+    if settings.all:
         controllers = [name for name in LISTED if name not in SLOW]
-    return make_bundle(rig, scenarios, sensors, controllers, policies, arguments.seed, alone)
+    return make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, alone)
 
 
 def _this_processor() -> str:
@@ -97,15 +107,18 @@ def _shipped() -> list[str]:
 
 
 def _show(report: Report) -> None:
+    sizes: list[tuple[str, str]] = []
     for name, value in report.items():
         if name == "estimate":
-            for law, found in value.items():
-                said = f"{found['operations']:,.0f} operations; at most {found['most']:,.0f} cycles, an estimate"
-                print(f"{law:60}{found['cycles']:>12,.0f} cycles a period; {said}")
-        elif isinstance(value, dict):
-            for key, size in value.items():
-                print(f"{name + ' ' + key:60}{size:>12,} bytes")
+            continue
+        if isinstance(value, dict):
+            sizes += [(f"{name} {key}", f"{size:,}") for key, size in value.items()]
         elif isinstance(value, int):
-            print(f"{name:60}{value:>12,} bytes")
+            sizes.append((name, f"{value:,}"))
         else:
-            print(f"{name:60}{', '.join(value) or 'nothing' if isinstance(value, list) else value:>12}")
+            said = ", ".join(value) or "nothing" if isinstance(value, list) else value
+            print(fill(f"{name}: {said}", 80, subsequent_indent="    "))
+    print(aligned(("", "bytes"), sizes))
+    if laws := report.get("estimate"):
+        counts = [(law, *(f"{found[one]:,.0f}" for one in ("operations", "cycles", "most"))) for law, found in laws.items()]
+        print(f"\n{aligned(('a period, estimated', 'operations', 'cycles', 'at most'), counts)}")

@@ -2,63 +2,65 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Literal
 
-from baselines.commands.shared import run, seed_number
+from cyclopts import Parameter
+
+from baselines.commands.settings import CONTROL, CONTROLLER, MANY, Configured, Env, RigFile, Seed, Sensors
 from birthsim_build.bundle import identifier, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu
 from birthsim_build.fmu.model import fmu_model
 from birthsim_build.loops import RESIDUAL, law_part, scenario_world
-from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim export",
-        description="Write a functional mock-up unit for co-simulation: the plant with its sensors, moved by spool openings "
-        "and the hand's force, or with --controller the closed loop, moved by setpoints and that force. No Python is inside.",
-        epilog="Variables, and what was tried in which tool: docs/fmu.md.",
-    )
-    parser.add_argument("--to", choices=("fmu",), required=True, help="the form of the file")
-    parser.add_argument("--controller", metavar="NAME", help="a compiled controller (default: none, the plant)")
-    parser.add_argument("--policy", help="a residual policy instead: a folder of birthsim train, or a name that is shipped")
-    parser.add_argument("--env", default="BirthSIM/Circle-v1", help="where the end effector begins (default: %(default)s)")
-    parser.add_argument("--sensors", choices=tuple(SENSORS), default="ideal", help="default: %(default)s")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the sensors' noise (default: %(default)s)")
-    parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help="version of the standard (default: %(default)s)")
-    parser.add_argument(
-        "--target",
-        nargs="+",
-        metavar="PROCESSOR",
-        choices=tuple(BINARIES),
-        default=["x86-64"],
-        help=f"of {', '.join(BINARIES)} (default: x86-64, Linux)",
-    )
-    parser.add_argument("--out", type=Path, required=True, help="file, ending in .fmu")
-    run(parser, _write)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Write a functional mock-up unit for co-simulation: the plant with its sensors, moved by spool openings and the hand's
+    force, or with --controller the closed loop, moved by setpoints and that force. No Python is inside.
+
+    Variables, and what was tried in which tool: docs/fmu.md.
+    """
+
+    to: Literal["fmu"]
+    """Form of the file."""
+    controller: Annotated[str | None, CONTROLLER] = None
+    """A compiled controller, else the plant alone."""
+    policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
+    """A residual policy instead: a folder that birthsim train wrote, or the name of what is shipped."""
+    env: Env = "BirthSIM/Circle-v1"
+    sensors: Sensors = "ideal"
+    parameters: RigFile = None
+    seed: Seed = 0
+    """Of the sensors' noise."""
+    fmi: Annotated[int, Parameter(choices=tuple(map(str, VERSIONS)))] = 2
+    """Version of the standard."""
+    target: Annotated[list[str], MANY, Parameter(choices=tuple(BINARIES))] = field(default_factory=lambda: ["x86-64"])
+    """Processors, else x86-64, Linux."""
+    out: Path
+    """File, ending in .fmu."""
 
 
-def _write(arguments: argparse.Namespace) -> None:
-    if arguments.out.suffix != ".fmu":
-        raise ValueError(f"--out {str(arguments.out)!r}; allowed: a file that ends in .fmu")
-    if arguments.controller and arguments.policy:
+def main(settings: Settings) -> None:
+    """Write the file and count its variables."""
+    if settings.out.suffix != ".fmu":
+        raise ValueError(f"--out {str(settings.out)!r}; allowed: a file that ends in .fmu")
+    if settings.controller and settings.policy:
         raise ValueError("--controller with --policy; allowed: one of them")
-    scenario_of(arguments.env)
+    scenario_of(settings.env)
     require_llvm()
     require_linker()
-    rig = load_parameters(arguments.parameters)
-    world = scenario_world(arguments.env, arguments.sensors, rig, arguments.seed)
-    name = RESIDUAL if arguments.policy else arguments.controller
-    law = law_part(name, rig, world.sampled, arguments.policy) if name else None
+    rig = load_parameters(settings.parameters)
+    world = scenario_world(settings.env, settings.sensors, rig, settings.seed)
+    name = RESIDUAL if settings.policy else settings.controller
+    law = law_part(name, rig, world.sampled, settings.policy) if name else None
     moved = "setpoints" if law else "spool openings"
-    about = f"BirthSIM ({name or 'the plant'}, {arguments.sensors} sensors), moved by {moved} and the force of a hand"
+    about = f"BirthSIM ({name or 'the plant'}, {settings.sensors} sensors), moved by {moved} and the force of a hand"
     model = fmu_model(f"BirthSIM_{identifier(name or 'plant')}", about, world, law, rig)
-    write_fmu(model, arguments.fmi, arguments.out, arguments.target)
+    write_fmu(model, settings.fmi, settings.out, settings.target)
     kinds = [one.causality for one in model.description.variables]
     counts = ", ".join(f"{kinds.count(kind)} {kind}s" for kind in ("parameter", "input", "output"))
-    print(f"written to {arguments.out}: {arguments.out.stat().st_size:,} bytes, FMI {arguments.fmi}, {counts}")
+    print(f"written to {settings.out}: {settings.out.stat().st_size:,} bytes, FMI {settings.fmi}, {counts}")

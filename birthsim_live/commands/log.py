@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-from baselines.commands.shared import run
+from cyclopts import Parameter
+
+from baselines.commands.settings import Configured
 from baselines.logs.writing import WRITERS, write_log
 from birthsim_live.logs.reading import read_log
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim export",
-        description="Write a recording of birthsim live, an evaluation, or the traces in a piece of one, as Parquet or as MCAP "
-        "(PlotJuggler, Foxglove). Columns have units.",
-    )
-    parser.add_argument("--to", choices=[suffix[1:] for suffix in WRITERS], required=True, help="the form of the file")
-    parser.add_argument("file", type=Path, help="a recording, .rec; evaluation.json; a piece of an evaluation, .json")
-    parser.add_argument("--out", type=Path, required=True, help="file to write, with the form as its ending")
-    run(parser, _log)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Write a recording of birthsim live, an evaluation, or the traces in a piece of one, as Parquet or as MCAP (PlotJuggler,
+    Foxglove). Columns have units.
+    """
+
+    file: Path = field(kw_only=False)
+    """A recording, .rec; evaluation.json; a piece of an evaluation, .json."""
+    to: Annotated[str, Parameter(choices=tuple(suffix[1:] for suffix in WRITERS))]
+    """Form of the file."""
+    out: Path
+    """File to write, with the form as its ending."""
 
 
-def _log(arguments: argparse.Namespace) -> None:
-    if arguments.out.suffix != f".{arguments.to}":
-        raise ValueError(f"--out {str(arguments.out)!r}; allowed: a file that ends in .{arguments.to}")
-    log = read_log(arguments.file)
-    write_log(log, arguments.out)
+def main(settings: Settings) -> None:
+    """Write the file and count its rows."""
+    if settings.out.suffix != f".{settings.to}":
+        raise ValueError(f"--out {str(settings.out)!r}; allowed: a file that ends in .{settings.to}")
+    log = read_log(settings.file)
+    write_log(log, settings.out)
     rows = sum(len(one.times) for one in log.series)
-    print(f"written to {arguments.out}: {rows} rows of {len(log.columns)} columns, {len(log.events)} events")
+    print(f"written to {settings.out}: {rows} rows of {len(log.columns)} columns, {len(log.events)} events")

@@ -13,8 +13,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from baselines.commands.command import perform_with
 from baselines.registry import make_controller
-from birthsim_build.commands.fmu import main
+from birthsim_build.commands import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
 from birthsim_build.fmu.units import exponents
@@ -97,7 +98,7 @@ def written(tmp_path_factory):
             with pytest.MonkeyPatch.context() as patch:
                 path = folder / f"{len(made)}.fmu"
                 patch.setattr(sys, "argv", ["birthsim export", "--to", "fmu", *map(str, options), "--out", str(path)])
-                main()
+                perform_with("birthsim export", fmu.Settings, fmu.main, "")
                 made[options] = path
         return made[options]
 

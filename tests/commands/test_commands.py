@@ -16,7 +16,7 @@ from agents.policy.seeds import policy_folders
 from baselines.work.files import write_json
 from birthsim.door import COMMANDS
 from birthsim.export import FORMS
-from tests.console import OWN, RESIDUAL, ROOT, assert_picture, call, run, strict, words
+from tests.console import OWN, RESIDUAL, ROOT, assert_picture, assert_says, call, run, strict, words
 
 HELP = [(name,) for name in COMMANDS] + [("export", "--to", form) for form in FORMS]
 
@@ -27,7 +27,7 @@ def test_help_fits_80_columns_and_ends_with_an_example(words, monkeypatch, capsy
     status, printed, complained = call(words[0], monkeypatch, capsys, *words[1:], "--help")
     assert (status, complained) == (0, "")
     lines = printed.rstrip().splitlines()
-    assert printed.startswith(f"usage: birthsim {words[0]}")
+    assert printed.lower().startswith(f"usage: birthsim {words[0]}")
     assert [line for line in lines if len(line) > 80] == []
     assert [line for line in lines if line.startswith("example: ")] == lines[-1:]
     assert lines[-1].startswith(f"example: birthsim {' '.join(words)}")
@@ -49,12 +49,17 @@ def test_help_of_all_fits_80_columns_and_names_every_command_at_once():
 @pytest.mark.parametrize(
     ("line", "asked"),
     [
-        (("evalute",), "command = 'evalute' (did you mean 'evaluate'?); allowed: run, live, "),
-        (("export", "--to", "fmux"), "--to 'fmux' (did you mean 'fmu'?); allowed: onnx, wasm, "),
+        (("evalute",), "command = 'evalute' (did you mean 'evaluate'?); allowed: what birthsim --help"),
+        (("export", "--to", "fmux"), "--to 'fmux' (did you mean 'fmu'?); allowed: what birthsim export --help"),
+        (("nothing",), "command = 'nothing'; allowed: run, live, "),
+        (("export", "--to", "stone"), "--to 'stone'; allowed: onnx, wasm, "),
         (("export",), "--to is missing; allowed: onnx, wasm, "),
-        (("evaluate", "--episods", "3", "--out", "x"), "--episods 3 (did you mean '--episodes'?)"),
-        (("evaluate", "--controller", "backsteping", "--out", "x"), "'backsteping' (did you mean 'backstepping'?); allowed: "),
-        (("run", "--env", "BirthSIM/Forcep-v1", "--out", "x"), "(did you mean 'BirthSIM/Forceps-v1'?); allowed: "),
+        (("evaluate", "--episods", "3", "--out", "x"), "--episods. Did you mean --episodes?"),
+        (
+            ("evaluate", "--controller", "backsteping", "--out", "x"),
+            "(did you mean 'backstepping'?); allowed: a registered name",
+        ),
+        (("run", "--env", "BirthSIM/Forcep-v1", "--out", "x"), "(did you mean 'BirthSIM/Forceps-v1'?); allowed: BirthSIM/"),
     ],
 )
 def test_what_is_mistyped_is_asked_about(line, asked, monkeypatch, capsys, tmp_path):
@@ -73,16 +78,14 @@ def test_options_come_from_toml_and_what_is_typed_counts_more(monkeypatch, capsy
     assert "--env 'BirthSIM/There-v1'" in typed
     assert not (tmp_path / "x").exists()
     (tmp_path / "own.toml").write_text('controller = ["pid"]\n')
-    assert (
-        "controller = ['pid']; allowed: " in call("animate", monkeypatch, capsys, "--config", "own.toml", "--out", "x.gif")[2]
-    )
+    assert_says(("--controller", "2"), call("animate", monkeypatch, capsys, "--config", "own.toml", "--out", "x.gif")[2])
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
         ("episods = 3", "'episods' (did you mean 'episodes'?); allowed: env, "),
-        ("episodes = 0", "--episodes: '0'; allowed: a whole number >= 1"),
+        ("episodes = 0", ("--episodes", "'0'", "allowed: a whole number ", "1")),
         ("episodes = [1, 2]", "episodes = [1, 2]; allowed: "),
         ('sensors = "perfect"', "sensors = 'perfect'; allowed: ideal, lab, honest"),
         ("no-studies = 1", "no-studies = 1; allowed: true or false"),
@@ -94,7 +97,7 @@ def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_
     options = ("--config", tmp_path / "own.toml", "--out", tmp_path / "x")
     status, _, complained = call("comparison", monkeypatch, capsys, *options)
     assert status == 2
-    assert said in complained.splitlines()[-1]
+    assert_says(said, complained.splitlines()[-1])
 
 
 def test_an_episode_is_printed_and_drawn(monkeypatch, capsys, tmp_path):
@@ -154,30 +157,30 @@ BAD = [
         ("--controller", "residual", "--policy", "{damaged}"),
         "policy.safetensors is damaged: its checksum is of another",
     ),
-    ("evaluate", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
-    ("evaluate", ("--episodes", "-3"), "--episodes: '-3'; allowed: a whole number >= 1"),
-    ("evaluate", ("--episodes", "some"), "--episodes: 'some'; allowed: a whole number >= 1"),
-    ("evaluate", ("--seed", "-1"), "--seed: '-1'; allowed: a whole number from 0 to 4294967295"),
-    ("evaluate", ("--sensors", "perfect"), "--sensors: invalid choice: 'perfect' (choose from"),
-    ("evaluate", ("--randomize", "some"), "--randomize: invalid choice: 'some' (choose from"),
+    ("evaluate", ("--episodes", "0"), ("--episodes", "'0'", "allowed: a whole number ", "1")),
+    ("evaluate", ("--episodes", "-3"), ("--episodes", "'-3'", "allowed: a whole number ", "1")),
+    ("evaluate", ("--episodes", "some"), ("--episodes", "'some'", "allowed: a whole number ", "1")),
+    ("evaluate", ("--seed", "-1"), ("--seed", "'-1'", "allowed: a whole number from 0 to 4294967295")),
+    ("evaluate", ("--sensors", "perfect"), ("--sensors", "perfect", "ideal", "lab", "honest")),
+    ("evaluate", ("--randomize", "some"), ("--randomize", "some", "none", "plant", "all")),
     ("evaluate", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("evaluate", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 and"),
     ("evaluate", ("--out", "{tmp}/own.py"), "own.py'"),
-    ("evaluate", ("--cluster", "slurm"), "--cluster: 'slurm'; allowed: ray, or ray:ADDRESS of a running cluster"),
-    ("evaluate", ("--cluster", "ray:"), "--cluster: 'ray:'; allowed: ray, or ray:ADDRESS of a running cluster"),
+    ("evaluate", ("--cluster", "slurm"), ("--cluster", "slurm", "allowed: ray, or ray:ADDRESS of a running cluster")),
+    ("evaluate", ("--cluster", "ray:"), ("--cluster", "ray:", "allowed: ray, or ray:ADDRESS of a running cluster")),
     ("sweep", ("nowhere.toml",), "sweep = 'nowhere.toml' cannot be read: "),
     ("sweep", ("{tmp}/own.py",), "own.py' is no TOML: "),
     ("sweep", ("{tmp}/rig.toml",), "rig.toml': 'mechanics'; allowed: [base], [grid], [draw], [search] and [[map]]"),
-    ("comparison", ("--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
+    ("comparison", ("--jobs", "0"), ("--jobs", "'0'", "allowed: a whole number ", "1")),
     ("comparison", (*ALL, "--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1, "),
     ("comparison", (*ALL, "--env", RESIDUAL), f"--env '{RESIDUAL}'; allowed: BirthSIM/Circle-v1, "),
     ("comparison", ("--controller", "nobody"), "--controller 'nobody'; allowed: backstepping, "),
     ("comparison", ("--controller", "residual"), "--controller 'residual'; allowed: backstepping, "),
     ("comparison", ("--controller", "{tmp}/own.py:Mine"), "own.py' has no 'Mine'; allowed: a name that it defines: "),
     ("comparison", ("--controller", "nowhere.py:Mine"), "controller file 'nowhere.py' does not exist; allowed: "),
-    ("comparison", ("--episodes", "0"), "--episodes: '0'; allowed: a whole number >= 1"),
+    ("comparison", ("--episodes", "0"), ("--episodes", "'0'", "allowed: a whole number ", "1")),
     ("comparison", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: "),
-    ("evaluate", ("--episodes", "2", "--colour", "red"), "unrecognized arguments: --colour red"),
+    ("evaluate", ("--episodes", "2", "--colour", "red"), ("--colour", "allowed: ", "--help")),
     ("figure4", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, "),
     ("figure4", ("--set", "gain=3"), "--set 'gain=3'; allowed for backstepping: weight_compensation, "),
     ("evaluate", ("--reference", "nowhere.csv"), "reference = 'nowhere.csv' cannot be read"),
@@ -187,28 +190,28 @@ BAD = [
         ("--reference", "{tmp}/own.py:Mine", "--out", "{tmp}/a.webp"),
         "own.py' has no 'Mine'; allowed: a name that it",
     ),
-    ("figure4", ("--sensors", "perfect"), "--sensors: invalid choice: 'perfect' (choose from"),
+    ("figure4", ("--sensors", "perfect"), ("--sensors", "perfect", "ideal", "lab", "honest")),
     ("figure4", ("--parameters", "nowhere.toml"), "'nowhere.toml'"),
     ("figure4", ("--out", "{tmp}/own.py"), "own.py'"),
-    ("train", ("--env", "BirthSIM/Circle-v1"), "--env 'BirthSIM/Circle-v1'; allowed: BirthSIM/CircleResidual-v1, "),
+    ("train", ("--env", "BirthSIM/Circle-v1"), ("--env 'BirthSIM/Circle-v1'", "; allowed: BirthSIM/CircleResidual-v1, ")),
     ("train", ("--env", "Pendulum-v1"), "--env 'Pendulum-v1'; allowed: BirthSIM/CircleResidual-v1, "),
-    ("train", ("--steps", "0"), "--steps: '0'; allowed: a whole number >= 1"),
-    ("train", ("--steps", "1e6"), "--steps: '1e6'; allowed: a whole number >= 1"),
-    ("train", ("--seed", "-1"), "--seed: '-1'; allowed: a whole number from 0 to 4294967295"),
-    ("train", ("--seed", "4294967296"), "--seed: '4294967296'; allowed: a whole number from 0 to 4294967295"),
+    ("train", ("--steps", "0"), ("--steps", "'0'", "allowed: a whole number ", "1")),
+    ("train", ("--steps", "1e6"), ("--steps", "'1e6'", "allowed: a whole number ", "1")),
+    ("train", ("--seed", "-1"), ("--seed", "'-1'", "allowed: a whole number from 0 to 4294967295")),
+    ("train", ("--seed", "4294967296"), ("--seed", "'4294967296'", "allowed: a whole number from 0 to 4294967295")),
     ("train", ("--config", "square"), "configuration = 'square' is no file; allowed: circle, "),
     ("train", ("--config", "{tmp}/own.py"), "own.py' is no TOML: "),
     ("train", ("--config", "{tmp}/rig.toml"), "rig.toml': table 'mechanics'; allowed: training, residual"),
-    ("train", ("--algorithm", "dqn"), "--algorithm: invalid choice: 'dqn' (choose from"),
-    ("train", ("--law", "pid"), "law = 'pid'; allowed: 'backstepping', 'backstepping-weight', "),
-    ("train", ("--impedance", "soft"), "--impedance: invalid choice: 'soft' (choose from"),
+    ("train", ("--algorithm", "dqn"), ("--algorithm", "dqn", "ppo", "sac", "tqc")),
+    ("train", ("--law", "pid"), ("--law", "pid", "backstepping-weight", "none")),
+    ("train", ("--impedance", "soft"), ("--impedance", "soft", "fixed", "variable")),
     ("train", ("--law", "none", "--impedance", "variable"), "impedance = 'variable'; allowed: 'fixed', law = 'none' has no"),
-    ("train", ("--seeds", "0"), "--seeds: '0'; allowed: a whole number >= 1"),
-    ("train", ("--jobs", "0"), "--jobs: '0'; allowed: a whole number >= 1"),
-    ("train", ("--smoothing", "0.3"), "unrecognized arguments: --smoothing 0.3"),
+    ("train", ("--seeds", "0"), ("--seeds", "'0'", "allowed: a whole number ", "1")),
+    ("train", ("--jobs", "0"), ("--jobs", "'0'", "allowed: a whole number ", "1")),
+    ("train", ("--smoothing", "0.3"), ("--smoothing", "allowed: ", "--help")),
     ("train", ("--authority", "0"), "authority = 0.0; allowed: more than 0, at most 500"),
     ("train", ("--authority", "nan"), "authority = nan; allowed: more than 0, at most 500"),
-    ("train", ("--randomize", "some"), "--randomize: invalid choice: 'some' (choose from"),
+    ("train", ("--randomize", "some"), ("--randomize", "some", "none", "plant", "all")),
     ("train", ("--parameters", "{tmp}/rig.toml"), "Mechanics.mass = -3.0 is impossible; allowed: a finite number > 0 and"),
     ("train", ("--out", "{tmp}/own.py"), "own.py' is a file; allowed: a folder"),
 ]
@@ -227,7 +230,7 @@ def test_bad_input_ends_with_status_2_and_one_line_that_says_what_is_allowed(
     assert printed == ""
     lines = complained.strip().splitlines()
     assert lines[-1].startswith(f"{' '.join(words(command))}: error: ")
-    assert message in lines[-1]
+    assert_says(message, lines[-1])
     # Before the line there is nothing but the usage that argparse shows.
     assert len(lines) == 1 or lines[0].startswith("usage: ")
     assert "Traceback" not in complained
@@ -238,7 +241,7 @@ def test_bad_input_ends_with_status_2_and_one_line_that_says_what_is_allowed(
 def test_the_output_folder_is_asked_for(command, monkeypatch, capsys):
     status, _, complained = call(command, monkeypatch, capsys)
     assert status == 2
-    assert re.search(r"the following arguments are required: (--controller, )?--out\n", complained)
+    assert "--out" in complained or (command == "tune" and "--controller" in complained)
 
 
 COMPILING = "BirthSIM: compiling numerical kernels, usually 10 to 40 s; the result is cached.\n"

@@ -24,24 +24,37 @@ door.main()
 """
 
 LEAVING = """
-import argparse, atexit, signal, sys, time
-from baselines.commands.shared import run
+import atexit, signal, sys, time
+from baselines.commands.command import act
 def leave():
     print("leaving", flush=True)
     time.sleep(600)
 atexit.register(leave)
-run(argparse.ArgumentParser("birthsim-x"), lambda arguments: signal.raise_signal(signal.SIGTERM))
+act("birthsim-x", lambda: signal.raise_signal(signal.SIGTERM))
 """
 
 SWALLOWED = """
-import argparse, signal
-from baselines.commands.shared import run
-def act(arguments):
+import signal
+from baselines.commands.command import act
+def swallow():
     try:
         signal.raise_signal(signal.SIGTERM)
     except BaseException:
         raise TypeError("what compiled code may make of it") from None
-run(argparse.ArgumentParser("birthsim-x"), act)
+act("birthsim-x", swallow)
+"""
+
+READING = """
+import signal, sys
+from dataclasses import dataclass
+from typing import Annotated
+from cyclopts import Parameter
+from baselines.commands.command import perform_with
+@dataclass
+class Settings:
+    lanes: Annotated[int, Parameter(converter=lambda *_: signal.raise_signal(signal.SIGTERM))]
+sys.argv = ["birthsim-x", "--lanes", "1"]
+perform_with("birthsim-x", Settings, print, "")
 """
 
 
@@ -65,8 +78,9 @@ def test_a_signal_ends_a_command_in_one_line(program, ending, said):
     assert (process.returncode, complained) == (128 + number, expected)
 
 
-def test_a_signal_that_compiled_code_makes_another_error_of_is_a_signal():
-    done = subprocess.run([sys.executable, "-c", SWALLOWED], cwd=ROOT, capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("program", [SWALLOWED, READING], ids=["swallowed", "while options are read"])
+def test_a_signal_is_a_signal_wherever_it_comes(program):
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (143, "birthsim-x: terminated\n")
 
 

@@ -160,7 +160,8 @@ TABLE = [
         for name in ("bandwidth", "noise", "bias", "gain_error")
     ),
     (rig, "electronics.acceleration_bandwidth", (39.0,), "0, which is no sensor, or at least 40 Hz"),
-    (named, "controller", ("backsteping", ""), "backstepping, admittance, pid"),
+    (named, "controller", ("backsteping",), "a registered name, or path/to/file.py"),
+    (named, "controller", ("",), "backstepping, admittance, pid"),
     (gains, "stiffness", (1.0,), "gain, rest_gain, rest_push, "),
     (gains, "gain", (0.0,), "a positive number"),
     (gains, "bandwidth", (NAN,), "a positive number"),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from baselines.commands.command import perform_with, program
 from tests.fuzz.harness import Case, Kind
 from tests.fuzz.mutations import Rng
 
@@ -80,6 +81,9 @@ class Began(Exception):
 
 
 def _options(module: Any) -> list[str]:
+    if hasattr(module, "Settings"):
+        options = program("x", module.Settings).assemble_argument_collection()
+        return [name for option in options for name in option.names if name.startswith("--")]
     import argparse
 
     found: list[str] = []
@@ -113,14 +117,21 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
         line.insert(int(rng.integers(len(line) + 1)), ODD[rng.integers(len(ODD))])
     case.shown = f"{name} {line!r}"
 
+    def begin(*_: Any) -> None:
+        raise Began
+
     def parsed(parser: Any, action: Any) -> None:
         parser.parse_args()
-        raise Began
+        begin()
 
     said = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said), patch.object(sys, "argv", [name, *line]), patch.object(module, "run", parsed):
-            module.main()
+        with contextlib.redirect_stderr(said), patch.object(sys, "argv", [name, *line]):
+            if hasattr(module, "Settings"):
+                perform_with(name, module.Settings, begin, "")
+            else:
+                with patch.object(module, "run", parsed):
+                    module.main()
     except Began:
         return
     except SystemExit as end:

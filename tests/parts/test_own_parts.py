@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from baselines.commands.parts import with_options
+from baselines.commands.worlds import with_options
 from baselines.registry import known_options, make_controller, split_options
 from birthsim_env import Circle, Parameters
 from birthsim_env.parts.own_parts import hand_of, trajectory_of

@@ -71,7 +71,7 @@ def parts():
 
 
 def test_generated_parts_know_everything(parts):
-    commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes EPISODES"]
+    commands = [f"birthsim {name}" for name in COMMANDS if name not in ("study", "export")] + ["--episodes 1..1000000"]
     ids = [name for name in gymnasium.registry if name.startswith("BirthSIM/") and "Residual" not in name]
     fields = [name for section in Parameters().to_dict().values() for name in section]
     for part, names in (("commands.md", commands), ("environments.md", ids), ("metrics.md", UNITS), ("rig.md", fields)):

@@ -52,4 +52,4 @@ def test_a_foreign_package_is_named(script, content, tmp_path):
 
 def test_the_command_is_chosen_by_its_name(tmp_path):
     done = run(COMMAND.replace("train", "explain"), tmp_path)
-    assert done.stdout.startswith("usage: birthsim explain")
+    assert done.stdout.startswith("Usage: birthsim explain")

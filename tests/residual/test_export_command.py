@@ -72,5 +72,5 @@ def test_help_names_every_option():
     line = [sys.executable, "-W", "error", "-m", "birthsim", "export", "--to", "onnx", "--help"]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("usage: birthsim export")
+    assert done.stdout.startswith("Usage: birthsim export")
     assert all(word in done.stdout for word in ("POLICY", "--to", "--out"))

@@ -17,6 +17,7 @@ from agents.training import student as module
 from agents.training.configuration import TrainingSettings
 from agents.training.student import Student, _learn
 from agents.training.trainer import train
+from baselines.commands.command import perform_with
 from studies.residual import beside_law
 
 
@@ -69,7 +70,7 @@ def told(monkeypatch, capsys):
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["distill", *map(str, arguments)])
-        distill.main()
+        perform_with("birthsim distill", distill.Settings, distill.main, "")
         return capsys.readouterr().out
 
     return run

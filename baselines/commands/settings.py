@@ -1,0 +1,154 @@
+"""Types of the settings that commands share: each has its range or choices, its help and its group.
+
+The settings of a command are a dataclass. Its docstring says what the command does; every field is an option of the command
+line and a key of ``--config``, and the text below a field is its help. This module imports nothing that is slow to load, so
+that help comes at once. Its annotations are no text, as others inherit them.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Group, Parameter, Token
+
+MOST = 10**9
+"""Largest whole number that an option takes, where it has no lower limit of its own."""
+
+EPISODES, JOBS_AT_MOST = 1_000_000, 256
+"""Most episodes of an evaluation, some 2 kB each, and most processes side by side."""
+
+JOBS = 2
+"""Processes side by side, unless --jobs says otherwise."""
+
+WORLD, CONTROL, PROCESSES = map(Group.create_ordered, ("World", "Controller", "Processes"))
+"""Groups of options in a command's help."""
+
+
+def whole(least: int = 1, most: int = MOST) -> Parameter:
+    """An option's whole number from ``least`` to ``most``, in decimal digits."""
+
+    def read(_: type, tokens: Sequence[Token]) -> int:
+        text = tokens[0].value
+        # Digits of other scripts are decimal too; more than 20 of any are too many.
+        if not (text.isascii() and text.isdecimal() and len(text) <= 20 and least <= int(text) <= most):
+            raise ValueError(f"{text[:40]!r}; allowed: a whole number from {least} to {most}")
+        return int(text)
+
+    return Parameter(converter=read, metavar=f"{least}..{most}")
+
+
+def number(unit: str, above: float = -math.inf, most: float = math.inf) -> Parameter:
+    """An option's finite number in ``unit``, more than ``above`` and at most ``most``."""
+    limits = [f"> {above:g}"] * math.isfinite(above) + [f"<= {most:g}"] * math.isfinite(most)
+
+    def read(_: type, tokens: Sequence[Token]) -> float:
+        text = tokens[0].value
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and above < value <= most):
+            raise ValueError(f"{text[:40]!r}; allowed: {' '.join(['a finite number', ' and '.join(limits)]).rstrip()}")
+        return value
+
+    return Parameter(converter=read, metavar=unit)
+
+
+def check_cluster(_: type, name: str | None) -> None:
+    """``ray`` or ``ray:ADDRESS``."""
+    kind, colon, address = (name or "ray").partition(":")
+    if kind != "ray" or (colon and not address):
+        raise ValueError("allowed: ray, or ray:ADDRESS of a running cluster, as ray:10.0.0.1:6379")
+
+
+Env = Annotated[str, Parameter(group=WORLD, metavar="ID", help="Environment.")]
+Seed = Annotated[int, whole(0, 2**32 - 1)]
+"""A seed that NumPy and PyTorch take."""
+Kind = Literal["ideal", "lab", "honest"]
+"""The names of ``birthsim_env.parts.sensors.sensors.SENSORS``."""
+Sensors = Annotated[Kind, Parameter(group=WORLD, help="Sensor model.")]
+Randomize = Annotated[Literal["none", "plant", "scenario", "sensors", "all"], Parameter(group=WORLD)]
+RigFile = Annotated[str | None, Parameter(group=WORLD, metavar="FILE", help="TOML file of the rig, else the paper's.")]
+MANY = Parameter(consume_multiple=True)
+"""An option takes several values."""
+CONTROLLER = Parameter(group=CONTROL, metavar="NAME")
+NAMES = (
+    "backstepping, admittance, pid, lqr, sliding-mode, nonlinear-mpc, residual or another registered name, with options as in "
+    "'admittance[learn=false]', or path/to/file.py:Class."
+)
+"""Help of an option that names controllers."""
+Controller = Annotated[str, CONTROLLER, Parameter(help=f"One of {NAMES}")]
+Controllers = Annotated[
+    list[str] | None,
+    MANY,
+    CONTROLLER,
+    Parameter(alias="--controllers", metavar="NAME...", help=f"One or more of {NAMES}"),
+]
+Set = Annotated[
+    list[str],
+    MANY,
+    Parameter(
+        group=CONTROL, metavar="GAIN=VALUE...",
+        help="Gains and other options of the controllers that have them, such as --set bandwidth=60; one of several takes "
+        "them by name: 'pid[bandwidth=60]'.",
+    ),
+]  # fmt: skip
+
+RANDOMIZE: dict[str, bool | str] = {"none": False, "plant": "plant", "scenario": "scenario", "sensors": "sensors", "all": True}
+"""``Randomize`` -> the environments' argument ``randomize``."""
+
+
+@dataclass(kw_only=True)
+class Configured:
+    """What every command with options has."""
+
+    config: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    """TOML file of these options, as episodes = 64; what is typed counts more."""
+
+    def shown(self) -> dict[str, Any]:
+        """What results depend on, as JSON."""
+        return {
+            name: value if value is None or isinstance(value, bool | int | list) else str(value)
+            for name, value in vars(self).items() if name not in ("out", "jobs", "cluster", "config")
+        }  # fmt: skip
+
+
+@dataclass(kw_only=True)
+class Parts(Configured):
+    """Parts of a user's own, instead of the environment's."""
+
+    reference: Annotated[
+        str | None,
+        Parameter(
+            group=WORLD, metavar="PART",
+            help="A CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a birthsim_env.Trajectory or of a function of "
+            "time that returns (x, y).",
+        ),
+    ] = None  # fmt: skip
+    stiffness: Annotated[str | None, Parameter(group=WORLD, metavar="FILE")] = None
+    """CSV file of time, x, y, stiffness (s, m, m, N/m) of the setpoints; --reference takes the same file."""
+    user_force: Annotated[
+        str | None,
+        Parameter(
+            group=WORLD, metavar="PART",
+            help="The hand: steps, sine, noise, guided, a CSV file of time, Fx, Fy (s, N, N), or path/to/file.py:Name of a "
+            "birthsim_env.UserForce or of a function of time that returns (Fx, Fy).",
+        ),
+    ] = None  # fmt: skip
+
+    def parts(self) -> dict[str, Any]:
+        """The environments' arguments, as far as they are given."""
+        given = {"reference": self.reference, "stiffness": self.stiffness, "user_force": self.user_force}
+        return {name: part for name, part in given.items() if part is not None}
+
+
+@dataclass(kw_only=True)
+class Processes(Configured):
+    """Where work is done."""
+
+    jobs: Annotated[int, whole(1, JOBS_AT_MOST), Parameter(group=PROCESSES)] = JOBS
+    """Processes side by side."""
+    cluster: Annotated[str | None, Parameter(group=PROCESSES, metavar="ray[:ADDRESS]", validator=check_cluster)] = None
+    """Ray's workers instead, of a running cluster or of this machine."""

@@ -1,0 +1,54 @@
+"""What commands look at before they begin: the environment, its world, and the controllers' options."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+
+from baselines.registry import known_options, split_options
+from birthsim_env.physics.rig.values import near
+
+
+def check_environment(name: str, residual: bool = False) -> None:
+    """Raises ``ValueError`` for an id that is none of the experiments, or else of those with a law inside."""
+    known = sorted(one for one in gymnasium.registry if one.startswith("BirthSIM/") and ("Residual" in one) == residual)
+    if name not in known:
+        raise ValueError(f"--env {name!r}{near(name, known)}; allowed: {', '.join(known)}")
+
+
+def check_world(environment: str, **arguments: Any) -> None:
+    """Raises ``ValueError`` for arguments with which no episode of an environment begins, before anything else is done."""
+    env: Any = gymnasium.make(environment, **arguments)
+    try:
+        env.reset(seed=0)
+    finally:
+        env.close()
+
+
+def policy_of(environment: str) -> str:
+    """Name of the policy that comes with the package for an environment id, where one does: ``BirthSIM/Forceps-v1`` ->
+    ``forceps``."""
+    return environment.removeprefix("BirthSIM/").rpartition("-v")[0].lower()
+
+
+def with_options(names: Sequence[str], entries: Sequence[str]) -> list[str]:
+    """Controllers' names with what ``--set`` gives to those that have it; ``ValueError`` for what none of them has."""
+    if not entries:
+        return list(names)
+    known = {name: known_options(name) for name in names}
+    for entry in entries:
+        option, equals, value = entry.partition("=")
+        if not (equals and value and option.isidentifier()):
+            raise ValueError(f"--set {entry!r}; allowed: GAIN=VALUE")
+        if not any(have is None or option in have for have in known.values()):
+            listed = "; ".join(f"{name}: {', '.join(have or ()) or 'nothing'}" for name, have in known.items())
+            raise ValueError(f"--set {entry!r}; allowed for {listed}")
+    found = []
+    for name, have in known.items():
+        own = [entry for entry in entries if have is None or entry.partition("=")[0] in have]
+        plain, given = split_options(name)
+        listed = ",".join([*(f"{key}={value}" for key, value in given.items()), *own])
+        found.append(f"{plain}[{listed}]" if listed else plain)
+    return found

@@ -1,0 +1,90 @@
+"""The settings of commands: the same by option and by TOML, and names that help lists without an import."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import pytest
+import tomli_w
+
+from baselines.commands.command import program
+from baselines.commands.settings import NAMES, RANDOMIZE, Configured, Kind, Randomize
+from baselines.commands.start import load
+from baselines.registry import CONTROLLERS
+from birthsim.door import COMMANDS
+from birthsim.export import FORMS
+from birthsim_env.parts.drawn.randomization import RANDOMIZE as WORDS
+from birthsim_env.parts.hands.moving_hands import HANDS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from tests.console import ROOT, assert_says, call
+
+EXAMPLES = {
+    **{name: (one.package, one.module, one.example.split()[1:]) for name, one in COMMANDS.items()},
+    **{form: (one[0], f"commands.{one[1]}", ["--to", form, *one[3].split()]) for form, one in FORMS.items()},
+}
+"""Command, or form of an export -> package, module, arguments of its example."""
+TYPED = [name for name, (_, module, _) in EXAMPLES.items() if name not in ("export", "study") and module != "commands.live"]
+
+
+@pytest.mark.parametrize("name", TYPED)
+def test_an_example_is_read_and_says_the_same_as_toml(name, tmp_path):
+    package, module, line = EXAMPLES[name]
+    settings = load("birthsim", package, module).Settings
+    typed = program(name, settings)(line)
+    assert isinstance(typed, settings)
+    if not isinstance(typed, Configured):
+        return
+    said = {key: str(value) if isinstance(value, Path) else value for key, value in vars(typed).items() if value is not None}
+    (tmp_path / "own.toml").write_text(tomli_w.dumps(said))
+    read = program(name, settings)(["--config", str(tmp_path / "own.toml")])
+    assert replace(read, config=None) == typed
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("sensor = 'lab'", ("sensor", "--sensors", "own.toml")),
+        ("sensors = 'la'", ("sensors", "la", "ideal", "lab", "honest", "own.toml")),
+        ("seed = -1", ("seed", "'-1'", "a whole number from 0 to 4294967295")),
+        ("seed = 3.0", ("seed", "'3.0'", "a whole number from 0 to 4294967295")),
+        ("seed = [1, 2]", ("seed", "own.toml")),
+        ("[world]\nseed = 3", ("[world][seed]", "own.toml", "birthsim run --help")),
+        ("seed =", ("--config", "own.toml", "no TOML")),
+    ],
+)
+def test_what_is_wrong_in_toml_is_named(content, said, monkeypatch, capsys, tmp_path):
+    (tmp_path / "own.toml").write_text(content)
+    status, _, complained = call("run", monkeypatch, capsys, "--config", tmp_path / "own.toml", "--out", tmp_path / "x")
+    assert status == 2
+    assert complained.count("\n") == 1
+    assert_says(said, complained)
+
+
+def test_what_is_typed_counts_more_than_toml(tmp_path):
+    (tmp_path / "own.toml").write_text("seed = 4\nset = ['bandwidth=60']\nuser-force = 'sine'\nrandomize = 'all'\n")
+    read = program("birthsim run", load("birthsim", "birthsim", "run").Settings)
+    given = read(
+        ["--config", str(tmp_path / "own.toml"), "--out", "x", "--seed", "5", *["--set", "a=1", "b=2", "--set", "c=3"]]
+    )
+    assert (given.seed, given.set, given.user_force, given.randomize) == (5, ["a=1", "b=2", "c=3"], "sine", "all")
+
+
+def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
+    assert set(get_args(Kind)) == {"ideal", "lab", "honest"} <= set(SENSORS)  # other tests register another one
+    assert set(get_args(get_args(Randomize)[0])) == set(RANDOMIZE)
+    assert set(RANDOMIZE.values()) == set(WORDS)
+    assert [name for name in CONTROLLERS if name not in NAMES] == []
+    _, printed, _ = call("run", monkeypatch, capsys, "--help")
+    assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
+
+
+def test_help_of_an_episode_loads_nothing_that_is_slow():
+    program = "import sys; from birthsim.door import main; main(); print(*sorted(sys.modules))"
+    line = [sys.executable, "-c", program, "run", "--help"]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert {"numpy", "numba", "gymnasium", "birthsim_env"} & set(done.stdout.splitlines()[-1].split()) == set()
