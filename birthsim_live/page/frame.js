@@ -1,4 +1,4 @@
-// The numbers of an instant, and what follows from them, as of birthsim_live/rig/frames.py. A rig in a worker needs it too.
+// The numbers of an instant, as recordings hold them (birthsim_live/logs/recording.py), and what follows from them.
 
 export const FIELDS = {
   time: 1, episode_time: 1, joints: 2, position: 2, velocity: 2, target: 2, compliant: 2, scenario_force: 2, drag_force: 2,

@@ -12,7 +12,7 @@ const GROUPS = {
 const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
 
 export class Settings {
-  /** `change(settings)` asks the server; what it answers comes back through `show`. */
+  /** `change(settings)` asks the rig; what it answers comes back through `show`. */
   constructor(form, change) {
     this.form = form;
     this.change = change;

@@ -1,4 +1,4 @@
-// Plays a recording in this window, with the face of a connection: the messages are those of birthsim live --replay.
+// Plays a recording, with the face of a connection.
 
 import { FIELDS, frameOf } from "../frame.js";
 
@@ -24,7 +24,6 @@ export class Player {
     cancelAnimationFrame(this.due);
   }
 
-  /** Act as the server does. */
   send({ type, paused, speed, time }) {
     if (type === "pause") {
       if (!paused && this.ended) this.position = 0;

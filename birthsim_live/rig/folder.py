@@ -1,0 +1,61 @@
+"""The page with a rig, as a folder of files that any server can show."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from birthsim_build.faces.javascript import write_module
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.pack import Packed, pack
+
+PAGE = Path(__file__).resolve().parent.parent / "page"
+"""HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the
+code of every rig, ``loop.bin`` and ``pack.json``."""
+
+
+def packed_page(rig: Parameters, policies: Sequence[str] = ()) -> Packed:
+    """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped."""
+    content = json.loads((PAGE / "rig" / "pack.json").read_text(encoding="utf-8"))
+    built = Packed(content, content.pop("index"), np.fromfile(PAGE / "rig" / "loop.bin", dtype=np.int64))
+    return built if rig == Parameters() and not policies else pack(rig, [*shipped_policies(), *policies], content["functions"])
+
+
+def shipped_policies() -> list[str]:
+    """Policies that come with the package; none without the extra that policies need."""
+    try:
+        from agents.policy.seeds import shipped_names
+    except ImportError:
+        return []
+    return shipped_names()
+
+
+def write_page(folder: Path, packed: Packed, recording: Path | None = None) -> int:
+    """Write the page of what is ``packed`` into ``folder``, which must be new or empty; its bytes. With a ``recording`` the
+    page plays that.
+
+    Raises ``ValueError`` for a folder with something in it.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
+    with tempfile.TemporaryDirectory() as place:
+        made = Path(place) / "page"
+        shutil.copytree(PAGE, made)
+        own = made / "rig"
+        (own / "pack.json").write_text(compact(packed.content))
+        write_module(packed.index, own)
+        packed.words.tofile(own / "loop.bin")
+        if recording is not None:
+            shutil.copyfile(recording, own / "replay.rec")
+        shutil.copytree(made, folder, dirs_exist_ok=True)
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def compact(content: object) -> str:
+    """It as JSON without spaces."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False)
