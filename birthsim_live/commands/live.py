@@ -6,14 +6,12 @@ import argparse
 from pathlib import Path
 
 from baselines.commands.shared import run
-from birthsim_build.loops import RESIDUAL
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.logs.recording import load_recording
-from birthsim_live.rig.folder import packed_page, write_page
-from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.pack import Packed
+from birthsim_live.rig.folder import Packed, packed_page, write_page
+from birthsim_live.rig.settings import RESIDUAL
 from birthsim_live.server.addresses import listen
 
 
@@ -89,10 +87,13 @@ def _replay(arguments: argparse.Namespace) -> None:
         if getattr(arguments, name):
             raise ValueError(f"--{name} with --replay; allowed: without it, a recording has its own rig")
     need_server()
+    from birthsim_live.rig.greeting import greeting  # which draws
+
     file: Path = arguments.replay
     with listen(arguments.host, 8001 if arguments.port is None else arguments.port) as listening:
         recording = load_recording(file)
         packed = packed_page(Parameters())
         # It draws the recording's rig; the one that it could run stands still and is not seen.
-        packed.content["hello"].update(greeting(recording.rig, []), replay=file.name)
+        hello = packed.content["hello"]
+        hello |= {**greeting(recording.rig, hello["choices"]["controller"]), "replay": file.name}
         serve(packed, recording.rig, listening, arguments, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")

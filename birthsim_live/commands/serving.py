@@ -15,8 +15,7 @@ from baselines.commands.shared import finite_number
 from baselines.commands.start import endings
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
-from birthsim_live.rig.folder import write_page
-from birthsim_live.rig.pack import Packed
+from birthsim_live.rig.folder import Packed, write_page
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
 
 REQUEST_TIME = 10.0

@@ -6,24 +6,39 @@ import json
 import shutil
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from birthsim_build.faces.javascript import write_module
+from birthsim_build.faces.module import write_module
+from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.pack import Packed, pack
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 """HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the
 code of every rig, ``loop.bin`` and ``pack.json``."""
 
 
+@dataclass(frozen=True)
+class Packed:
+    """What the worker must know (``content``), the module's ``index``, and the ``words`` of all parts."""
+
+    content: dict[str, Any]
+    index: dict[str, Any]
+    words: Words
+
+
 def packed_page(rig: Parameters, policies: Sequence[str] = ()) -> Packed:
     """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped."""
     content = json.loads((PAGE / "rig" / "pack.json").read_text(encoding="utf-8"))
     built = Packed(content, content.pop("index"), np.fromfile(PAGE / "rig" / "loop.bin", dtype=np.int64))
-    return built if rig == Parameters() and not policies else pack(rig, [*shipped_policies(), *policies], content["functions"])
+    if rig == Parameters() and not policies:
+        return built
+    from birthsim_live.rig.pack import pack  # which takes a second to load
+
+    return pack(rig, [*shipped_policies(), *policies], content["functions"])
 
 
 def shipped_policies() -> list[str]:

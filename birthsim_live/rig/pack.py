@@ -6,7 +6,6 @@ The files of ``page/worker`` read it. The code of the parts is the same for ever
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,12 @@ import numpy as np
 import birthsim_env
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.controller import BacksteppingController
-from baselines.registry import make_controller
+from baselines.registry import LISTED, UNCONTROLLED, make_controller
 from baselines.rivals.tracking import TrackingController
 from baselines.staged import StagedController
-from birthsim_build.faces.javascript import Store
-from birthsim_build.image import INPUT_MEMORY, Part, Words, function_name
-from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, RESIDUAL, staged_part
+from birthsim_build.faces.module import Store
+from birthsim_build.image import INPUT_MEMORY, Part, function_name
+from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, staged_part
 from birthsim_build.stages import Period, enter_sensors, leave_sensors
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import ASKED, WORLD
@@ -37,8 +36,9 @@ from birthsim_env.physics.strength import require_carried
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
+from birthsim_live.rig.folder import Packed
 from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.settings import OPENS, STIFFNESSES, controller_choice, controller_names
+from birthsim_live.rig.settings import OPENS, RESIDUAL, STIFFNESSES, controller_choice
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
@@ -57,15 +57,6 @@ that is frozen would pull for ever); control periods between rows of a recording
 time."""
 
 
-@dataclass(frozen=True)
-class Packed:
-    """What the worker must know (``content``), the module's ``index``, and the ``words`` of all parts."""
-
-    content: dict[str, Any]
-    index: dict[str, Any]
-    words: Words
-
-
 def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None = None) -> Packed:
     """All that a rig in the browser is made of, with ``policies`` (folders or shipped names), for code that has ``functions``;
     without them, for code that is to be built.
@@ -74,7 +65,8 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
     """
     if not options.are_off(parameter_array(rig, 1)) or not spools.are_perfect(parameter_array(rig, 1)):
         raise ValueError("the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed in the page: none")
-    controllers, period = [controller_choice(name) for name in controller_names(policies)], rig.electronics.control_period
+    names, period = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies)], rig.electronics.control_period
+    controllers = [controller_choice(name) for name in names]
     laws = {one["name"]: parts for one in controllers if (parts := controller(one["name"], rig)) is not None}
     for one in controllers:
         if one["name"] not in laws:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from baselines import about
-from baselines.registry import LISTED, UNCONTROLLED
-from birthsim_build.loops import RESIDUAL
 from birthsim_env.physics.rig.parameters import Parameters
 
 STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
 """Settings that take the place of the scenario's setpoints, in the order of a reference's rows 8 to 11."""
+
+RESIDUAL = "residual"
+"""Controller whose policies are choices of their own: ``residual:circle``."""
 
 NOTHING = "nothing"
 """What a rig is compared with where no second one is beside it."""
@@ -74,8 +74,3 @@ def controller_choice(name: str) -> dict[str, str]:
         "title": Path(name).name.replace("-", " "),
         "about": about.CONTROLLERS.get(name, "A controller of your own."),
     }
-
-
-def controller_names(policies: Sequence[str]) -> list[str]:
-    """Every controller that is compared, and ``policies``, folders or shipped names."""
-    return [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{policy}" for policy in policies)]

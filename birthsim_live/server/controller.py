@@ -18,8 +18,6 @@ import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from baselines.controller import Controller, checked_command
-from baselines.registry import listed_names, make_controller
-from birthsim_build.loops import RESIDUAL
 from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
@@ -33,20 +31,24 @@ def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -
     """
     choices = content["hello"]["choices"]
     known = {one["name"]: one for one in choices["controller"]}
-    for name in dict.fromkeys([*listed_names(), *asked]):
-        if name == RESIDUAL or (name in known and "missing" not in known[name]):
-            continue
+    for name in dict.fromkeys(asked):
         if name not in known:
-            make_controller(name, rig)
-            known[name] = controller_choice(name)
-            for several in ("controller", "compare"):
-                choices[several].append(known[name])
-        for one in (*choices["controller"], *choices["compare"]):
-            if one["name"] == name:
-                one.pop("missing", None)
-                if name == "nonlinear-mpc" and importlib.util.find_spec("casadi") is None:
-                    one["missing"] = "pip install 'birthsim[mpc]'"
-        content["python"].append(name)
+            made(name, rig)
+            known[name] = {**controller_choice(name), "missing": ""}
+            choices["controller"].append(known[name])
+    content["python"] = [name for name, one in known.items() if "missing" in one]
+    for name in content["python"]:
+        known[name].pop("missing")
+    if importlib.util.find_spec("casadi") is None:
+        known["nonlinear-mpc"]["missing"] = "pip install 'birthsim[mpc]'"
+    choices["compare"][1:] = choices["controller"]
+
+
+def made(name: str, rig: Parameters) -> Controller:
+    """The controller ``name``."""
+    from baselines.registry import make_controller  # which takes a third of a second to load
+
+    return make_controller(name, rig)
 
 
 async def command(socket: WebSocket, rig: Parameters, names: Collection[str]) -> None:
@@ -60,7 +62,7 @@ async def command(socket: WebSocket, rig: Parameters, names: Collection[str]) ->
     # One thread, as in a program: what a controller imports may ask for that.
     with ThreadPoolExecutor(1) as thread:
         try:
-            law = await loop.run_in_executor(thread, make_controller, name, rig)
+            law = await loop.run_in_executor(thread, made, name, rig)
             while True:
                 numbers = np.frombuffer(await socket.receive_bytes())
                 answer = await loop.run_in_executor(thread, openings, law, name, rig, numbers)

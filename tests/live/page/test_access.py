@@ -161,7 +161,7 @@ def test_frames_without_numbers_are_shown_as_such(window, tmp_path):
     # At its end a replay halts, and plays on from wherever it is put; paused, it stays there.
     window.page.evaluate("birthsim.send({ type: 'pause', paused: true })")
     window.wait("birthsim.state.paused")
-    for time, shown in ((0.5, "–"), (0.2, "+0.0")):
+    for time, shown in ((0.5, "–"), (0.1, "+0.0")):
         window.page.locator("#scrub").fill(str(time))
         window.wait(f"document.querySelector('[data-figure=displacement] dd').textContent.startsWith('{shown}')")
 
