@@ -8,24 +8,22 @@ export const FIELDS = {
 export const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
 export const LEAST_GIVEN = 1e-4;
 
-const told = (value) => (Number.isFinite(value) ? value : null);
-
-/** An instant, name -> numbers in the order of FIELDS, as a frame: null where there is no number. */
+/** An instant, name -> numbers in the order of FIELDS, as a frame: NaN where there is no number. */
 export function frameOf(now, geometry) {
   const force = now.scenario_force.map((value, k) => value + now.drag_force[k]);
   const given = now.position.map((value, k) => value - now.target[k]);
   const off = now.position.map((value, k) => value - now.compliant[k]);
   const rendered = force.map((f, k) => {
     const says = Math.abs(f) >= LEAST_FORCE && Math.abs(given[k]) >= LEAST_GIVEN && f * given[k] > 0;
-    return says ? f / given[k] : null;
+    return says ? f / given[k] : NaN;
   });
-  const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? told(values[0]) : values.map(told)]);
+  const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? values[0] : values]);
   return {
     ...Object.fromEntries(named),
     pointer: now.pointer.every(Number.isFinite) ? now.pointer : null,
-    force: force.map(told),
-    error_mm: told(1e3 * Math.hypot(...off)),
-    rendered: rendered.map(told),
+    force,
+    error_mm: 1e3 * Math.hypot(...off),
+    rendered,
     linkage: linkage(now.joints, geometry),
   };
 }

@@ -97,14 +97,14 @@ const source = new Source({
   history: ({ frames }) => {
     whole.clear();
     rigs.clear();
-    for (const frame of frames.map(withNumbers)) {
+    for (const frame of frames) {
       rigs.note(frame);
       whole.push(frame.time, rowOf(frame, rigs.rms));
     }
     plots.show(whole, rig.hello.state.duration);
   },
-  frame: (message) => {
-    const frame = (rig.frame = withNumbers(message));
+  frame: (frame) => {
+    rig.frame = frame;
     rig.monitor.received += 1;
     rigs.push(frame);
     if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms));
@@ -122,13 +122,6 @@ function setUpSettings(message) {
     if (Object.keys(wished).length) change(wished);
   }
   link.setUp(message.defaults);
-}
-
-/** A message has null where there is no number: NaN computes like one. */
-function withNumbers(frame) {
-  const number = (value) => value ?? NaN;
-  const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
-  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm), second: frame.second && withNumbers(frame.second) };
 }
 
 function showSettings(values) {

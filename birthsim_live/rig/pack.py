@@ -38,7 +38,7 @@ from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
 from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.settings import OPENS, RESIDUAL, STIFFNESSES, controller_choice
+from birthsim_live.rig.settings import OPENS, RESIDUAL, controller_choice
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
@@ -50,6 +50,13 @@ WITHOUT = "only with birthsim live"
 
 DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
 """Laws that can be told to damp more."""
+
+INFO = {
+    "joints": "piston_position", "position": "position", "velocity": "velocity", "target": "target",
+    "compliant": "compliant_target", "pressures": "pressure", "openings": "opening", "stiffness": "stiffness_setpoint",
+    "pneumatic": "pneumatic_stiffness", "pneumatic_setpoint": "pneumatic_stiffness_setpoint",
+}  # fmt: skip
+"""Field of a frame -> what it is in ``Info``."""
 
 NUMBERS = {"patience": 3.0, "every": EVERY, "longest": 600.0, "slowest": 0.05}
 """Assumed: s after which a hand that has not been heard of lets go (the page tells of one that rests every 0.3 s, and a window
@@ -94,10 +101,9 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         "hello": hello,
         "opens": {"controller": OPENS},
         "python": [],
-        "stiffnesses": STIFFNESSES,
         "signals": [WORLD, ASKED],
         "info": {
-            **{name: [group.first, group.count] for name, group in Info.groups.items()},
+            **{name: [Info.groups[own].first, FIELDS[name]] for name, own in INFO.items()},
             "friction": [Info.size, 2], "flows": [Info.size + 2, 4],
         },
         "rig": rig_numbers(rig),

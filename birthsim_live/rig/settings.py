@@ -9,9 +9,6 @@ from typing import Any
 from baselines import about
 from birthsim_env.physics.rig.parameters import Parameters
 
-STIFFNESSES = ("Kclx", "Kcly", "Kpneu1", "Kpneu2")
-"""Settings that take the place of the scenario's setpoints, in the order of a reference's rows 8 to 11."""
-
 RESIDUAL = "residual"
 """Controller whose policies are choices of their own: ``residual:circle``."""
 

@@ -87,7 +87,7 @@ export class Player {
   named(row, time) {
     const { rigs, width } = this.recording;
     const second = rigs === 2 ? this.one(row.subarray(width / 2), time) : null;
-    return { ...this.one(row, time), second: second?.episode_time == null ? null : second };
+    return { ...this.one(row, time), second: Number.isFinite(second?.episode_time) ? second : null };
   }
 
   /** The numbers of one rig. */

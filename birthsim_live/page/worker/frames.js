@@ -2,12 +2,6 @@
 
 import { FIELDS, frameOf as completed } from "../frame.js";
 
-const INFO = {
-  joints: "piston_position", position: "position", velocity: "velocity", target: "target", compliant: "compliant_target",
-  pressures: "pressure", openings: "opening", stiffness: "stiffness_setpoint", pneumatic: "pneumatic_stiffness",
-  pneumatic_setpoint: "pneumatic_stiffness_setpoint", friction: "friction", flows: "flows",
-};
-
 /** The present instant: name -> numbers, in the order of FIELDS. */
 export function instant(session) {
   const { pack, hands } = session;
@@ -20,7 +14,7 @@ export function instant(session) {
     pointer: hands.pointer(session.some("x", 2), session.loop.get("pointer_stiffness")),
   };
   const of = (name) => {
-    const [first, count] = pack.info[INFO[name]];
+    const [first, count] = pack.info[name];
     return Array.from(info.subarray(first, first + count));
   };
   return Object.fromEntries(Object.keys(FIELDS).map((name) => [name, known[name] ?? of(name)]));

@@ -2,7 +2,7 @@
 
 import { INDEX, Loop, ROW } from "../rig/birthsim.js";
 import { Remote } from "./remote.js";
-import { NOTHING, merged } from "./settings.js";
+import { NOTHING, STIFFNESSES, merged } from "./settings.js";
 
 // Parts that run together.
 const LAW = ["policy", "law"];
@@ -14,6 +14,7 @@ const SHOW = ["show"];
 // Parts that are exchanged together.
 const SCENARIO = ["target", "setpoints", "hand"];
 const SENSORS = ["sensors", "board"];
+const STATES = 18;
 const PASSES = ["target", "setpoints", "force"]; // what can pass over smoothly
 
 export class Session {
@@ -231,8 +232,8 @@ export class Session {
   leftRange() {
     const { pack, loop } = this;
     const name = Object.keys(pack.range).find((one) => !(loop.get(one) > pack.range[one][0] && loop.get(one) < pack.range[one][1]));
-    if (!name && Number.isFinite(loop.get("v1"))) return null;
-    if (!name || !Number.isFinite(loop.get(name))) return "the state is no longer finite";
+    if (!loop.rows.subarray(ROW.y1, ROW.y1 + STATES).every(Number.isFinite)) return "the state is no longer finite";
+    if (!name) return null;
     const [kind, unit] = name.startsWith("P") ? ["pressure", "Pa"] : ["temperature", "K"];
     const words = [loop.get(name), ...pack.range[name]].map((value) => Number(value.toPrecision(6)));
     return `${kind} of chamber ${name.slice(1).toUpperCase()} = ${words[0]} ${unit}; the model holds from ${words[1]} to ${words[2]}`;
@@ -246,7 +247,7 @@ export class Session {
   /** What the scenario asks for at this time. */
   scenarioSetpoints() {
     const asked = this.some("scenario_Kclx", 4);
-    return Object.fromEntries(this.pack.stiffnesses.map((name, k) => [name, Math.round(1e3 * asked[k]) / 1e3]));
+    return Object.fromEntries(STIFFNESSES.map((name, k) => [name, Math.round(1e3 * asked[k]) / 1e3]));
   }
 
   /** The settings as the page shows them: with the scenario's setpoints where they hold. */

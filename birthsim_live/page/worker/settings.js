@@ -1,7 +1,7 @@
 // What a person can set, and what is refused.
 
 export const NOTHING = "nothing"; // to compare with
-const STIFFNESSES = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
+export const STIFFNESSES = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"]; // instead of the scenario's setpoints, in the order of a reference
 
 /** `changes` if all are allowed; else an error that names the setting, its value and what is allowed. */
 export function checked(changes, { choices, ranges, defaults }) {

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-
 import pytest
 
-from tests.build.targets import need_program
+from tests.live.rig.worker import node
 
 SCRIPT = """
 import { Pace } from "./worker/clock.js";
@@ -60,12 +57,7 @@ MOST_LAG = 0.05  # s
 
 @pytest.fixture(scope="module")
 def told(page):
-    need_program("node", "nodejs")
-    (page / "package.json").write_text('{"type": "module"}')
-    (page / "clock.js").write_text(SCRIPT)
-    done = subprocess.run(["node", "clock.js"], cwd=page, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return node(page, SCRIPT)
 
 
 def test_what_is_due_follows_the_wall_and_the_speed(told):

@@ -72,17 +72,22 @@ class Told(NamedTuple):
         return self.row[-1, SLICES[name]]
 
 
+def node(folder: Path, script: str, given: Any = None) -> Any:
+    """What a script beside the page in ``folder`` prints as JSON; it reads what is ``given`` from its input."""
+    need_program("node", "nodejs")
+    (folder / "package.json").write_text('{"type": "module"}')
+    (folder / "try.js").write_text(script)
+    done = subprocess.run(["node", "try.js"], cwd=folder, input=json.dumps(given), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 def run(folder: Path, *cases: list[tuple[str, Any]]) -> list[list[Told]]:
     """What a rig says after each step of each case, ("set" | "reset" | "hold" | "put" | "advance", value); ``folder`` holds the
     page."""
-    need_program("node", "nodejs")
-    (folder / "package.json").write_text('{"type": "module"}')
-    (folder / "try.js").write_text(SCRIPT)
-    done = subprocess.run(["node", "try.js"], cwd=folder, input=json.dumps(cases), capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
     def told(said: dict[str, Any]) -> Told:
         widths, texts = (ROWS, ROWS, COLUMNS, COLUMNS), said.pop("rows")
         return Told(*(np.frombuffer(base64.b64decode(t)).reshape(-1, n) for t, n in zip(texts, widths, strict=True)), **said)
 
-    return [[told(one) for one in case] for case in json.loads(done.stdout)]
+    return [[told(one) for one in case] for case in node(folder, SCRIPT, cases)]

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 from typing import Any
 
 import pytest
 
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.folder import PAGE, packed_page
-from tests.build.targets import need_program
+from tests.live.rig.worker import node
 
 SCRIPT = """
 import { readFileSync } from "node:fs";
-const [link, worker, cases, pack] = process.argv.slice(2);
-const { settingsIn } = await import(link), { checked } = await import(worker);
-const about = JSON.parse(readFileSync(pack));
+import { settingsIn } from "./link.js";
+import { checked } from "./worker/settings.js";
+
+const { hello } = JSON.parse(readFileSync("rig/pack.json"));
 const outcome = (search) => {
-  const read = settingsIn(search, about.defaults);
+  const read = settingsIn(search, hello.defaults);
   try {
-    return [read, checked(read, about) && ""];
+    return [read, checked(read, hello) && ""];
   } catch (error) {
     return [read, error.message];
   }
 };
-console.log(JSON.stringify(JSON.parse(cases).map(outcome)));
+console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(outcome)));
 """
 CASES = {
     "": {},
@@ -42,18 +39,9 @@ CASES = {
 
 
 @pytest.fixture(scope="module")
-def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def outcomes(page) -> dict[str, Any]:
     """Address -> what the page reads in it, and how the worker refuses that."""
-    need_program("node", "nodejs")
-    folder = tmp_path_factory.mktemp("link")
-    # Node takes modules by this ending, or by a package.json, which the page has no use for.
-    for name, place in (("link", "link.js"), ("settings", "worker/settings.js")):
-        (folder / f"{name}.mjs").write_text((PAGE / place).read_text(encoding="utf-8"), encoding="utf-8")
-    (folder / "try.mjs").write_text(SCRIPT)
-    (folder / "pack.json").write_text(json.dumps(packed_page(Parameters()).content["hello"]))
-    line = ["node", "try.mjs", "./link.mjs", "./settings.mjs", json.dumps(list(CASES)), "pack.json"]
-    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=True)
-    return dict(zip(CASES, json.loads(done.stdout), strict=True))
+    return dict(zip(CASES, node(page, SCRIPT, list(CASES)), strict=True))
 
 
 @pytest.mark.parametrize("search", CASES)
