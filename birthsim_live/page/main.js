@@ -168,7 +168,7 @@ function draw(now) {
     magnifier.draw(frame, rigs.scenes[0].pen.scale);
     rigs.draw(frame, magnifier.window);
     rig.monitor.drew(frame);
-    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
+    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost.replace(/[.]?$/, ".")} Press R to reset.` : "");
   }
   transport.step(frame);
   const [one, k] = [rigs.rigOf(frame), rigs.chosen];

@@ -28,7 +28,7 @@ from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, Parts
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics import options, spools
+from birthsim_env.physics import options
 from birthsim_env.physics.compiled.lanes import PRESSURES, STATE_NAMES, TEMPERATURES, parameter_array, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -70,8 +70,8 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
 
     Raises ``ValueError`` for a rig with options of ``physics.options``, and for one that cannot do what the page opens with.
     """
-    if not options.are_off(parameter_array(rig, 1)) or not spools.are_perfect(parameter_array(rig, 1)):
-        raise ValueError("the rig has imperfect valves, tubes, a weak supply or a soft structure; allowed in the page: none")
+    if not options.are_off(parameter_array(rig, 1)):
+        raise ValueError("the rig has tubes, a weak supply or a soft structure; allowed in the page: none")
     names, period = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies)], rig.electronics.control_period
     controllers = [controller_choice(name) for name in names]
     laws = {one["name"]: parts for one in controllers if (parts := controller(one["name"], rig)) is not None}
@@ -89,7 +89,9 @@ def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None =
         "sensors": {name: sensors(name, rig) for name in SENSORS},
         "controllers": {name: own for name, (own, _) in laws.items()},
     }  # fmt: skip
-    functions = functions or sorted({function_name(stage) for part in _all(tree) for stage in part.stages})
+    if functions is None:  # those of valves that open imperfectly too
+        worn = plant_stage(Plant(rig.replace({"valves.deadband": 0.01})), period)
+        functions = sorted({function_name(stage) for part in (*_all(tree), _part(worn)) for stage in part.stages})
     store, hello = Store(functions), greeting(rig, controllers)
     for one in hello["choices"]["scenario"]:
         if problem := _problem(one["name"], rig):

@@ -112,6 +112,7 @@ export class Session {
     const { loop, settings } = this;
     this.episode = 0;
     this.lost = null;
+    this.put(["plant"], this.pack.parts.rig); // worn valves remember
     this.putScenario();
     this.putSensors();
     this.describeRig();

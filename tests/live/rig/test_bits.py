@@ -13,7 +13,7 @@ from birthsim_env import Parameters, StiffnessSchedule, UserForce
 from birthsim_env.loop.rows import SINCE_JUMP
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_live.rig.folder import packed_page
+from birthsim_live.rig.folder import packed_page, write_page
 from tests.build.targets import assert_same_bits
 from tests.live.rig.worker import run
 
@@ -26,6 +26,7 @@ OFFERED = [
     for one in packed_page(Parameters()).content["hello"]["choices"]["controller"]
     if "missing" not in one and not one["name"].startswith("limited")
 ]
+DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
 FEW = {"backstepping", "admittance-backstepping", "residual:circle", "lqr"}
 
 
@@ -71,24 +72,25 @@ class Chosen(StiffnessSchedule):
         return np.repeat(self._rows, len(time), axis=1)
 
 
-def expected(controller, settings, hold):
+def expected(controller, settings, hold, rig):
     """What Gymnasium's environment does under such settings and such a hand."""
     scenario, sensors = settings.get("scenario", "probe"), settings.get("sensors", "ideal")
     friction, world = (
         settings.get("friction", 1.0),
         {"user_force": Hand(scenario, settings.get("scenario_force", False), **hold)},
     )
-    rig, changes = Parameters(), {"mechanics.mass": settings.get("mass", 3.0)}
+    changes = {"mechanics.mass": settings.get("mass", rig.mechanics.mass)}
     for name, cylinder in (("cylinder1", rig.cylinder1), ("cylinder2", rig.cylinder2)):
         changes[f"{name}.coulomb_friction"] = cylinder.coulomb_friction * friction
         changes[f"{name}.viscous_friction"] = cylinder.viscous_friction * friction
     if "Kclx" in settings:
         world["stiffness"] = Chosen(settings["Kclx"])
     valves = settings.get("valves", "two_valves")
-    return loop_rows(scenario, sensors, controller, PERIODS, parameters=rig.replace(changes), valves=valves, **world)[:, ROWS]
+    true = rig.replace(changes)
+    return loop_rows(scenario, sensors, controller, PERIODS, rig=rig, parameters=true, valves=valves, **world)[:, ROWS]
 
 
-def check(page, *cases):
+def check(page, *cases, rig=DEFAULT):
     """Cases of settings and a hand."""
     steps = [
         [("set", {"controller": "admittance-backstepping", **settings}), ("reset", None), ("hold", hold), ("advance", PERIODS)]
@@ -96,9 +98,9 @@ def check(page, *cases):
     ]
     for (settings, hold), told in zip(cases, run(page, *steps), strict=True):
         law = settings.get("controller", "admittance-backstepping")
-        assert_same_bits(told[-1].rows[:, ROWS], expected(law, settings, hold or {}))
+        assert_same_bits(told[-1].rows[:, ROWS], expected(law, settings, hold or {}, rig))
         if "compare" in settings:
-            assert_same_bits(told[-1].second_rows[:, ROWS], expected(settings["compare"], settings, hold or {}))
+            assert_same_bits(told[-1].second_rows[:, ROWS], expected(settings["compare"], settings, hold or {}, rig))
 
 
 def on_the_circle(name, sensors):
@@ -142,3 +144,9 @@ def test_another_rig_other_setpoints_one_valve_and_hands(page):
 )
 def test_both_rigs_are_what_each_would_be_alone(page, one, other):
     check(page, ({**on_the_circle(one, "lab"), "compare": other, "mass": 4.0}, PULL))
+
+
+@pytest.mark.slow
+def test_a_rig_of_ones_own_with_worn_valves(tmp_path):
+    write_page(tmp_path / "page", packed_page(WORN))
+    check(tmp_path / "page", (on_the_circle("admittance-backstepping", "lab"), PULL), rig=WORN)

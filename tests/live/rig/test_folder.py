@@ -68,7 +68,7 @@ def test_what_is_no_policy_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[valves]\ndeadband = 0.02\n", "imperfect valves"),
+        ("[chambers]\ntube_length = 1.0\n", "tubes"),
         ("[mechanics]\nmass = 90.0\n", "mass"),
     ],
 )
