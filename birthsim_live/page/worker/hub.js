@@ -21,6 +21,7 @@ export class Hub {
     this.post({ type: "hello", mode: "live", ...this.pack.hello, settings: settings.settings, state });
     this.clock.paused = Boolean(this.pack.hello.replay); // nobody sees it
     this.clock.start();
+    this.receive({ type: "set", settings: this.pack.opens });
   }
 
   async receive(message) {
@@ -34,17 +35,13 @@ export class Hub {
     }
   }
 
-  on_drag({ position, id }) {
-    this.hold({ position, id });
-  }
-
-  on_push({ force, id }) {
-    this.hold({ force, id });
-  }
-
-  hold(hold) {
+  on_drag(hold) {
     this.session.hands.hold = hold;
     this.heard = performance.now();
+  }
+
+  on_push(hold) {
+    this.on_drag(hold);
   }
 
   on_release() {

@@ -19,9 +19,4 @@ async function begin() {
 const hub = begin();
 // What comes while the rig is loading waits for it, in order.
 addEventListener("message", async ({ data }) => (await hub).receive(data));
-hub
-  .then((running) => {
-    running.start();
-    running.receive({ type: "set", settings: running.pack.opens });
-  })
-  .catch((error) => postMessage({ type: "failed", message: error.message }));
+hub.then((running) => running.start()).catch((error) => postMessage({ type: "failed", message: error.message }));

@@ -17,6 +17,9 @@ from tests.live.recordings.made import example, write_recording
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
+DRAWN = """[...document.querySelectorAll('.plot canvas')].some((canvas) =>
+    canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0))"""
+"""Only plots that can be seen are drawn."""
 CUT = """[...document.querySelectorAll('label, button, figcaption, legend, dt, dd, .status, .hint, h1')]
     .filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"""
 CUT_CHOICES = """[...document.querySelectorAll('select')].filter((e) => e.offsetParent).filter((e) => {
@@ -132,6 +135,8 @@ def test_a_window_of_any_size_shows_whole_words_and_scrolls_one_way(chromium, se
         assert window.value("document.documentElement.scrollWidth") <= width
         if width > 1080:
             assert window.value("document.documentElement.scrollHeight") <= height
+            window.wait(DRAWN)
+        assert window.value("document.querySelectorAll('#plots .plot canvas').length") == 6
         assert window.value(CUT) == []
         assert window.value(CUT_CHOICES) == []
         window.page.locator("#record").click()
