@@ -55,6 +55,18 @@ def test_what_goes_wrong_is_shown_and_a_reset_makes_it_anew(chromium, mine):
         mine.write_text(OWN)
 
 
+def test_a_slow_one_is_slow_motion_and_one_that_hangs_can_be_left(chromium, mine):
+    options = ("--controller", f"{mine}:Slow", "--compare", f"{mine}:Hangs")
+    with Server("live", *options) as server, Window(chromium, server.url) as window:
+        window.wait("birthsim.settings.compare.endsWith('Hangs') && birthsim.frame.real_time === 0")
+        window.page.locator("select[name=compare]").select_option("nothing")
+        window.wait("birthsim.frame.time > 0.02 && birthsim.frame.behind > 0.5")
+        window.wait("/^physics at [0-6] % of real time/.test(document.querySelector('#status').textContent)")
+        window.page.locator("select[name=controller]").select_option("pid")
+        window.wait("birthsim.settings.controller === 'pid' && birthsim.frame.real_time > 0.5")
+        assert window.complaints == []
+
+
 @pytest.mark.slow
 def test_a_server_that_has_gone_is_told(chromium, mine):
     with Server("live", "--controller", f"{mine}:Law") as server:

@@ -21,6 +21,8 @@ from tests.live.server.conftest import HERE
 
 SOCKET = "ws://127.0.0.1:8000/controller?name="
 OWN = """
+import time
+
 import numpy as np
 from baselines.registry import make_controller
 
@@ -35,6 +37,16 @@ class Law:
 class Fails(Law):
     def command(self, measurement, reference):
         return 1 / 0
+
+class Slow(Law):
+    def command(self, measurement, reference):
+        time.sleep(0.02)
+        return self.own.command(measurement, reference)
+
+class Hangs(Law):
+    def command(self, measurement, reference):
+        time.sleep(5.0)
+        return self.own.command(measurement, reference)
 
 class Wide(Law):
     def command(self, measurement, reference):
