@@ -7,9 +7,13 @@ import json
 import numpy as np
 import pytest
 
+import birthsim_env
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import FIELDS
 from birthsim_live.rig.build import build
-from birthsim_live.rig.folder import PAGE
+from birthsim_live.rig.folder import PAGE, compact, packed_page
+from birthsim_live.rig.greeting import greeting
+from birthsim_live.rig.pack import rig_numbers
 from tests.build.targets import need_linker
 
 BUILT = PAGE / "rig"
@@ -36,6 +40,14 @@ def test_data_are_equal(fresh):
     differs = np.flatnonzero(built != made)
     # Other processors design a linear regulator with other rounding errors.
     np.testing.assert_allclose(*(words[differs].view(np.float64) for words in (built, made)), rtol=1e-6, err_msg=RENEW)
+
+
+def test_it_says_what_the_words_and_the_rig_say():
+    packed, rig = packed_page(Parameters()), Parameters()
+    assert packed.content["birthsim"] == birthsim_env.__version__, RENEW
+    hello = json.loads(compact(greeting(rig, packed.content["hello"]["choices"]["controller"])))
+    assert packed.content["hello"] == hello, RENEW
+    assert packed.content["rig"] == json.loads(compact(rig_numbers(rig))), RENEW
 
 
 def test_it_is_small():
