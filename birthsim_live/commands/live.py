@@ -30,7 +30,8 @@ def main() -> None:
     parser.add_argument(
         "--controller",
         metavar="NAME",
-        help="open with this controller; one of your own, path/to/file.py:Class, runs in Python, and the rig waits for it",
+        help="open with this controller, such as lqr or pid[bandwidth=60]; one of your own, path/to/file.py:Class, runs in "
+        "Python, and the rig waits for it",
     )
     parser.add_argument("--compare", metavar="NAME", help="open with a second rig under this controller beside the first")
     parser.add_argument(
@@ -66,11 +67,10 @@ def _live(arguments: argparse.Namespace) -> None:
 
 def _packed(arguments: argparse.Namespace, rig: Parameters) -> Packed:
     """What the page of a rig is made of, with what it opens with."""
-    packed = packed_page(rig, arguments.policy)
-    opens = packed.content["opens"]
-    if arguments.policy:
-        opens["controller"] = f"{RESIDUAL}:{arguments.policy[0]}"
+    opens = {"controller": f"{RESIDUAL}:{arguments.policy[0]}"} if arguments.policy else {}
     opens |= {name: value for name in ("controller", "compare") if (value := getattr(arguments, name)) is not None}
+    packed = packed_page(rig, arguments.policy, opens.values())
+    packed.content["opens"] |= opens
     if arguments.static is None:
         from birthsim_live.server.controller import offer  # needs the extra
 

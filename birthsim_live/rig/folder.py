@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.settings import RESIDUAL
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 """HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the
@@ -30,15 +31,19 @@ class Packed:
     words: Words
 
 
-def packed_page(rig: Parameters, policies: Sequence[str] = ()) -> Packed:
-    """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped."""
+def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[str] = ()) -> Packed:
+    """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped, and
+    so are controllers that are ``asked`` for by name."""
     content = json.loads((PAGE / "rig" / "pack.json").read_text(encoding="utf-8"))
     built = Packed(content, content.pop("index"), np.fromfile(PAGE / "rig" / "loop.bin", dtype=np.int64))
-    if rig == Parameters() and not policies:
+    known = {one["name"] for one in content["hello"]["choices"]["controller"]}
+    others = [name for name in dict.fromkeys([*asked, *(f"{RESIDUAL}:{one}" for one in policies)]) if name not in known]
+    others = [name for name in others if ".py:" not in name]  # Python runs these
+    if rig == Parameters() and not others:
         return built
     from birthsim_live.rig.pack import pack  # which takes a second to load
 
-    return pack(rig, [*shipped_policies(), *policies], content["functions"])
+    return pack(rig, shipped_policies(), content["functions"], others)
 
 
 def shipped_policies() -> list[str]:

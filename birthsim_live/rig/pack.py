@@ -64,17 +64,21 @@ that is frozen would pull for ever); control periods between rows of a recording
 time."""
 
 
-def pack(rig: Parameters, policies: Sequence[str], functions: list[str] | None = None) -> Packed:
-    """All that a rig in the browser is made of, with ``policies`` (folders or shipped names), for code that has ``functions``;
-    without them, for code that is to be built.
+def pack(
+    rig: Parameters, policies: Sequence[str], functions: list[str] | None = None, others: Sequence[str] = ()
+) -> Packed:  # fmt: skip
+    """All that a rig in the browser is made of, with ``policies`` (folders or shipped names) and, of ``others`` than the
+    controllers that are listed, those that are compiled; for code that has ``functions``, without them for code that is to be
+    built.
 
     Raises ``ValueError`` for a rig with options of ``physics.options``, and for one that cannot do what the page opens with.
     """
     if not options.are_off(parameter_array(rig, 1)):
         raise ValueError("the rig has tubes, a weak supply or a soft structure; allowed in the page: none")
-    names, period = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies)], rig.electronics.control_period
-    controllers = [controller_choice(name) for name in names]
-    laws = {one["name"]: parts for one in controllers if (parts := controller(one["name"], rig)) is not None}
+    names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *others]
+    period = rig.electronics.control_period
+    laws = {name: parts for name in names if (parts := controller(name, rig, functions)) is not None}
+    controllers = [controller_choice(name) for name in names if name in laws or name not in others]
     for one in controllers:
         if one["name"] not in laws:
             one["missing"] = WITHOUT
@@ -188,9 +192,11 @@ def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
     return episodes
 
 
-def controller(name: str, rig: Parameters) -> tuple[dict[str, dict[str, Part]], bool] | None:
+def controller(
+    name: str, rig: Parameters, functions: Sequence[str] | None
+) -> tuple[dict[str, dict[str, Part]], bool] | None:  # fmt: skip
     """The parts of a controller whose law is compiled, for exact and for sampled positions, and whether it can be told to damp
-    more; None where it is not compiled."""
+    more; None where it is not compiled, or needs others than the ``functions`` of the code."""
     kinds = {"exact": False, "sampled": True}
     if name.startswith(f"{RESIDUAL}:"):
         try:
@@ -203,9 +209,11 @@ def controller(name: str, rig: Parameters) -> tuple[dict[str, dict[str, Part]], 
         law = make_controller(name, rig)
     except (ImportError, ValueError):
         return None
-    if not isinstance(law, StagedController):
+    if not isinstance(law, StagedController) or not law.is_compiled():
         return None
-    return {kind: {"law": staged_part(law, flag)} for kind, flag in kinds.items()}, isinstance(law, DAMPED)
+    parts = {kind: {"law": staged_part(law, flag)} for kind, flag in kinds.items()}
+    needed = {function_name(stage) for part in _all(parts) for stage in part.stages}
+    return (parts, isinstance(law, DAMPED)) if functions is None or needed <= set(functions) else None
 
 
 def _part(*own: Stage) -> Part:

@@ -27,8 +27,10 @@ def mine(tmp_path: Path) -> str:
 
 def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Path) -> None:
     rig = RIG.replace({"mechanics.mass": 2.5, "cylinder1.coulomb_friction": 9.0})
-    packed = packed_page(rig, [mine])
-    choices = {one["name"]: one for one in packed.content["hello"]["choices"]["controller"]}
+    packed = packed_page(rig, [mine, "forceps"])
+    listed = packed.content["hello"]["choices"]["controller"]
+    choices = {one["name"]: one for one in listed}
+    assert len(choices) == len(listed)
     assert "run 1" in choices[f"residual:{mine}"]["title"]
     numbers = packed.content["parts"]["controllers"]
     copied, other = numbers[f"residual:{mine}"], numbers["residual:forceps"]
@@ -87,6 +89,16 @@ def test_a_scenario_that_a_rig_cannot_do_is_no_choice() -> None:
     assert "missing" not in choices["probe"]
     assert choices["circle"]["missing"] == "not with this rig"
     assert "unreachable" in choices["circle"]["about"]
+
+
+def test_a_controller_with_options_is_compiled_too() -> None:
+    names = ["pid[bandwidth=30]", "admittance", "limited:pid", "nobody"]
+    content = packed_page(RIG, [], names).content
+    listed = [one["name"] for one in content["hello"]["choices"]["controller"]]
+    assert listed[-2:] == names[:2]  # the others are for Python, or none
+    laws = content["parts"]["controllers"]
+    assert laws["pid[bandwidth=30]"] != laws["pid"]
+    assert laws["admittance"] == laws["admittance-adaptive"]
 
 
 def test_a_folder_with_something_in_it_is_refused(tmp_path, monkeypatch, capsys):
