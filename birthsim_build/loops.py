@@ -71,6 +71,11 @@ def law_part(controller: str, rig: Parameters, sampled: bool, policy: str | None
     if not isinstance(law, StagedController):
         compiled = [name for name in controller_names() if name == RESIDUAL or isinstance(_made(name, rig), StagedController)]
         raise ValueError(f"controller = {controller!r}; allowed: a compiled one: {', '.join(compiled)}")
+    return staged_part(law, sampled)
+
+
+def staged_part(law: StagedController, sampled: bool) -> Part:
+    """A compiled law as a part."""
     law.prepare(1, sampled)
     return Part((Stage(ask, sees_world=False), *law.stages()), {WORLD + row: 0.0 for row in range(FEEDFORWARD, DAMPING)})
 

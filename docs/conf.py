@@ -14,7 +14,7 @@ import _generate  # noqa: E402
 from _generate import notebooks  # noqa: E402
 
 import birthsim_env  # noqa: E402
-from birthsim_live.static.build import build_page  # noqa: E402
+from birthsim_live.rig.folder import packed_page, write_page  # noqa: E402
 
 project = "BirthSIM"
 author = "The BirthSIM developers"
@@ -105,7 +105,7 @@ def build_rig(app, exception):
     """The folder of static files that runs the rig, beside the pages."""
     if exception is None and app.builder.name == "html":
         shutil.rmtree(app.outdir / "rig", ignore_errors=True)
-        build_page(app.outdir / "rig", birthsim_env.Parameters())
+        write_page(app.outdir / "rig", packed_page(birthsim_env.Parameters()))
 
 
 def setup(app):

@@ -94,7 +94,7 @@ def pytest_xdist_make_scheduler(config, log):
     class Grouped(LoadScopeScheduling):
         def _split_scope(self, nodeid):
             path = nodeid.partition("::")[0]
-            shown = ("tests/live/page/", "tests/live/static/", "tests/project/test_docs.py")
+            shown = ("tests/live/page/", "tests/project/test_docs.py")
             return "browser" if path.startswith(shown) else path
 
     return Grouped(config, log) if config.getvalue("dist") == "load" else None

@@ -49,11 +49,9 @@ def written(seed: int) -> str:
 
 
 def _live(path: Path) -> None:
-    from birthsim_live.rig.session import Session
+    from birthsim_live.rig.folder import packed_page
 
-    session = Session(load_parameters(path))
-    session.reset()
-    session.advance(300)
+    packed_page(load_parameters(path))
 
 
 def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:

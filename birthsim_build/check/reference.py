@@ -25,10 +25,10 @@ SHARED = [*range(IMPACT), *range(IMPACT + 2, WORLD + ASKED), *range(WORLD + OPEN
 CHAMBERS = ("P1", "N1", "P2", "N2")
 
 
-def make_law(controller: str) -> Controller:
-    """A controller by the name that it has in a bundle."""
+def make_law(controller: str, rig: Parameters | None = None) -> Controller:
+    """A controller by the name that it has in a bundle, which believes in ``rig`` (default: the paper's)."""
     kind, _, policy = controller.partition(":")
-    return make_controller(kind, Parameters(), **({"policy": policy} if policy else {}))
+    return make_controller(kind, rig or Parameters(), **({"policy": policy} if policy else {}))
 
 
 class OneValve(Driving):
@@ -42,16 +42,17 @@ class OneValve(Driving):
 
 def whole_rows(
     scenario: str, sensors: str, controller: str, periods: int = PERIODS, exchange: Any = None,
-    valves: str = "two_valves", **world: Any,
+    valves: str = "two_valves", rig: Parameters | None = None, **world: Any,
 ) -> Array:  # fmt: skip
     """Rows of world and seen before the first control period and after each, (1 + periods, WORLD + SEEN).
 
-    The scenario is nominal. ``exchange`` {"at", "controller"} puts another controller in its place; ``world`` are arguments of
-    the environment.
+    The scenario is nominal. ``exchange`` {"at", "controller"} puts another controller in its place; controllers
+    believe in ``rig``; ``world`` are arguments of the environment.
     """
 
     def drives(name: str) -> Driving:
-        return OneValve(make_law(name), name, {}) if valves == "one_valve" else driving(make_law(name), name)
+        law = make_law(name, rig)
+        return OneValve(law, name, {}) if valves == "one_valve" else driving(law, name)
 
     period = Parameters().electronics.control_period
     own = {"sensors": sensors, "policy_period": period, "actuation": drives(controller), **world}

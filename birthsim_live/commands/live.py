@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from baselines.commands.shared import run
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import add_address, need_server, serve
+from birthsim_live.logs.recording import load_recording
+from birthsim_live.rig.folder import Packed, packed_page, write_page
+from birthsim_live.rig.settings import RESIDUAL
 from birthsim_live.server.addresses import listen
 
 
@@ -16,7 +19,7 @@ def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="birthsim live",
-        description="One rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, "
+        description="A rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, "
         "valves and sensors while it moves, record it for --replay. Works without internet, for this machine alone.",
     )
     parser.add_argument(
@@ -24,10 +27,13 @@ def main() -> None:
     )
     add_address(parser)
     parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--compare", metavar="CONTROLLER", help="open with a second rig under this controller beside the first")
     parser.add_argument(
-        "--record-dir", type=Path, default=Path("out/live"), help="folder for recordings (default: %(default)s)"
+        "--controller",
+        metavar="NAME",
+        help="open with this controller, such as lqr or pid[bandwidth=60]; one of your own, path/to/file.py:Class, runs in "
+        "Python, and the rig waits for it",
     )
+    parser.add_argument("--compare", metavar="NAME", help="open with a second rig under this controller beside the first")
     parser.add_argument(
         "--static",
         type=Path,
@@ -48,68 +54,46 @@ def main() -> None:
 def _live(arguments: argparse.Namespace) -> None:
     if arguments.replay is not None:
         _replay(arguments)
-        return
-    if arguments.static is not None:
-        if arguments.compare is not None:
-            raise ValueError(f"--compare {arguments.compare} beside --static; allowed: ?compare={arguments.compare} in a link")
-        _build(arguments.static, arguments.parameters, arguments.policy)
-        return
-    need_server()
-    # After that: both need pydantic, which comes with the extra only.
-    from birthsim_live.rig.session import Session
-    from birthsim_live.rig.settings import opening_settings
-    from birthsim_live.server.live_hub import LiveHub
+    elif arguments.static is not None:
+        size = write_page(arguments.static, _packed(arguments, load_parameters(arguments.parameters)))
+        shown = f"python -m http.server -d {arguments.static} shows it at http://127.0.0.1:8000"
+        print(f"written to {arguments.static}: {size / 1e6:.2f} MB; {shown}")
+    else:
+        need_server()
+        with listen(arguments.host, 8000 if arguments.port is None else arguments.port) as listening:
+            rig = load_parameters(arguments.parameters)
+            serve(_packed(arguments, rig), rig, listening, arguments, "birthsim live")
 
-    with listen(arguments.host, 8000 if arguments.port is None else arguments.port) as listening:
-        rig = load_parameters(arguments.parameters)
-        _check(arguments.policy, rig)
-        session = Session(rig, opening_settings(rig, arguments.policy), policies=arguments.policy)
-        if arguments.compare is not None:
-            session.change({"compare": arguments.compare})
-        session.advance(1)  # compiles what is not cached yet, before anybody looks
-        session.reset()
-        hub = LiveHub(session, arguments.record_dir)
-        serve(hub, listening, arguments.host, "birthsim live", arguments.request_time, arguments.record_dir)
+
+def _packed(arguments: argparse.Namespace, rig: Parameters) -> Packed:
+    """What the page of a rig is made of, with what it opens with."""
+    opens = {"controller": f"{RESIDUAL}:{arguments.policy[0]}"} if arguments.policy else {}
+    opens |= {name: value for name in ("controller", "compare") if (value := getattr(arguments, name)) is not None}
+    packed = packed_page(rig, arguments.policy, opens.values())
+    packed.content["opens"] |= opens
+    if arguments.static is None:
+        from birthsim_live.server.controller import offer  # needs the extra
+
+        offer(packed.content, rig, opens.values())
+    for name in opens.values():
+        allowed = [one["name"] for one in packed.content["hello"]["choices"]["controller"] if "missing" not in one]
+        if name not in allowed:
+            raise ValueError(f"controller = {shown(name)}; allowed: {', '.join(allowed)}")
+    return packed
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    for name in ("parameters", "compare", "static", "policy"):
+    for name in ("parameters", "controller", "compare", "static", "policy"):
         if getattr(arguments, name):
             raise ValueError(f"--{name} with --replay; allowed: without it, a recording has its own rig")
     need_server()
-    # After that: it needs pydantic, which comes with the extra only.
-    from birthsim_live.rig.player import Player
-    from birthsim_live.rig.recording import load_recording
-    from birthsim_live.server.replay_hub import ReplayHub
+    from birthsim_live.rig.greeting import greeting  # which draws
 
     file: Path = arguments.replay
     with listen(arguments.host, 8001 if arguments.port is None else arguments.port) as listening:
         recording = load_recording(file)
-        title = f"birthsim live --replay {file.name}, {recording.duration:.1f} s"
-        serve(ReplayHub(Player(recording), file.name), listening, arguments.host, title, arguments.request_time)
-
-
-def _check(policies: Sequence[str], rig: Parameters) -> None:
-    """``ValueError`` that names a policy which is none, or the extra that policies need."""
-    if not policies:
-        return
-    try:
-        from agents.policy.controller import ResidualController
-    except ImportError as error:
-        raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-    for policy in policies:
-        ResidualController(rig, policy=policy)
-
-
-def _build(folder: Path, parameters: str | None, policies: Sequence[str]) -> None:
-    try:
-        # They need pydantic and safetensors, which come with extras only.
-        from birthsim_live.static.build import build_page
-    except ImportError as error:
-        raise ValueError(
-            f"{error}; the page without a server needs extras: pip install 'birthsim[live,agents,build]'"
-        ) from error
-    rig = load_parameters(parameters)
-    _check(policies, rig)
-    size = build_page(folder, rig, policies)
-    print(f"written to {folder}: {size / 1e6:.2f} MB; python -m http.server -d {folder} shows it at http://127.0.0.1:8000")
+        packed = packed_page(Parameters())
+        # It draws the recording's rig; the one that it could run stands still and is not seen.
+        hello = packed.content["hello"]
+        hello |= {**greeting(recording.rig, hello["choices"]["controller"]), "replay": file.name}
+        serve(packed, recording.rig, listening, arguments, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")

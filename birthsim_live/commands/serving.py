@@ -7,17 +7,16 @@ import contextlib
 import os
 import signal
 import socket
+import tempfile
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
 from baselines.commands.shared import finite_number
 from baselines.commands.start import endings
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import shown
+from birthsim_live.rig.folder import Packed, write_page
 from birthsim_live.server.addresses import LOOPBACK, is_loopback
-
-if TYPE_CHECKING:
-    from birthsim_live.server.hub import Hub
 
 REQUEST_TIME = 10.0
 """s, assumed, in which a request must arrive."""
@@ -66,28 +65,18 @@ def request_time(text: str) -> float:
     return seconds
 
 
-def serve(
-    hub: Hub, listening: socket.socket, host: str, title: str, request_time: float, recordings: Path | None = None
-) -> None:
-    """Serve a hub on a socket of ``listen``, by the name ``host``, until a signal asks it to end; after ``need_server``."""
+def serve(packed: Packed, rig: Parameters, listening: socket.socket, arguments: argparse.Namespace, title: str) -> None:
+    """Serve the page of what is ``packed`` on a socket of ``listen`` until a signal asks it to end; after ``need_server``."""
     import uvicorn
 
     from birthsim_live.server.app import create_app
     from birthsim_live.server.connections import configured
 
+    host: str = arguments.host
     loopback = is_loopback(host)
-    shown = f"[{host}]" if ":" in host else host
-    print(f"{title}: http://{shown}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True)
-    if not loopback:
-        print(
-            f"exposed: everybody who can reach {host} may watch and push this rig, change its settings and fetch its "
-            "recordings; there is no password and no encryption. Pages must be opened by exactly this name.",
-            flush=True,
-        )
-    app = create_app(hub, {host, *LOOPBACK} if loopback else {host}, recordings)
 
     class Server(uvicorn.Server):
-        """Closes the hub at the first signal, and ends at once at the second, when recordings lack half a second at most."""
+        """Ends at once at the second signal."""
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
             if self.should_exit:
@@ -95,13 +84,22 @@ def serve(
                 os._exit(128 + sig)
             super().handle_exit(sig, frame)
 
-    server = Server(configured(app, request_time))
-    if hasattr(signal, "SIGHUP"):
-        # As the server does with SIGTERM: the hub is closed before the command ends.
-        signal.signal(signal.SIGHUP, lambda _, frame: server.handle_exit(signal.SIGTERM, frame))
-    try:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "page"
+        write_page(folder, packed, arguments.replay)
+        app = create_app(folder, rig, packed.content["python"], {host, *LOOPBACK} if loopback else {host})
+        print(
+            f"{title}: http://{f'[{host}]' if ':' in host else host}:{listening.getsockname()[1]}  (Ctrl-C ends it)", flush=True
+        )
+        if not loopback:
+            print(
+                f"exposed: everybody who can reach {host} may run this page's controllers on this machine; there is no "
+                "password and no encryption. Pages must be opened by exactly this name.",
+                flush=True,
+            )
+        server = Server(configured(app, arguments.request_time))
+        if hasattr(signal, "SIGHUP"):
+            # As the server does with SIGTERM: the folder goes before the command ends.
+            signal.signal(signal.SIGHUP, lambda _, frame: server.handle_exit(signal.SIGTERM, frame))
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listening])
-    finally:
-        # An exception too leaves no recording unfinished.
-        hub.finish()

@@ -14,8 +14,7 @@ from baselines.bench.measures import TRACE
 from baselines.logs.log import Column, Event, Log, Series
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.frames import SLICES
-from birthsim_live.rig.recording import EVENTS, SUFFIX, load_recording
+from birthsim_live.logs.recording import EVENTS, SLICES, SUFFIX, load_recording
 
 _PLANE, _CYLINDERS, _CHAMBERS = ("_x", "_y"), ("_1", "_2"), ("_P1", "_N1", "_P2", "_N2")
 FIELDS = {

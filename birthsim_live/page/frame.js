@@ -1,4 +1,4 @@
-// The numbers of an instant, and what follows from them, as of birthsim_live/rig/frames.py. A rig in a worker needs it too.
+// The numbers of an instant, as recordings hold them (birthsim_live/logs/recording.py), and what follows from them.
 
 export const FIELDS = {
   time: 1, episode_time: 1, joints: 2, position: 2, velocity: 2, target: 2, compliant: 2, scenario_force: 2, drag_force: 2,
@@ -8,24 +8,22 @@ export const FIELDS = {
 export const LEAST_FORCE = 5; // N and m: below them their quotient says nothing
 export const LEAST_GIVEN = 1e-4;
 
-const told = (value) => (Number.isFinite(value) ? value : null);
-
-/** An instant, name -> numbers in the order of FIELDS, as a frame: null where there is no number. */
+/** An instant, name -> numbers in the order of FIELDS, as a frame: NaN where there is no number. */
 export function frameOf(now, geometry) {
   const force = now.scenario_force.map((value, k) => value + now.drag_force[k]);
   const given = now.position.map((value, k) => value - now.target[k]);
   const off = now.position.map((value, k) => value - now.compliant[k]);
   const rendered = force.map((f, k) => {
     const says = Math.abs(f) >= LEAST_FORCE && Math.abs(given[k]) >= LEAST_GIVEN && f * given[k] > 0;
-    return says ? f / given[k] : null;
+    return says ? f / given[k] : NaN;
   });
-  const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? told(values[0]) : values.map(told)]);
+  const named = Object.entries(now).map(([name, values]) => [name, FIELDS[name] === 1 ? values[0] : values]);
   return {
     ...Object.fromEntries(named),
     pointer: now.pointer.every(Number.isFinite) ? now.pointer : null,
-    force: force.map(told),
-    error_mm: told(1e3 * Math.hypot(...off)),
-    rendered: rendered.map(told),
+    force,
+    error_mm: 1e3 * Math.hypot(...off),
+    rendered,
     linkage: linkage(now.joints, geometry),
   };
 }

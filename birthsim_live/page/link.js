@@ -1,7 +1,8 @@
 // The settings as a link: the address names those that differ from what the page opens with.
 
+import { STIFFNESSES } from "./worker/settings.js";
+
 const GAP = 500; // ms between changes of the address; browsers allow a hundred in half a minute
-const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
 
 /** The settings that an address asks for; what is no setting, or cannot be read as one, is refused by the rig, by name. */
 export function settingsIn(search, defaults) {
@@ -17,7 +18,7 @@ function read(text, type) {
 
 /** What stands in an address for settings. */
 function searchOf(settings, defaults) {
-  const given = settings.stiffness_source === "scenario" ? SETPOINTS : [];
+  const given = settings.stiffness_source === "scenario" ? STIFFNESSES : [];
   const names = Object.keys(defaults).filter((name) => settings[name] !== defaults[name] && !given.includes(name));
   const search = new URLSearchParams(names.map((name) => [name, settings[name]]));
   return names.length ? `?${search}` : "";

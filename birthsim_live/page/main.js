@@ -1,4 +1,4 @@
-// Puts the page together: what comes from the server, what is drawn when, and what the keys do.
+// Puts the page together: what comes from the rig, what is drawn when, and what the keys do.
 
 import { About } from "./about.js";
 import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
@@ -25,7 +25,7 @@ const byId = (id) => document.getElementById(id);
 
 /**
  * What the page knows, for tests and for the curious:
- * `frame` is the newest frame of the server, `settings` and `state` its last words on those, `hello` its greeting,
+ * `frame` is the newest frame of the rig, `settings` and `state` its last words on those, `hello` its greeting,
  * `connected` whether it is there, `monitor` what the page measures of itself, `send` a message to it, `pixel([x, y], k)` the
  * place of a point (m) on the screen in CSS px from the corner of the window, in picture 0 or 1, `scenes` the two pictures,
  * `plots` the curves.
@@ -63,12 +63,6 @@ rig.scenes = rigs.scenes;
 new Keys(hand, enabled);
 
 const source = new Source({
-  closed: (seconds) => {
-    rig.connected = false;
-    hand.release();
-    banner("offline", `No connection to the rig. Next try in ${seconds.toFixed(1)} s.`);
-    readouts.say("offline", "connection lost");
-  },
   failed: ({ message }) => {
     rig.connected = false;
     hand.release();
@@ -85,7 +79,7 @@ const source = new Source({
     physics.setUp(message);
     explain(message.words.figures);
     about.setUp(message.words);
-    byId("back").hidden = !source.player;
+    byId("back").hidden = !source.player || Boolean(message.replay);
     gauges.setUp(message.air);
     transport.setUp(message);
     banner("offline", "");
@@ -99,19 +93,18 @@ const source = new Source({
     rigs.setPath(points);
     magnifier.setPath(points);
   },
+  /** Of a recording: all of it. */
   history: ({ frames }) => {
-    const replay = rig.hello.mode === "replay";
-    const history = replay ? whole : recent;
-    history.clear();
+    whole.clear();
     rigs.clear();
-    for (const frame of frames.map(withNumbers)) {
+    for (const frame of frames) {
       rigs.note(frame);
-      history.push(frame.time, rowOf(frame, rigs.rms));
+      whole.push(frame.time, rowOf(frame, rigs.rms));
     }
-    if (replay) plots.show(whole, rig.hello.state.duration);
+    plots.show(whole, rig.hello.state.duration);
   },
-  frame: (message) => {
-    const frame = (rig.frame = withNumbers(message));
+  frame: (frame) => {
+    rig.frame = frame;
     rig.monitor.received += 1;
     rigs.push(frame);
     if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms));
@@ -129,13 +122,6 @@ function setUpSettings(message) {
     if (Object.keys(wished).length) change(wished);
   }
   link.setUp(message.defaults);
-}
-
-/** A message has null where there is no number: NaN computes like one. */
-function withNumbers(frame) {
-  const number = (value) => value ?? NaN;
-  const named = Object.entries(frame).map(([name, value]) => [name, Array.isArray(value) ? value.map(number) : value]);
-  return { ...Object.fromEntries(named), error_mm: number(frame.error_mm), second: frame.second && withNumbers(frame.second) };
 }
 
 function showSettings(values) {
@@ -182,7 +168,7 @@ function draw(now) {
     magnifier.draw(frame, rigs.scenes[0].pen.scale);
     rigs.draw(frame, magnifier.window);
     rig.monitor.drew(frame);
-    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost} Press R to reset.` : "");
+    for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost.replace(/[.]?$/, ".")} Press R to reset.` : "");
   }
   transport.step(frame);
   const [one, k] = [rigs.rigOf(frame), rigs.chosen];

@@ -1,5 +1,5 @@
 // The linkage: cylinders, pins, fetal head and the column that carries them (birthsim_env/drawing/rig.py).
-// Every dimension and the outline of the head come from the server.
+// Every dimension and the outline of the head come from Python.
 
 import { Axis, CAP, FAINT, GROUND, GROUND_EDGE, INK, LINE, PAPER, SKIN, SKIN_EDGE, STEEL, finite } from "./pen.js";
 

@@ -1,6 +1,7 @@
 // Lists and sliders for everything that can be set while the rig runs.
 
 import { NumberField } from "./slider.js";
+import { STIFFNESSES } from "./worker/settings.js";
 
 const LISTS = { scenario: "Scenario", controller: "Controller", compare: "Compare", valves: "Valves", sensors: "Sensors" };
 const GROUPS = {
@@ -9,10 +10,9 @@ const GROUPS = {
   "Law and rig": { damping: ["damping ", ["B"]], mass: ["mass ", ["M"]], friction: ["friction"] },
   "Your hand": { drag_stiffness: ["spring to the pointer"] },
 };
-const SETPOINTS = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"];
 
 export class Settings {
-  /** `change(settings)` asks the server; what it answers comes back through `show`. */
+  /** `change(settings)` asks the rig; what it answers comes back through `show`. */
   constructor(form, change) {
     this.form = form;
     this.change = change;
@@ -95,7 +95,7 @@ export class Settings {
     const own = settings.stiffness_source === "scenario";
     this.source.disabled = own;
     this.source.textContent = own ? "these are the scenario's setpoints" : "back to the scenario's setpoints";
-    for (const name of SETPOINTS) this.fields[name].element.classList.toggle("given", own);
+    for (const name of STIFFNESSES) this.fields[name].element.classList.toggle("given", own);
     this.fields.damping.enable(settings.damping_applies, "this controller has no damping to set");
   }
 }

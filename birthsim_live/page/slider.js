@@ -83,7 +83,7 @@ export class NumberField {
     this.input.setAttribute("aria-valuetext", text);
   }
 
-  /** Show what the server holds; a slider in somebody's hand stays there. */
+  /** Show what the rig has; a slider in somebody's hand stays there. */
   show(value) {
     if (this.held || this.asked !== null || !Number.isFinite(value)) return;
     this.write(value);

@@ -10,15 +10,22 @@ export class Source {
     this.handlers = handlers;
     this.player = null;
     this.known = new Map();
-    const all = ["closed", "failed", "hello", "history", "settings", "state", "path", "frame", "error"];
+    const all = ["failed", "hello", "settings", "state", "path", "frame", "error"];
     this.connection = new Connection(Object.fromEntries(all.map((kind) => [kind, (message) => this.receive(kind, message)])));
   }
 
   /** A message of the connection; while a recording plays it is only remembered. */
   receive(kind, message) {
-    if (kind === "hello") this.known.clear();
     if (kind !== "frame" && kind !== "error") this.known.set(kind, message);
-    if (!this.player) this.handlers[kind](message);
+    const { replay } = this.known.get("hello") ?? {};
+    if (kind === "hello" && replay) this.openServed(replay);
+    else if (!this.player && !replay) this.handlers[kind](message);
+  }
+
+  /** Play the recording that this page was made for. */
+  async openServed(name) {
+    const answer = await fetch("rig/replay.rec");
+    await this.open(new File([await answer.blob()], name));
   }
 
   send(message) {
@@ -53,8 +60,6 @@ export class Source {
     const { known, handlers } = this;
     const hello = known.get("hello");
     handlers.hello({ ...hello, settings: known.get("settings")?.settings ?? hello.settings, state: known.get("state") ?? hello.state });
-    // What a rig did before is older than what it has done meanwhile; what a recording holds is not.
-    const kept = ["path", ...(hello.mode === "replay" ? ["history"] : []), "closed", "failed"];
-    for (const kind of kept) if (known.has(kind)) handlers[kind](known.get(kind));
+    for (const kind of ["path", "failed"]) if (known.has(kind)) handlers[kind](known.get(kind));
   }
 }

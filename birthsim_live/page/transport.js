@@ -1,5 +1,7 @@
 // Pause, reset, slow motion, recording; of a replay its file, settings and scrubber.
 
+import { STIFFNESSES } from "./worker/settings.js";
+
 const byId = (id) => document.getElementById(id);
 
 export class Transport {
@@ -67,7 +69,7 @@ export class Transport {
   /** The settings of a replay at its present instant, in words. */
   showSettings(settings) {
     const words = ["scenario", "controller", "valves", "sensors"].filter((name) => settings[name]).map((name) => settings[name].replaceAll("_", " "));
-    const numbers = ["Kclx", "Kcly", "Kpneu1", "Kpneu2"].filter((name) => settings[name]).map((name) => `${name} ${settings[name]} N/m`);
+    const numbers = STIFFNESSES.filter((name) => settings[name]).map((name) => `${name} ${settings[name]} N/m`);
     const rig = settings.mass ? [`mass ${settings.mass} kg`, `friction × ${settings.friction}`] : [];
     byId("played").textContent = [...words, ...numbers, ...rig].join(" · ");
   }

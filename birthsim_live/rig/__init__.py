@@ -1,1 +1,1 @@
-"""The rig that a person plays with: motion, hand, setpoints, recordings, and real time."""
+"""What the page's rig is made of: its parts as data, its code, and all that the page says of it."""

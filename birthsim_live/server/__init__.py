@@ -1,1 +1,1 @@
-"""The web server, its messages, and what all clients share."""
+"""The web server: the page's files, and controllers that run in Python."""

@@ -1,29 +1,25 @@
-"""The web server: the page, its files, recordings, and the socket; nothing for foreign origins."""
+"""The web server: the files of the page, and a socket for controllers; nothing for foreign origins."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import re
-from collections.abc import AsyncIterator, Collection
+from collections.abc import Collection
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from fastapi import FastAPI, HTTPException, WebSocket, WebSocketDisconnect
-from fastapi.responses import FileResponse
-from fastapi.staticfiles import StaticFiles
+from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
+from starlette.routing import Mount, WebSocketRoute
+from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
 
+from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.server.addresses import LOOPBACK
-from birthsim_live.server.clients import Client
-from birthsim_live.server.hub import Hub
-
-PAGE = Path(__file__).resolve().parent.parent / "page"
+from birthsim_live.server.controller import command
 
 HEADERS = {
-    "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "content-security-policy": "frame-ancestors 'none'",  # besides what the page says itself
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cross-origin-resource-policy": "same-origin",
@@ -80,49 +76,12 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-def create_app(hub: Hub, hosts: Collection[str] = LOOPBACK, recordings: Path | None = None) -> ASGIApp:
-    """The application of a hub for requests to ``hosts``; finished recordings are given out from ``recordings``."""
+def create_app(folder: Path, rig: Parameters, controllers: Collection[str] = (), hosts: Collection[str] = LOOPBACK) -> ASGIApp:
+    """The application of a page in ``folder`` for requests to ``hosts``; ``controllers`` run in Python and believe in a
+    ``rig``."""
 
-    @contextlib.asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        await hub.open()
-        try:
-            yield
-        finally:
-            await hub.close()
-
-    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
-
-    @app.get("/")
-    async def page() -> FileResponse:
-        return FileResponse(PAGE / "index.html")
-
-    @app.get("/recordings/{name}")
-    async def recording(name: str) -> FileResponse:
-        if recordings is None or not re.fullmatch(r"[\w-]+\.rec", name) or not (recordings / name).is_file():
-            raise HTTPException(404, "no such recording")
-        return FileResponse(recordings / name, media_type="application/octet-stream", filename=name)
-
-    @app.websocket("/ws")
     async def socket(socket: WebSocket) -> None:
-        await socket.accept()
-        client = Client(socket.send_text)
-        sending = asyncio.create_task(client.send_all())
-        try:
-            await hub.join(client)
-            while True:
-                message = await socket.receive()
-                if message["type"] == "websocket.disconnect":
-                    break
-                await hub.receive(client, message["text"] if message.get("text") is not None else message["bytes"])
-        except WebSocketDisconnect:
-            pass
-        finally:
-            hub.leave(client)
-            sending.cancel()
-            # However a socket broke, it is closed.
-            with contextlib.suppress(asyncio.CancelledError, Exception):
-                await sending
+        await command(socket, rig, controllers)
 
-    app.mount("/static", StaticFiles(directory=PAGE), name="static")
-    return OriginMiddleware(app, hosts)
+    files = StaticFiles(directory=folder, html=True)
+    return OriginMiddleware(Starlette(routes=[WebSocketRoute("/controller", socket), Mount("/", files)]), hosts)

@@ -12,8 +12,8 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-LARGEST = 1 << 20
-"""Bytes of a message that is still answered by an error; a larger one closes the socket."""
+LARGEST = 1 << 12
+"""Bytes of a message; a larger one closes its socket."""
 
 
 class TimedRequests(H11Protocol):

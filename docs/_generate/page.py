@@ -1,7 +1,7 @@
 """What the page of ``birthsim live`` says where something is chosen or shown: the same sentences, as tables."""
 
 from baselines import about
-from birthsim_live.server.words import CHOICES, FIGURES
+from birthsim_live.rig.words import CHOICES, FIGURES
 
 
 def page() -> str:

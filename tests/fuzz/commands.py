@@ -112,7 +112,7 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
     line = forms.get(name, [])
     for option in dict.fromkeys(["--out", *(option for option in options if rng.random() < 0.3)]):
         if option in options:
-            line += [option, str(folder / "out") if option in ("--out", "--record-dir") else str(ODD[rng.integers(len(ODD))])]
+            line += [option, str(folder / "out") if option == "--out" else str(ODD[rng.integers(len(ODD))])]
     if rng.random() < 0.2:
         line.insert(int(rng.integers(len(line) + 1)), ODD[rng.integers(len(ODD))])
     case.shown = f"{name} {line!r}"

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from tests.kills.processes import end_all, hear_signals
-from tests.kills.recording import RECORD, RecordingCourse
 from tests.kills.report import read_outcomes, summary, write_outcomes, write_page
 from tests.kills.targets import ROOT, TARGETS
 from tests.kills.tries import SCENARIOS, Course
@@ -21,7 +20,7 @@ PAGE = ROOT / "docs" / "kills.md"
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="python -m tests.kills", description=__doc__)
-    names = (*TARGETS, RECORD)
+    names = tuple(TARGETS)
     parser.add_argument("--target", action="append", choices=names, help="may be repeated (default: all)")
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="may be repeated (default: all)")
     parser.add_argument("--kills", type=int, default=50, help="per target, over all scenarios (default: %(default)s)")
@@ -35,7 +34,7 @@ def main() -> None:
         rng = np.random.default_rng([arguments.seed, names.index(name)])
         work = Path(tempfile.mkdtemp(prefix=f"kills-{name}-"))
         try:
-            course = RecordingCourse(work, rng) if name == RECORD else Course(TARGETS[name], work, rng)
+            course = Course(TARGETS[name], work, rng)
             done = dict.fromkeys(scenarios, 0)
             while sum(done.values()) < arguments.kills:
                 scenario = min(done, key=lambda name: done[name] / SCENARIOS[name])

@@ -86,7 +86,6 @@ TARGETS = {
         ),
     )
 }  # fmt: skip
-"""Without the recording, which is no command that ends by itself: ``recording.py``."""
 
 
 def program(command: str) -> str:

@@ -144,31 +144,6 @@ class Server:
                 process.kill()
 
 
-class Hosted:
-    """A hub's page, served by a thread of this process, which is there at once; entering gives its address."""
-
-    def __init__(self, hub):
-        import uvicorn
-
-        from birthsim_live.server.addresses import LOOPBACK, listen
-        from birthsim_live.server.app import create_app
-
-        self._socket, self._hub = listen("127.0.0.1", 0), hub
-        self._server = uvicorn.Server(
-            uvicorn.Config(create_app(hub, LOOPBACK), log_level="warning", ws="websockets-sansio", timeout_graceful_shutdown=1)
-        )
-        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]})
-
-    def __enter__(self):
-        self._thread.start()
-        return f"http://127.0.0.1:{self._socket.getsockname()[1]}/"
-
-    def __exit__(self, *_):
-        self._server.should_exit = True
-        self._thread.join()
-        self._hub.finish()
-
-
 class Folder:
     """A server of the files in a folder, as ``python -m http.server``; entering gives its address."""
 

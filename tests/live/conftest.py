@@ -2,48 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
 import pytest
 
-from tests.live.browser import CALM, PATIENCE, Server, Window
+from tests.live.browser import CALM, Server, Window
 
 
 @pytest.fixture(scope="session")
-def served(tmp_path_factory):
-    with Server("live", "--record-dir", tmp_path_factory.mktemp("recordings")) as running:
+def server():
+    with Server("live") as running:
         yield running
 
 
 @pytest.fixture
-def server(served):
-    """The run's server; its rig begins anew, whatever a test that failed has left."""
-    from websockets.sync.client import connect
-
-    with connect(f"{served.url.replace('http', 'ws')}ws", open_timeout=PATIENCE) as socket:
-        defaults = json.loads(socket.recv())["defaults"]
-        settings = {name: value for name, value in defaults.items() if not name.startswith("K")}
-        for message in (
-            {"type": "set", "settings": settings},
-            {"type": "speed", "speed": 1},
-            {"type": "pause", "paused": False},
-            {"type": "reset"},
-            {"type": "ping", "id": 1},
-        ):
-            socket.send(json.dumps(message))
-        while (said := json.loads(socket.recv()))["type"] != "pong":
-            assert said["type"] != "error", said
-    return served
-
-
-@pytest.fixture
 def window(chromium, server):
-    """A window on a rig that runs and that nobody holds."""
+    """A window with a rig of its own."""
     with Window(chromium, server.url + CALM) as opened:
         opened.wait(f"birthsim.settings.controller === '{CALM.partition('=')[2]}'")
-        opened.wait("birthsim.frame.pointer === null && birthsim.frame.lost === null && !birthsim.state.paused")
         yield opened
         assert opened.complaints == []
         assert opened.foreign == []

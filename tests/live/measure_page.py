@@ -1,21 +1,19 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
 ``python -m tests.live.measure_page`` starts a server, drags the end effector around for some seconds, several times, and
-prints a table; ``--static FOLDER`` does so with a folder of ``birthsim live --static``, ``--compare CONTROLLER`` with two rigs;
+prints a table; ``--controller NAME`` does so with a controller that runs in Python, ``--compare NAME`` with two rigs;
 ``--picture FILE`` also writes the screenshot of docs/live.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
 import statistics
-import tempfile
 import time
 
 from tests.live import browser
-from tests.live.browser import CALM, Folder, Server, Window
+from tests.live.browser import Server, Window
 
 ROUND = 2.0  # s per circle of the mouse
 RADIUS = 45.0  # px
@@ -78,36 +76,21 @@ def picture(window, path):
     window.page.mouse.up()
 
 
-@contextlib.contextmanager
-def _served(static, folder):
-    """The address of a page: of the files in ``static``, or of a server that records into ``folder``."""
-    if static:
-        with Folder(static) as url:
-            yield url
-        return
-    with Server("live", "--record-dir", folder) as server:
-        yield server.url
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=15.0, help="length of a run (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="how many (default: %(default)s)")
-    parser.add_argument("--static", metavar="FOLDER", help="the page without a server, in this folder")
-    parser.add_argument("--compare", metavar="CONTROLLER", default="nothing", help="with a second rig beside the first")
+    parser.add_argument("--controller", metavar="NAME", default="admittance-backstepping", help="what drives the rig")
+    parser.add_argument("--compare", metavar="NAME", default="nothing", help="with a second rig beside the first")
     parser.add_argument("--picture", help="write a screenshot, 1280x800, to this PNG")
     arguments = parser.parse_args()
     if lack := browser.missing():
         raise SystemExit(lack)
     from playwright.sync_api import sync_playwright
 
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        _served(arguments.static, folder) as url,
-        sync_playwright() as playwright,
-    ):
+    with Server("live", "--controller", arguments.controller) as server, sync_playwright() as playwright:
         chromium = browser.launch(playwright)
-        with Window(chromium, f"{url}{CALM}&compare={arguments.compare}") as window:
+        with Window(chromium, f"{server.url}?compare={arguments.compare}") as window:
             window.wait(f"birthsim.settings.compare === '{arguments.compare}'")
             first = window.wait("birthsim.monitor.first")
             rows = [row(k + 1, drag(window, arguments.seconds)) for k in range(arguments.runs)]

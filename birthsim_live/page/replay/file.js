@@ -1,4 +1,4 @@
-// Reads a recording in the browser; birthsim_live/rig/recording.py has the format.
+// Reads a recording in the browser; birthsim_live/logs/recording.py has the format.
 
 import { crc32 } from "../crc32.js";
 import { FIELDS } from "../frame.js";

@@ -1,4 +1,4 @@
-// Plays a recording in this window, with the face of a connection: the messages are those of birthsim live --replay.
+// Plays a recording, with the face of a connection.
 
 import { FIELDS, frameOf } from "../frame.js";
 
@@ -24,7 +24,6 @@ export class Player {
     cancelAnimationFrame(this.due);
   }
 
-  /** Act as the server does. */
   send({ type, paused, speed, time }) {
     if (type === "pause") {
       if (!paused && this.ended) this.position = 0;
@@ -88,7 +87,7 @@ export class Player {
   named(row, time) {
     const { rigs, width } = this.recording;
     const second = rigs === 2 ? this.one(row.subarray(width / 2), time) : null;
-    return { ...this.one(row, time), second: second?.episode_time == null ? null : second };
+    return { ...this.one(row, time), second: Number.isFinite(second?.episode_time) ? second : null };
   }
 
   /** The numbers of one rig. */

@@ -6,15 +6,10 @@ import os
 
 import pytest
 
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.player import Player
-from birthsim_live.rig.recorder import EVERY, Recorder
-from birthsim_live.rig.recording import load_recording
-from birthsim_live.rig.session import Session
-from birthsim_live.server.replay_hub import ReplayHub
 from tests.live import axe, browser
 from tests.live.axe import violations
-from tests.live.browser import NARROW, WIDE, Hosted, Window
+from tests.live.browser import NARROW, WIDE, Server, Window
+from tests.live.recordings.made import example, write_recording
 
 LACK = browser.missing()
 pytestmark = [pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
@@ -64,11 +59,7 @@ def test_nothing_is_found_on_the_page(chromium, server, theme, size):
 
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_is_found_on_a_replay(chromium, tmp_path, theme):
-    session = Session(Parameters())
-    session.recorder = Recorder(session, tmp_path / "rest.rec")
-    session.advance(100 * EVERY)
-    session.recorder.finish()
-    hub = ReplayHub(Player(load_recording(tmp_path / "rest.rec")), "rest.rec")
-    with Hosted(hub) as address, Window(chromium, address) as viewer:
+    write_recording(tmp_path / "rest.rec", example(100))
+    with Server("live", "--replay", tmp_path / "rest.rec") as server, Window(chromium, server.url) as viewer:
         viewer.page.emulate_media(color_scheme=theme)
         assert violations(viewer.page) == []

@@ -9,16 +9,12 @@ import struct
 import numpy as np
 import pytest
 
+from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.frames import FIELDS, SLICES
-from birthsim_live.rig.hand import Hold
-from birthsim_live.rig.player import Player
-from birthsim_live.rig.recorder import Recorder
-from birthsim_live.rig.recording import load_recording
-from birthsim_live.rig.session import Session
-from birthsim_live.server.replay_hub import ReplayHub
+from birthsim_live.logs.recording import FIELDS, SLICES, load_recording
 from tests.live import browser
-from tests.live.browser import Hosted, Window
+from tests.live.browser import Server, Window
+from tests.live.recordings.made import example, write_recording
 
 LACK = browser.missing()
 pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
@@ -36,22 +32,10 @@ DROP = """([bytes, name]) => {
 NOTICES = "document.querySelector('#notices').textContent"
 
 
-def record(folder, rig=None):
-    """A file of 2 s: at rest, a pull, another law."""
-    session = Session(rig or Parameters())
-    session.recorder = Recorder(session, folder / "pull.rec")
-    session.advance(600)
-    session.hands.hold = Hold(np.array([0.54, 0.01]), 1)
-    session.advance(700)
-    session.change({"controller": "backstepping", "Kclx": 3000})
-    session.advance(700)
-    session.recorder.finish()
-    return folder / "pull.rec"
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("recordings"))
+    """2 s: at rest, a pull, another law."""
+    return write_recording(tmp_path_factory.mktemp("recordings") / "pull.rec", example(500))
 
 
 def drop(window, content, name="pull.rec"):
@@ -65,18 +49,21 @@ def test_a_dropped_recording_is_played_searched_and_left(window, file, pictures)
     assert window.value("window.shaded && document.querySelector('#drop').hidden")
     assert not window.page.locator("#settings").is_visible()
     window.page.locator("#pause").click()
-    player = Player(load_recording(file))
-    duration = player.recording.duration
+    recording = load_recording(file)
+    duration = recording.duration
     assert window.value("birthsim.state.duration") == pytest.approx(duration)
     assert window.value("birthsim.plots.shown.history.view('time').at(-1)") == pytest.approx(duration, abs=0.03)
-    for time in (0.1, 0.999, 1.5, duration):
+    for time in (0.1, 0.998, 1.5, duration):
         window.page.evaluate(f"() => window.birthsim.send({{ type: 'seek', time: {time} }})")
         window.wait(f"Math.abs(birthsim.frame.time - {time}) < 1e-9")
-        player.seek(time)
-        frame, wanted = window.frame(), player.frame()
-        for name in {*FIELDS, "force", "rendered", "linkage", "error_mm"} - {"pointer"}:
-            numbers = np.array([frame[name], wanted[name]], dtype=np.float64)
-            assert np.allclose(*numbers, rtol=1e-5, atol=1e-7, equal_nan=True), (time, name)
+        frame, place = window.frame(), time / recording.interval
+        between = recording.rows[[int(place + 1e-6), min(int(place + 1e-6) + 1, len(recording.rows) - 1)]]  # a straight line
+        row = between[0] + (place - int(place + 1e-6)) * (between[1] - between[0])
+        for name in {*FIELDS} - {"pointer", "time"}:
+            assert np.allclose(np.ravel(frame[name]), row[SLICES[name]], rtol=1e-5, atol=1e-7), (time, name)
+        off = row[SLICES["position"]] - row[SLICES["compliant"]]
+        assert frame["error_mm"] == pytest.approx(1e3 * np.hypot(*off))
+        assert frame["linkage"][3] == pytest.approx(end_effector(row[SLICES["joints"]][:, None], recording.rig)[:, 0])
     assert "backstepping" in window.page.locator("#played").text_content()
     assert "Kclx 3000 N/m" in window.page.locator("#played").text_content()
     window.page.screenshot(path=pictures / "dropped.png")
@@ -106,7 +93,7 @@ def test_what_is_none_is_refused_in_a_line(window, file, tmp_path, damage):
         "checksum": (whole[:400] + bytes([whole[400] ^ 1]) + whole[401:], "has another checksum"),
         "large": (2**27 + 1, "allowed: up to 134217728"),
         "shape": (
-            record(tmp_path, Parameters().replace({"geometry.d6": 0.26})).read_bytes(),
+            write_recording(tmp_path / "a.rec", example(9), Parameters().replace({"geometry.d6": 0.26})).read_bytes(),
             "allowed: birthsim live --replay FILE",
         ),
     }[damage]
@@ -125,9 +112,10 @@ def test_a_file_that_ends_early_is_played_as_far_as_it_goes(window, file):
 
 
 @pytest.mark.slow
-def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, file):
-    hub = ReplayHub(Player(load_recording(file)), file.name)
-    with Hosted(hub) as address, Window(chromium, address) as viewer:
+@pytest.mark.parametrize("changes", [{}, {"geometry.d6": 0.26, "valves.deadband": 0.02}])
+def test_a_served_recording_of_any_rig_plays_by_itself_and_shows_all_curves(chromium, tmp_path, changes):
+    file = write_recording(tmp_path / "pull.rec", example(500), Parameters().replace(changes))
+    with Server("live", "--replay", file) as server, Window(chromium, server.url) as viewer:
         first = viewer.value("birthsim.plots.shown.history.view('time')[0]")
         assert first == 0
         assert viewer.page.locator("#file").text_content() == "pull.rec"
@@ -144,9 +132,3 @@ def test_a_served_recording_waits_for_its_viewer_and_shows_all_curves(chromium, 
         shown = "Number(document.querySelector('[data-figure=error] small').textContent.match(/[\\d.]+/)[0])"
         viewer.wait(f"Math.abs({shown} - birthsim.plots.shown.history.at('error_rms', 0.4)) < 0.006")
         assert viewer.complaints == []
-
-
-def test_rows_are_as_long_as_the_page_believes(window):
-    """The page reads recordings by names and sizes of its own."""
-    found = window.page.evaluate("async () => (await import(new URL('static/frame.js', location))).FIELDS")
-    assert list(found.items()) == list(FIELDS.items())

@@ -17,10 +17,10 @@ from baselines.work import tasks
 from baselines.work.files import write_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs import reading
-from birthsim_live.rig import frames
-from birthsim_live.rig.recording import load_recording
+from birthsim_live.logs import recording as recordings
+from birthsim_live.logs.recording import load_recording
 from tests.console import call
-from tests.live.recordings.test_recording import recorded
+from tests.live.recordings.made import example, write_recording
 
 MISSING = "mcap is not installed: pip install 'birthsim[log]'"
 HEAD = ["topic", "log_time"]
@@ -28,11 +28,9 @@ HEAD = ["topic", "log_time"]
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A recording with a pointer that comes and goes, a loss and a reset; an evaluation of two laws; one of its pieces."""
-    folder = tmp_path_factory.mktemp("logs")
-    _, recorder = recorded(folder / "one.rec")
-    recorder.finish()
-    rig = Parameters()
+    """A recording with a pointer that comes, and a second rig; an evaluation of two laws; one of its pieces."""
+    folder, rig = tmp_path_factory.mktemp("logs"), Parameters()
+    write_recording(folder / "one.rec", example(40, second=True))
     results = []
     for name in ("pid", "backstepping"):
         task = pieces.evaluation_tasks(name, pieces.controller_settings(name, rig), "BirthSIM/Probe-v2", {}, 2, 7)[0]
@@ -109,7 +107,7 @@ def test_mcap_gives_every_finite_number_back(kind: str, files: dict[str, Path], 
 
 def test_a_log_holds_what_the_file_holds(files: dict[str, Path]) -> None:
     recording, log = load_recording(files["recording"]), reading.read_log(files["recording"])
-    assert {name: len(ends) for name, (_, _, ends) in reading.FIELDS.items()} == frames.FIELDS
+    assert {name: len(ends) for name, (_, _, ends) in reading.FIELDS.items()} == recordings.FIELDS
     assert bits(np.array([log.series[0].values[name] for name in log.columns]).T) == bits(recording.rows)
     assert np.isnan(log.series[0].values["pointer_x"]).any()
     assert {event.kind for event in log.events} == {"settings", "path", "lost"}

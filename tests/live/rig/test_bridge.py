@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
-from birthsim_build.stages import FORCE_TIME, LEAST_TIME, PACE, SETPOINTS_TIME
+from birthsim_build.stages import LEAST_TIME, PACE
 from birthsim_env.parts.references import Circle, Hold, Trajectory
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.session import Session
-from birthsim_live.rig.settings import default_settings
 from tests.live.rig.course import Course
 
 
@@ -52,20 +54,10 @@ def test_a_course_is_smooth_through_several_changes(after: Trajectory) -> None:
     assert np.abs(np.diff(table[:, 6:8], axis=0)).max() < 0.02  # the jerk is continuous too
 
 
-def test_setpoints_and_the_scenario_s_force_fade_at_minimum_jerk() -> None:
-    rig = Parameters()
-    one = Session(rig, default_settings(rig).model_copy(update={"scenario": "circle", "scenario_force": True}))
-    one.advance(1500)  # a push is on
-    push = one.lane.world.force[:, 0].copy()
-    assert np.abs(push).max() > 1
-    one.change({"scenario_force": False, "Kclx": 3000.0})
-    rows = []
-    for _ in range(101):
-        one.advance(1)
-        rows.append([one.lane.seen.reference.stiffness[0, 0], *one.lane.world.force[:, 0]])
-    for k, (stiffness, *force) in enumerate(rows):
-        u, v = (min((k + 1) * 1e-3 / lasts, 1.0) for lasts in (SETPOINTS_TIME, FORCE_TIME))
-        passed, left = u**3 * (10 - 15 * u + 6 * u * u), 1 - v**3 * (10 - 15 * v + 6 * v * v)
-        assert stiffness == pytest.approx(2000 + 1000 * passed, rel=1e-9)
-        assert force == pytest.approx(push * left, rel=1e-9, abs=1e-9)
-    assert rows[-1] == [3000.0, 0.0, 0.0]
+@pytest.mark.parametrize(("first", "second"), list(permutations(SCENARIOS, 2)))
+def test_bridges_between_scenarios_stay_in_the_workspace(first: str, second: str) -> None:
+    for now in (0.7, 2.9):
+        course = Course(SCENARIOS[first].nominal()[0])
+        course.follow(SCENARIOS[second].nominal()[0], now)
+        samples = np.stack([course.sample(t)[:2] for t in np.arange(now, now + 4, 0.02)], axis=1)
+        inverse_geometry(samples, Parameters())

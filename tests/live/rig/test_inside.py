@@ -21,14 +21,11 @@ from birthsim_env.physics.compiled.lanes import (
     TP2,
     V1,
     V2,
-    parameter_array,
 )
 from birthsim_env.physics.geometry import amplification
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.frames import SLICES
 from birthsim_live.rig.inside import ROWS, look_inside
-from birthsim_live.rig.session import Session
 
 FRICTION = (FC1, FC2, FS1, FS2, FV1, FV2, BRISTLE_S0, BRISTLE_S1)
 
@@ -79,13 +76,3 @@ def test_flows_are_those_that_fill_the_chambers() -> None:
     before = masses()
     plant.advance(plant.state[-4:].copy(), np.zeros((2, 1)), step)
     assert (masses() - before) / step == pytest.approx(flows, rel=1e-3, abs=1e-8)
-
-
-def test_a_row_holds_them() -> None:
-    session = Session(Parameters())
-    session.advance(300)
-    rows = np.empty((ROWS, 1))
-    look_inside(session.state, parameter_array(Parameters(), 1), rows)
-    row = session.row()
-    assert np.array_equal(row[SLICES["friction"]], rows[:2, 0])
-    assert np.array_equal(row[SLICES["flows"]], rows[2:, 0])

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
+from starlette.types import ASGIApp
 
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.session import Session
-from birthsim_live.server import live_hub
-from birthsim_live.server.live_hub import LiveHub
-from tests.live.server.sockets import client
+from birthsim_live.rig.folder import packed_page, write_page
+from birthsim_live.server.app import create_app
+
+HERE = "http://127.0.0.1:8000"
+
+
+@pytest.fixture(scope="session")
+def app(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ASGIApp]:
+    """The application, with controllers that run in Python and other options."""
+    folder: Path = tmp_path_factory.mktemp("served") / "page"
+    write_page(folder, packed_page(Parameters()))
+    return lambda *controllers, **options: create_app(folder, Parameters(), controllers, **options)
 
 
 @pytest.fixture
-def live(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    # However slowly this machine computes, a hand is not let go because it says nothing.
-    monkeypatch.setattr(live_hub, "PATIENCE", math.inf)
-    with client(LiveHub(Session(Parameters()), tmp_path), tmp_path) as one:
+def live(app: Callable[..., ASGIApp]) -> Iterator[TestClient]:
+    with TestClient(app("shut-valves"), base_url=HERE) as one:
         yield one

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import http.client
-import json
 import logging
 import socket
 import threading
@@ -15,24 +14,20 @@ import uvicorn
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 
-from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.commands.serving import request_time
-from birthsim_live.rig.session import Session
 from birthsim_live.server.addresses import listen
-from birthsim_live.server.app import create_app
-from birthsim_live.server.connections import configured
-from birthsim_live.server.live_hub import LiveHub
+from birthsim_live.server.connections import LARGEST, configured
+from tests.live.server.test_controller import numbers
 from tests.work.test_side_by_side import waited_for
 
 SHORT = 0.3  # s for a request
 
 
 @pytest.fixture(scope="module")
-def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+def port(app) -> Iterator[int]:
     """A server as the command makes it, in a thread."""
-    app = create_app(LiveHub(Session(Parameters()), tmp_path_factory.mktemp("recordings")))
     with listen("127.0.0.1", 0) as listening:
-        server = uvicorn.Server(configured(app, SHORT))
+        server = uvicorn.Server(configured(app("shut-valves"), SHORT))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         thread.start()
         waited_for(lambda: server.started)
@@ -42,12 +37,12 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 
 
 def window(port: int) -> ClientConnection:
-    return connect(f"ws://127.0.0.1:{port}/ws", max_size=None)
+    return connect(f"ws://127.0.0.1:{port}/controller?name=shut-valves")
 
 
-def answered(ws: ClientConnection, identity: int) -> bool:
-    ws.send(json.dumps({"type": "ping", "id": identity}))
-    return any(json.loads(text) == {"type": "pong", "id": identity} for text in ws)
+def answered(ws: ClientConnection) -> bool:
+    ws.send(numbers())
+    return len(ws.recv()) == 32
 
 
 HALVES = [
@@ -65,13 +60,13 @@ def test_a_request_that_never_ends_is_closed_and_others_are_served(port: int, ha
         while stranger.recv(1000):
             pass  # an answer to what it has sent so far
         # This window is older than the time for a request.
-        assert answered(ws, 1)
+        assert answered(ws)
 
 
 def test_half_a_second_request_is_closed_too(port: int) -> None:
     client = http.client.HTTPConnection("127.0.0.1", port)
     for _ in range(2):
-        client.request("GET", "/static/none.js")
+        client.request("GET", "/none.js")
         assert client.getresponse().read()
     client.sock.sendall(b"GET /")
     assert client.sock.recv(1) == b""
@@ -83,12 +78,19 @@ def test_text_that_is_no_text_closes_its_window_alone_and_quietly(port: int, cap
     with window(port) as other, window(port) as ws:
         ws.send(b"\xff\xfe", text=True)
         with contextlib.suppress(ConnectionClosedError):
-            for _ in ws:
-                pass  # frames on their way
+            ws.recv()
         assert ws.close_code == 1007
-        assert answered(other, 2)
+        assert answered(other)
     logging.getLogger("uvicorn.error").removeHandler(caplog.handler)
     assert caplog.records == []
+
+
+def test_a_message_that_is_too_large_closes_its_window(port: int) -> None:
+    with window(port) as ws:
+        ws.send(bytes(LARGEST + 1))
+        with contextlib.suppress(ConnectionClosedError):
+            ws.recv()
+        assert ws.close_code == 1009
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "1e9", "soon"])

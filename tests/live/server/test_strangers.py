@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.session import Session
 from birthsim_live.server.addresses import is_loopback, listen
-from birthsim_live.server.app import create_app
-from birthsim_live.server.live_hub import LiveHub
-from tests.live.server.sockets import HERE, SOCKET, of, until
+from tests.live.server.conftest import HERE
+from tests.live.server.test_controller import SOCKET, numbers
 
 HEADERS = [
     ({"host": "evil.example"}, 403),
@@ -31,32 +26,32 @@ HEADERS = [
 
 @pytest.mark.parametrize(("headers", "status"), HEADERS)
 def test_foreign_hosts_and_origins_are_refused(live: TestClient, headers: dict[str, str], status: int) -> None:
-    reply = live.get("/recordings/none.rec", headers=headers)
-    assert reply.status_code == (404 if status == 200 else 403)
+    reply = live.get("/main.js", headers=headers)
+    assert reply.status_code == status
     if status == 200:
-        with live.websocket_connect(SOCKET, headers=headers) as ws:
-            assert until(ws, of("hello"))
+        with live.websocket_connect(SOCKET + "shut-valves", headers=headers) as ws:
+            ws.send_bytes(numbers())
+            assert len(ws.receive_bytes()) == 32
         return
     assert "foreign" in reply.text
-    with pytest.raises(WebSocketDisconnect), live.websocket_connect(SOCKET, headers=headers) as ws:
+    with pytest.raises(WebSocketDisconnect), live.websocket_connect(SOCKET + "shut-valves", headers=headers) as ws:
         ws.receive_text()
 
 
-def test_a_host_of_ones_own_is_the_only_one(tmp_path: Path) -> None:
-    hub = LiveHub(Session(Parameters()), tmp_path)
-    with TestClient(create_app(hub, ("rig.example",)), base_url="http://rig.example:8000") as one:
+def test_a_host_of_ones_own_is_the_only_one(app) -> None:
+    with TestClient(app(hosts=("rig.example",)), base_url="http://rig.example:8000") as one:
         assert one.get("/nothing").status_code == 404
         assert one.get("/nothing", headers={"host": "127.0.0.1:8000"}).status_code == 403
 
 
 def test_pages_may_only_use_what_is_served_here(live: TestClient) -> None:
-    for place in ("/", "/static/none.js", "/recordings/none.rec"):
+    for place in ("/", "/none.js"):
         headers = live.get(place).headers
-        assert headers["content-security-policy"].startswith("default-src 'self'")
+        assert headers["content-security-policy"] == "frame-ancestors 'none'"
         assert headers["x-content-type-options"] == "nosniff"
-    assert live.get("/docs").status_code == live.get("/openapi.json").status_code == 404
-    assert live.get("/static/../server.py").status_code == 404
-    assert live.get("/static/%2e%2e/server.py").status_code == 404
+    assert "content=\"default-src 'none'; script-src 'self' 'wasm-unsafe-eval'" in live.get("/").text
+    for place in ("/docs", "/openapi.json", "/../pack.py", "/%2e%2e/pack.py", "/rig/../../pack.py"):
+        assert live.get(place).status_code == 404
 
 
 def test_addresses() -> None:

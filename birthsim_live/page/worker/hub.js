@@ -1,0 +1,121 @@
+// The page's messages in, news out.
+
+import { Clock } from "./clock.js";
+import { frameOf } from "./frames.js";
+import { Recorder } from "./recorder.js";
+import { Session } from "./session.js";
+import { checked } from "./settings.js";
+
+export class Hub {
+  /** `post` sends a message to the page. */
+  constructor(pack, bundle, post) {
+    Object.assign(this, { pack, post });
+    this.session = new Session(pack, bundle);
+    this.clock = new Clock(this.session, frameOf, (frame) => this.onFrame(frame));
+    this.told = {};
+    this.lastRecording = null;
+  }
+
+  start() {
+    const { settings, state } = this.news();
+    this.post({ type: "hello", mode: "live", ...this.pack.hello, settings: settings.settings, state });
+    this.clock.paused = Boolean(this.pack.hello.replay); // nobody sees it
+    this.clock.start();
+    this.receive({ type: "set", settings: this.pack.opens });
+  }
+
+  async receive(message) {
+    try {
+      const act = this[`on_${message.type}`];
+      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, set, pause, speed, reset, record`);
+      await act.call(this, message);
+      this.clock.touch();
+    } catch (error) {
+      this.post({ type: "error", message: error.message });
+    }
+  }
+
+  on_drag(hold) {
+    this.session.hands.hold = hold;
+    this.heard = performance.now();
+  }
+
+  on_push(hold) {
+    this.on_drag(hold);
+  }
+
+  on_release() {
+    this.session.hands.hold = null;
+  }
+
+  on_pause({ paused }) {
+    this.clock.pause(paused);
+  }
+
+  on_speed({ speed }) {
+    const least = this.pack.numbers.slowest;
+    if (!(speed >= least && speed <= 1)) throw new Error(`speed = ${speed}; allowed: ${least} to 1 times real time`);
+    this.clock.setSpeed(speed);
+  }
+
+  on_set({ settings }) {
+    const { time } = this.session;
+    this.session.change(checked(settings, this.pack.hello));
+    if (this.session.time < time) this.clock.pace.restart(); // what is compared starts anew
+  }
+
+  on_reset() {
+    this.session.reset();
+    this.clock.pace.restart();
+  }
+
+  async on_record({ on }) {
+    const { session } = this;
+    if (on) session.recorder ??= new Recorder(session, nameOf(new Date()));
+    else await this.endRecording();
+  }
+
+  async endRecording() {
+    const { recorder } = this.session;
+    if (!recorder) return;
+    this.session.recorder = null;
+    this.post({ type: "recorded", name: recorder.name, file: await recorder.file() });
+    this.lastRecording = recorder.name;
+  }
+
+  news() {
+    const { session, clock } = this;
+    const { recorder } = session;
+    if (recorder?.full) this.endRecording().catch(({ message }) => this.post({ type: "error", message }));
+    if (performance.now() - this.heard > 1e3 * this.pack.numbers.patience) this.on_release();
+    return {
+      settings: { type: "settings", settings: session.shownSettings() },
+      state: {
+        type: "state",
+        paused: clock.paused,
+        speed: clock.speed,
+        recording: recorder && { file: recorder.name, seconds: Math.floor(recorder.seconds) },
+        last_recording: this.lastRecording,
+        dragging: session.hands.hold !== null,
+        duration: session.duration,
+      },
+      path: { type: "path", points: session.path() },
+    };
+  }
+
+  onFrame(frame) {
+    for (const [kind, message] of Object.entries(this.news())) {
+      const words = JSON.stringify(message);
+      if (this.told[kind] !== words) this.post(message);
+      this.told[kind] = words;
+    }
+    this.post(frame);
+  }
+}
+
+/** birthsim-20261123-080910.rec */
+function nameOf(now) {
+  const two = (number) => String(number).padStart(2, "0");
+  const day = `${now.getFullYear()}${two(now.getMonth() + 1)}${two(now.getDate())}`;
+  return `birthsim-${day}-${two(now.getHours())}${two(now.getMinutes())}${two(now.getSeconds())}.rec`;
+}

@@ -1,0 +1,81 @@
+"""The page with a rig, as a folder of files that any server can show."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from birthsim_build.faces.module import write_module
+from birthsim_build.image import Words
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.settings import RESIDUAL
+
+PAGE = Path(__file__).resolve().parent.parent / "page"
+"""HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the
+code of every rig, ``loop.bin`` and ``pack.json``."""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """What the worker must know (``content``), the module's ``index``, and the ``words`` of all parts."""
+
+    content: dict[str, Any]
+    index: dict[str, Any]
+    words: Words
+
+
+def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[str] = ()) -> Packed:
+    """What was built where that serves, else ``pack``; ``policies``, folders, are choices besides those that are shipped, and
+    so are controllers that are ``asked`` for by name."""
+    content = json.loads((PAGE / "rig" / "pack.json").read_text(encoding="utf-8"))
+    built = Packed(content, content.pop("index"), np.fromfile(PAGE / "rig" / "loop.bin", dtype=np.int64))
+    known = {one["name"] for one in content["hello"]["choices"]["controller"]}
+    others = [name for name in dict.fromkeys([*asked, *(f"{RESIDUAL}:{one}" for one in policies)]) if name not in known]
+    others = [name for name in others if ".py:" not in name]  # Python runs these
+    if rig == Parameters() and not others:
+        return built
+    from birthsim_live.rig.pack import pack  # which takes a second to load
+
+    return pack(rig, shipped_policies(), content["functions"], others)
+
+
+def shipped_policies() -> list[str]:
+    """Policies that come with the package; none without the extra that policies need."""
+    try:
+        from agents.policy.seeds import shipped_names
+    except ImportError:
+        return []
+    return shipped_names()
+
+
+def write_page(folder: Path, packed: Packed, recording: Path | None = None) -> int:
+    """Write the page of what is ``packed`` into ``folder``, which must be new or empty; its bytes. With a ``recording`` the
+    page plays that.
+
+    Raises ``ValueError`` for a folder with something in it.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"--static {str(folder)!r} is not empty; allowed: a new or empty folder")
+    with tempfile.TemporaryDirectory() as place:
+        made = Path(place) / "page"
+        shutil.copytree(PAGE, made)
+        own = made / "rig"
+        (own / "pack.json").write_text(compact(packed.content))
+        write_module(packed.index, own)
+        packed.words.tofile(own / "loop.bin")
+        if recording is not None:
+            shutil.copyfile(recording, own / "replay.rec")
+        shutil.copytree(made, folder, dirs_exist_ok=True)
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def compact(content: object) -> str:
+    """It as JSON without spaces."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False)

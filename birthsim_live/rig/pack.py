@@ -1,0 +1,237 @@
+"""What a rig in the browser is made of: its parts, as of ``birthsim_build``, and what the worker must know besides, as JSON.
+
+The files of ``page/worker`` read it. The code of the parts is the same for every rig and policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+import birthsim_env
+from baselines.admittance.controller import AdmittanceController
+from baselines.backstepping.controller import BacksteppingController
+from baselines.registry import LISTED, UNCONTROLLED, make_controller
+from baselines.rivals.tracking import TrackingController
+from baselines.staged import StagedController
+from birthsim_build.faces.module import Store
+from birthsim_build.image import INPUT_MEMORY, Part, function_name
+from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, staged_part
+from birthsim_build.stages import Period, enter_sensors, leave_sensors
+from birthsim_env.info import Info
+from birthsim_env.loop.rows import ASKED, WORLD
+from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.world import plant_stage
+from birthsim_env.parts.courses import checked_start
+from birthsim_env.parts.drawn.seeding import stream
+from birthsim_env.parts.scenarios import SCENARIOS, Parts
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics import options
+from birthsim_env.physics.compiled.lanes import PRESSURES, STATE_NAMES, TEMPERATURES, parameter_array, parameter_column
+from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.strength import require_carried
+from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
+from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
+from birthsim_live.rig import stages
+from birthsim_live.rig.folder import Packed
+from birthsim_live.rig.greeting import greeting
+from birthsim_live.rig.settings import OPENS, RESIDUAL, controller_choice
+
+EPISODES = 16
+"""So many episodes have sensors of their own; then those of the first come again."""
+
+PATH_POINTS = 400
+
+WITHOUT = "only with birthsim live"
+"""What the page says of a controller that is not compiled."""
+
+DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
+"""Laws that can be told to damp more."""
+
+INFO = {
+    "joints": "piston_position", "position": "position", "velocity": "velocity", "target": "target",
+    "compliant": "compliant_target", "pressures": "pressure", "openings": "opening", "stiffness": "stiffness_setpoint",
+    "pneumatic": "pneumatic_stiffness", "pneumatic_setpoint": "pneumatic_stiffness_setpoint",
+}  # fmt: skip
+"""Field of a frame -> what it is in ``Info``."""
+
+NUMBERS = {"patience": 3.0, "every": EVERY, "longest": 600.0, "slowest": 0.05}
+"""Assumed: s after which a hand that has not been heard of lets go (the page tells of one that rests every 0.3 s, and a window
+that is frozen would pull for ever); control periods between rows of a recording; s after which it ends; least speed, of real
+time."""
+
+
+def pack(
+    rig: Parameters, policies: Sequence[str], functions: list[str] | None = None, others: Sequence[str] = ()
+) -> Packed:  # fmt: skip
+    """All that a rig in the browser is made of, with ``policies`` (folders or shipped names) and, of ``others`` than the
+    controllers that are listed, those that are compiled; for code that has ``functions``, without them for code that is to be
+    built.
+
+    Raises ``ValueError`` for a rig with options of ``physics.options``, and for one that cannot do what the page opens with.
+    """
+    if not options.are_off(parameter_array(rig, 1)):
+        raise ValueError("the rig has tubes, a weak supply or a soft structure; allowed in the page: none")
+    names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *others]
+    period = rig.electronics.control_period
+    laws = {name: parts for name in names if (parts := controller(name, rig, functions)) is not None}
+    controllers = [controller_choice(name) for name in names if name in laws or name not in others]
+    for one in controllers:
+        if one["name"] not in laws:
+            one["missing"] = WITHOUT
+    tree = {
+        "rig": {
+            "plant": _part(plant_stage(Plant(rig), period)), "clock": CLOCK, "inputs": INPUTS,
+            "start": _part(Stage(stages.begin, parameter_column(rig))),
+            "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
+        },
+        "valves": {"two_valves": {}, "one_valve": {"valves": PAIRED_VALVES}},
+        "scenarios": {name: scenario(name) for name in SCENARIOS},
+        "sensors": {name: sensors(name, rig) for name in SENSORS},
+        "controllers": {name: own for name, (own, _) in laws.items()},
+    }  # fmt: skip
+    if functions is None:  # those of valves that open imperfectly too
+        worn = plant_stage(Plant(rig.replace({"valves.deadband": 0.01})), period)
+        functions = sorted({function_name(stage) for part in (*_all(tree), _part(worn)) for stage in part.stages})
+    store, hello = Store(functions), greeting(rig, controllers)
+    for one in hello["choices"]["scenario"]:
+        if problem := _problem(one["name"], rig):
+            one |= {"missing": "not with this rig", "about": problem}
+    numbers = _numbered(tree, store)
+    content = {
+        "birthsim": birthsim_env.__version__,
+        "functions": functions,
+        "hello": hello,
+        "opens": {"controller": OPENS},
+        "python": [],
+        "signals": [WORLD, ASKED],
+        "info": {
+            **{name: [Info.groups[own].first, FIELDS[name]] for name, own in INFO.items()},
+            "friction": [Info.size, 2], "flows": [Info.size + 2, 4],
+        },
+        "rig": rig_numbers(rig),
+        "range": {
+            STATE_NAMES[row]: limits
+            for rows, limits in ((PRESSURES, PRESSURE_RANGE), (TEMPERATURES, TEMPERATURE_RANGE)) for row in rows
+        },
+        "parts": numbers,
+        "scenarios": {
+            name: {"duration": one.duration, "path": path_of(begun(name), one.duration)} for name, one in SCENARIOS.items()
+        },
+        "sampled": {name: kind.sampled for name, kind in SENSORS.items()},
+        "damped": {name: damped for name, (_, damped) in laws.items()},
+        "numbers": NUMBERS,
+        "header": {
+            "format": FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(), "columns": list(FIELDS),
+            "interval": EVERY * period,
+        },
+    }  # fmt: skip
+    index = {"period": period, "order": ORDER, "zero": store.rows(None), "parts": store.parts}
+    return Packed(content, index, store.words)
+
+
+def rig_numbers(rig: Parameters) -> dict[str, Any]:
+    """The rig's column, and what of it follows from the mass and friction that are set."""
+    cylinders = (rig.cylinder1, rig.cylinder2)
+    return {
+        "column": parameter_column(rig).tolist(),
+        "coulomb": [one.coulomb_friction for one in cylinders],
+        "viscous": [one.viscous_friction for one in cylinders],
+        "static_ratio": rig.friction.static_ratio,
+    }
+
+
+def begun(name: str) -> Parts:
+    """Target, hand and setpoints of a nominal scenario, which are the same in every episode."""
+    parts = SCENARIOS[name].nominal()
+    for part, channel in zip(parts, ("reference", "user_force", "stiffness"), strict=True):
+        part.prepare(1)  # type: ignore[attr-defined]
+        part.begin(0, stream(0, 0, channel))  # type: ignore[attr-defined]
+    return parts
+
+
+def scenario(name: str) -> dict[str, Part]:
+    """A scenario's parts."""
+    target, force, setpoints = (_part(part.stage()) for part in begun(name))  # type: ignore[union-attr]
+    return {"target": target, "setpoints": setpoints, "hand": force}
+
+
+def path_of(scenario: Parts, duration: float) -> list[list[float]]:
+    """Where the target goes within ``duration`` s, m; one point where it rests."""
+    instants = np.linspace(0.0, duration, PATH_POINTS)
+    points = np.round(np.concatenate([scenario[0].sample(np.array([t]))[:2] for t in instants], axis=1).T, 6)
+    return (points if np.ptp(points, axis=0).any() else points[:1]).tolist()  # type: ignore[no-any-return]
+
+
+def _problem(name: str, rig: Parameters) -> str:
+    """Why a rig cannot do a scenario: its target leaves the workspace, or the rig cannot carry its weight there."""
+    (target, _, setpoints), nominal = begun(name), parameter_column(rig)
+    try:
+        start = checked_start(target, setpoints, np.array([0]), 1, SCENARIOS[name].duration, rig, nominal)
+        require_carried(start[:2], rig)
+    except ValueError as error:
+        if name == "probe":  # with which the page opens
+            raise
+        return str(error)
+    return ""
+
+
+def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
+    """The parts of a sensor model, for each episode; the stages have a clock of their own."""
+    model, period, episodes = SENSORS[name](rig.electronics, 1), rig.electronics.control_period, []  # type: Any, float, list[Any]
+    enter, leave = (Stage(one, Period.numbers(period=period), INPUT_MEMORY) for one in (enter_sensors, leave_sensors))
+    for episode in range(EPISODES):
+        model.begin(0, stream(0, episode, "sensors"))
+        own = {"sensors": model.stage(), **({"board": model.board_stage()} if hasattr(model, "board_stage") else {})}
+        for stage in own.values():
+            stage.tables = tuple(table.copy() for table in stage.tables)
+        episodes.append({kind: _part(enter, stage, leave) for kind, stage in own.items()})
+    return episodes
+
+
+def controller(
+    name: str, rig: Parameters, functions: Sequence[str] | None
+) -> tuple[dict[str, dict[str, Part]], bool] | None:  # fmt: skip
+    """The parts of a controller whose law is compiled, for exact and for sampled positions, and whether it can be told to damp
+    more; None where it is not compiled, or needs others than the ``functions`` of the code."""
+    kinds = {"exact": False, "sampled": True}
+    if name.startswith(f"{RESIDUAL}:"):
+        try:
+            from birthsim_build.residual import residual_parts
+        except ImportError as error:
+            raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
+        both = {kind: residual_parts(rig, flag, name.partition(":")[2]) for kind, flag in kinds.items()}
+        return {kind: dict(zip(("policy", "law"), own, strict=True)) for kind, own in both.items()}, False
+    try:
+        law = make_controller(name, rig)
+    except (ImportError, ValueError):
+        return None
+    if not isinstance(law, StagedController) or not law.is_compiled():
+        return None
+    parts = {kind: {"law": staged_part(law, flag)} for kind, flag in kinds.items()}
+    needed = {function_name(stage) for part in _all(parts) for stage in part.stages}
+    return (parts, isinstance(law, DAMPED)) if functions is None or needed <= set(functions) else None
+
+
+def _part(*own: Stage) -> Part:
+    return Part(own, {})
+
+
+def _all(tree: Any) -> Iterator[Part]:
+    if isinstance(tree, Part):
+        yield tree
+    else:
+        for one in tree.values() if isinstance(tree, dict) else tree:
+            yield from _all(one)
+
+
+def _numbered(tree: Any, store: Store) -> Any:
+    """The tree with the number of each part in its place."""
+    if isinstance(tree, Part):
+        return store.number(tree)
+    if isinstance(tree, dict):
+        return {name: _numbered(one, store) for name, one in tree.items()}
+    return [_numbered(one, store) for one in tree]

@@ -1,0 +1,89 @@
+"""A controller that runs in Python for a rig in somebody's browser (``page/worker/remote.js``).
+
+A socket is one controller, from its making to its end. In each control period the page sends numbers: 1 where positions are
+samples, else 0, and the rows of ``Signals``; the answer are the openings of the four valves. Where the controller gives up the
+answer is a line of text, and the end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import time
+import traceback
+from collections.abc import Collection, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from baselines.controller import Controller, checked_command
+from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
+from birthsim_env.loop.signals import Reference
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.settings import controller_choice
+
+QUICK = 0.002
+"""s: a controller that answered in less is called beside all else that is served; a thread of its own costs 0.13 ms more."""
+
+
+def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
+    """Let a page (``Packed.content``) offer what is listed and not compiled, and what is ``asked`` for by name.
+
+    Raises ``ValueError`` for a controller that is none.
+    """
+    choices = content["hello"]["choices"]
+    known = {one["name"]: one for one in choices["controller"]}
+    for name in dict.fromkeys(asked):
+        if name not in known:
+            made(name, rig)
+            known[name] = {**controller_choice(name), "missing": ""}
+            choices["controller"].append(known[name])
+    content["python"] = [name for name, one in known.items() if "missing" in one]
+    for name in content["python"]:
+        known[name].pop("missing")
+    if importlib.util.find_spec("casadi") is None:
+        known["nonlinear-mpc"]["missing"] = "pip install 'birthsim[mpc]'"
+    choices["compare"][1:] = choices["controller"]
+
+
+def made(name: str, rig: Parameters) -> Controller:
+    """The controller ``name``."""
+    from baselines.registry import make_controller  # which takes a third of a second to load
+
+    return make_controller(name, rig)
+
+
+async def command(socket: WebSocket, rig: Parameters, names: Collection[str]) -> None:
+    """Run the controller that the socket's address names, one of ``names``, until the page leaves or it gives up."""
+    name = socket.query_params.get("name", "")
+    if name not in names:
+        await socket.close(1008)
+        return
+    await socket.accept()
+    loop, spent = asyncio.get_running_loop(), QUICK
+    with ThreadPoolExecutor(1) as thread:
+        try:
+            law = await loop.run_in_executor(thread, made, name, rig)
+            while True:
+                numbers = np.frombuffer(await socket.receive_bytes())
+                given, started = (law, name, rig, numbers), time.perf_counter()
+                answer = openings(*given) if spent < QUICK else await loop.run_in_executor(thread, openings, *given)
+                spent = time.perf_counter() - started
+                await socket.send_bytes(answer)
+        except WebSocketDisconnect:
+            return
+        except Exception as error:
+            traceback.print_exc()
+            await socket.send_text("".join(traceback.format_exception_only(error)).strip().splitlines()[-1])
+            await socket.close()
+
+
+def openings(law: Controller, name: str, rig: Parameters, numbers: Any) -> bytes:
+    """What a controller answers, as four numbers."""
+    if numbers.shape != (1 + ASKED,):
+        raise ValueError(f"{numbers.size} numbers; allowed: {1 + ASKED}")
+    sampled, rows = bool(numbers[0]), numbers[1:, None].copy()
+    feels = sampled and rig.electronics.acceleration_bandwidth > 0.0
+    return checked_command(name, law.command(measurement_of(rows, sampled, feels), Reference(rows[REFERENCE:])), 1).tobytes()

@@ -1,0 +1,173 @@
+"""The page as a folder of files: any server shows it below any address, and it records and replays by itself."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+from agents.policy import seeds
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.logs.recording import COLUMNS, load_recording
+from birthsim_live.rig.folder import packed_page, write_page
+from tests.console import run as command
+from tests.live import browser
+from tests.live.browser import CALM, NARROW, Folder, Window
+from tests.live.rig.worker import run
+
+LACK = browser.missing()
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)]
+
+LARGEST = 1.5e6  # bytes
+SOONEST = 2.0  # s from the address to a rig that moves
+SILENT = """async () => {
+  const { load } = await import(new URL("rig/birthsim.js", location));
+  const { Hub } = await import(new URL("worker/hub.js", location));
+  const pack = await (await fetch(new URL("rig/pack.json", location))).json();
+  const read = async (name) => (await fetch(new URL(`rig/${name}`, location))).arrayBuffer();
+  const [code, data] = [await read("loop.wasm"), await read("loop.bin")];
+  const bundle = await load({ code, data });
+  pack.numbers.patience = 0.2;
+  const held = [];
+  return new Promise((resolve) => {
+    const hub = new Hub(pack, bundle, ({ type, pointer }) => {
+      if (type === "frame") held.push(pointer !== null);
+      if (held.includes(true) && held.at(-1) === false) resolve(true);
+    });
+    setTimeout(() => resolve(false), 60e3);
+    hub.start();
+    hub.receive({ type: "drag", position: [0.53, 0], id: 1 });
+  });
+}"""
+"""True once a rig has let go of a hand that said a single word."""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A folder, made by the command, with a policy of one's own."""
+    folder = tmp_path_factory.mktemp("static") / "deeper" / "page"
+    own = shutil.copytree(seeds.SHIPPED / "circle" / "seed_0", tmp_path_factory.mktemp("runs") / "own")
+    done = command("live", "--static", folder, "--policy", own)
+    assert f"written to {folder}" in done.stdout, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(built):
+    """Of the page on a server of files, which has it below another folder."""
+    with Folder(built.parent) as served:
+        yield f"{served}{built.name}/"
+
+
+@pytest.fixture
+def window(chromium, address):
+    with Window(chromium, address + CALM) as opened:
+        opened.wait("birthsim.settings.controller === 'admittance-backstepping'")
+        yield opened
+        assert opened.complaints == []
+        assert opened.foreign == []
+
+
+def test_the_folder_is_small(built):
+    assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
+
+
+def test_the_rig_moves_soon(chromium, address):
+    soonest = []
+    for _ in range(3):  # a busy machine may be late once
+        with Window(chromium, address) as window:
+            soonest.append(window.wait("birthsim.frame.time > 0 && performance.now()"))
+    assert min(soonest) < 1e3 * SOONEST
+
+
+@pytest.mark.parametrize("compare", ["nothing", "backstepping"])
+def test_a_recorded_episode_has_the_bits_of_the_loop(window, tmp_path, compare):
+    page = window.page
+    page.locator("select[name=compare]").select_option(compare)
+    window.wait(f"birthsim.settings.compare === '{compare}'")
+    page.locator("select[name=scenario]").select_option("circle")
+    page.locator("input[name=scenario_force]").check()
+    window.wait("birthsim.settings.scenario === 'circle' && birthsim.settings.scenario_force")
+    window.live(0.3)
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording !== null")
+    page.locator("#pause").click()
+    window.wait("birthsim.state.paused")
+    page.locator("#reset").click()
+    window.wait("birthsim.frame.time === 0")  # paused, it stays there
+    page.locator("#pause").click()
+    window.wait("birthsim.frame.time > 1.5")
+    page.locator("#record").click()
+    window.wait("birthsim.state.recording === null && birthsim.state.last_recording !== null")
+    with page.expect_download() as download:
+        page.locator("#download").click()
+    download.value.save_as(tmp_path / "circle.rec")
+    page.locator("#choose").set_input_files(tmp_path / "circle.rec")
+    window.wait("birthsim.hello.mode === 'replay' && birthsim.state.file === 'circle.rec' && birthsim.frame.time > 0")
+    page.locator("#back").click()
+    window.wait("birthsim.hello.mode === 'live'")
+    recording = load_recording(tmp_path / "circle.rec")
+    begun = int(np.argmin(recording.rows[:, 0]))
+    rows = np.hstack([recording.rows, recording.second])[begun:]
+    assert len(rows) > 300
+    instants = np.round(rows[:, 0] / 0.001).astype(int)
+    settings = {"scenario": "circle", "scenario_force": True, "controller": CALM.partition("=")[2], "compare": compare}
+    write_page(tmp_path / "page", packed_page(Parameters()))
+    told = run(tmp_path / "page", [("set", settings), ("reset", None), ("advance", int(instants[-1]))])[0][-1]
+    expected = np.hstack([told.row, told.second_row]) if compare != "nothing" else told.row
+    moved = instants > 0
+    found, wanted = rows[moved, : expected.shape[1]], expected[instants[moved] - 1]
+    assert np.array_equal(found, wanted, equal_nan=True)
+    assert np.isfinite(rows[moved, COLUMNS]).all() == (compare != "nothing")
+
+
+def test_a_policy_of_ones_own_opens_the_page(chromium, address):
+    with Window(chromium, address) as window:
+        window.wait("birthsim.settings.controller.endsWith('own') && birthsim.frame.lost === null")
+        window.wait("document.querySelector('select[name=controller]').selectedOptions[0].text.includes('own')")
+        window.live(0.2)
+        assert window.complaints == []
+
+
+def test_every_choice_runs_in_the_window(window):
+    for name in ("scenario", "controller", "valves", "sensors"):
+        choices = window.value(f"birthsim.hello.choices.{name}.filter((c) => !c.missing).map((c) => c.name ?? c)")
+        for choice in choices:
+            window.page.locator(f"select[name={name}]").select_option(choice)
+            window.wait(f"birthsim.settings.{name} === {choice!r}")
+            begun = window.frame()
+            window.wait(f"birthsim.frame.time > {begun['time'] + 0.1} || birthsim.frame.lost")
+            assert window.frame()["lost"] is None, (name, choice)
+
+
+def test_a_hand_that_falls_silent_lets_go(window):
+    assert window.page.evaluate(SILENT)
+
+
+def test_what_is_not_allowed_is_named_and_changes_nothing(chromium, address):
+    with Window(chromium, address, NARROW) as window:
+        window.wait("birthsim.settings.controller.endsWith('own')")  # the policy arrives after the page
+        before = window.value("birthsim.settings")
+        window.page.evaluate("() => window.birthsim.send({ type: 'set', settings: { mass: 900 } })")
+        window.wait("document.querySelector('#notices').textContent.includes('mass = 900; allowed: 1.5 to 6 kg')")
+        window.live(0.1)
+        assert window.value("birthsim.settings") == before
+
+
+def test_a_file_that_is_missing_is_named(chromium, built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "page")
+    (folder / "rig" / "loop.wasm").unlink()
+    with Folder(folder) as served:
+        page = chromium.new_page()
+        page.goto(served)
+        page.locator("#offline", has_text="loop.wasm is missing (404)").wait_for()
+        page.close()
+
+
+def test_from_a_disk_it_explains_itself(chromium, built):
+    page = chromium.new_page()
+    page.goto((built / "index.html").as_uri())
+    page.locator("#offline", has_text="run birthsim live, or any server of files").wait_for()
+    page.close()

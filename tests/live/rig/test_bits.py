@@ -1,0 +1,152 @@
+"""The rig of the page computes the bits of the environments: every row of every control period."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from birthsim_build.check.reference import SHARED, loop_rows
+from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
+from birthsim_env import Parameters, StiffnessSchedule, UserForce
+from birthsim_env.loop.rows import SINCE_JUMP
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_live.rig.folder import packed_page, write_page
+from tests.build.targets import assert_same_bits
+from tests.live.rig.worker import run
+
+PERIODS = 400
+ROWS = [row for row in SHARED if row != SINCE_JUMP]
+"""The page has no use for the time since a jump."""
+PULL, FAR, PUSH, HARD = {"position": [0.56, 0.02]}, {"position": [0.7, -0.2]}, {"force": [20, -5]}, {"force": [90, 90]}
+OFFERED = [
+    one["name"]
+    for one in packed_page(Parameters()).content["hello"]["choices"]["controller"]
+    if "missing" not in one and not one["name"].startswith("limited")
+]
+DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
+FEW = {"backstepping", "admittance-backstepping", "residual:circle", "lqr"}
+
+
+class Hand(UserForce):
+    """The scenario's hand where it pushes, and a person's, from the first control period on."""
+
+    closed_loop = True
+
+    def __init__(self, scenario, pushes, position=None, force=(0.0, 0.0)):
+        self.own, self._pushes, self._place, self._push = SCENARIOS[scenario].nominal()[1], pushes, position, np.array(force)
+        self.jump_rate = self.own.jump_rate
+
+    def prepare(self, num_envs):
+        self.own.prepare(num_envs)
+
+    def begin(self, lane, rng):
+        self.own.begin(lane, rng)
+
+    def force(self, time, position, velocity):
+        forces = self.own.force(time, position, velocity) * self._pushes
+        if time[0, 0] > 0:
+            pull = self._push.copy()
+            if self._place:
+                pull += 1000.0 * (np.array(self._place) - position[:, 0]) - DRAG_DAMPING * velocity[:, 0]
+            size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1])
+            forces[0, :, 0] += pull * (DRAG_LIMIT / size) if size > DRAG_LIMIT else pull
+        return forces
+
+
+class Chosen(StiffnessSchedule):
+    """Setpoints of the sliders."""
+
+    def __init__(self, kclx):
+        self._rows = np.array([kclx, 2000.0, 4600.0, 2300.0, 0.0, 0.0, 0.0])[:, None]
+
+    def prepare(self, num_envs):
+        pass
+
+    def begin(self, lane, rng):
+        pass
+
+    def sample(self, time):
+        return np.repeat(self._rows, len(time), axis=1)
+
+
+def expected(controller, settings, hold, rig):
+    """What Gymnasium's environment does under such settings and such a hand."""
+    scenario, sensors = settings.get("scenario", "probe"), settings.get("sensors", "ideal")
+    friction, world = (
+        settings.get("friction", 1.0),
+        {"user_force": Hand(scenario, settings.get("scenario_force", False), **hold)},
+    )
+    changes = {"mechanics.mass": settings.get("mass", rig.mechanics.mass)}
+    for name, cylinder in (("cylinder1", rig.cylinder1), ("cylinder2", rig.cylinder2)):
+        changes[f"{name}.coulomb_friction"] = cylinder.coulomb_friction * friction
+        changes[f"{name}.viscous_friction"] = cylinder.viscous_friction * friction
+    if "Kclx" in settings:
+        world["stiffness"] = Chosen(settings["Kclx"])
+    valves = settings.get("valves", "two_valves")
+    true = rig.replace(changes)
+    return loop_rows(scenario, sensors, controller, PERIODS, rig=rig, parameters=true, valves=valves, **world)[:, ROWS]
+
+
+def check(page, *cases, rig=DEFAULT):
+    """Cases of settings and a hand."""
+    steps = [
+        [("set", {"controller": "admittance-backstepping", **settings}), ("reset", None), ("hold", hold), ("advance", PERIODS)]
+        for settings, hold in cases
+    ]
+    for (settings, hold), told in zip(cases, run(page, *steps), strict=True):
+        law = settings.get("controller", "admittance-backstepping")
+        assert_same_bits(told[-1].rows[:, ROWS], expected(law, settings, hold or {}, rig))
+        if "compare" in settings:
+            assert_same_bits(told[-1].second_rows[:, ROWS], expected(settings["compare"], settings, hold or {}, rig))
+
+
+def on_the_circle(name, sensors):
+    return {"scenario": "circle", "controller": name, "sensors": sensors, "scenario_force": True}
+
+
+def test_a_law_a_policy_and_a_hand(page):
+    check(
+        page, (on_the_circle("backstepping", "lab"), None), (on_the_circle("residual:circle", "ideal"), None),
+        ({"controller": "backstepping", "compare": "admittance-backstepping"}, PULL),
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_every_scenario_with_every_sensor(page):
+    check(page, *(({"scenario": one, "sensors": kind, "scenario_force": True}, None) for one in SCENARIOS for kind in SENSORS))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_every_controller(page, sensors):
+    assert set(OFFERED) >= FEW
+    check(page, *((on_the_circle(name, sensors), None) for name in OFFERED))
+
+
+@pytest.mark.slow
+def test_another_rig_other_setpoints_one_valve_and_hands(page):
+    rig = {"scenario": "circle", "mass": 4.3, "friction": 1.37, "scenario_force": True}
+    check(
+        page,
+        (rig, None),
+        ({**rig, "Kclx": 3150.0, "valves": "one_valve"}, None),
+        *(({}, one) for one in (PULL, FAR, PUSH, HARD)),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("backstepping", "admittance-backstepping"), ("residual:circle", "backstepping"), ("pid", "residual:circle_lab")],
+)
+def test_both_rigs_are_what_each_would_be_alone(page, one, other):
+    check(page, ({**on_the_circle(one, "lab"), "compare": other, "mass": 4.0}, PULL))
+
+
+@pytest.mark.slow
+def test_a_rig_of_ones_own_with_worn_valves(tmp_path):
+    write_page(tmp_path / "page", packed_page(WORN))
+    check(tmp_path / "page", (on_the_circle("admittance-backstepping", "lab"), PULL), rig=WORN)

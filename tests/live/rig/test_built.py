@@ -1,0 +1,61 @@
+"""What the package carries of the page's rig is what its sources make: ``python -m birthsim_live.rig.build`` renews it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import birthsim_env
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.logs.recording import FIELDS
+from birthsim_live.rig.build import build
+from birthsim_live.rig.folder import PAGE, compact, packed_page
+from birthsim_live.rig.greeting import greeting
+from birthsim_live.rig.pack import rig_numbers
+from tests.build.targets import need_linker
+
+BUILT = PAGE / "rig"
+RENEW = "python -m birthsim_live.rig.build renews it"
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    need_linker()
+    folder = tmp_path_factory.mktemp("built")
+    build(folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_code_is_equal_in_every_byte(fresh):
+    assert (BUILT / "loop.wasm").read_bytes() == (fresh / "loop.wasm").read_bytes(), RENEW
+
+
+@pytest.mark.slow
+def test_data_are_equal(fresh):
+    assert json.loads((BUILT / "pack.json").read_text()) == json.loads((fresh / "pack.json").read_text()), RENEW
+    built, made = (np.fromfile(folder / "loop.bin", dtype=np.int64) for folder in (BUILT, fresh))
+    differs = np.flatnonzero(built != made)
+    # Other processors design a linear regulator with other rounding errors.
+    np.testing.assert_allclose(*(words[differs].view(np.float64) for words in (built, made)), rtol=1e-6, err_msg=RENEW)
+
+
+def test_it_says_what_the_words_and_the_rig_say():
+    packed, rig = packed_page(Parameters()), Parameters()
+    assert packed.content["birthsim"] == birthsim_env.__version__, RENEW
+    hello = json.loads(compact(greeting(rig, packed.content["hello"]["choices"]["controller"])))
+    assert packed.content["hello"] == hello, RENEW
+    assert packed.content["rig"] == json.loads(compact(rig_numbers(rig))), RENEW
+
+
+def test_it_is_small():
+    assert sum(path.stat().st_size for path in BUILT.iterdir()) < 0.8e6
+
+
+def test_the_page_knows_the_columns_of_a_recording():
+    """It reads recordings by names and sizes of its own."""
+    text = (PAGE / "frame.js").read_text(encoding="utf-8").partition("FIELDS = {")[2].partition("}")[0]
+    named = [entry.partition(":") for entry in text.split(",") if entry.strip()]
+    assert [(name.strip(), int(size)) for name, _, size in named] == list(FIELDS.items())

@@ -1,0 +1,109 @@
+"""A policy of one's own, another rig, and a rig that the page cannot show: ``birthsim live``."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.policy.files import load_policy
+from agents.policy.seeds import SHIPPED, best_policy
+from birthsim_build.residual import residual_parts
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.folder import packed_page, write_page
+from tests.console import call
+from tests.live.rig.worker import run
+
+RIG = Parameters()
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> str:
+    """A folder as birthsim train leaves it."""
+    return str(shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "run 1" / "seed_0").parent)
+
+
+def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Path) -> None:
+    rig = RIG.replace({"mechanics.mass": 2.5, "cylinder1.coulomb_friction": 9.0})
+    packed = packed_page(rig, [mine, "forceps"])
+    listed = packed.content["hello"]["choices"]["controller"]
+    choices = {one["name"]: one for one in listed}
+    assert len(choices) == len(listed)
+    assert "run 1" in choices[f"residual:{mine}"]["title"]
+    numbers = packed.content["parts"]["controllers"]
+    copied, other = numbers[f"residual:{mine}"], numbers["residual:forceps"]
+    assert copied["exact"]["policy"] == copied["sampled"]["policy"]  # kept once
+    assert copied["exact"]["policy"] != other["exact"]["policy"]
+    write_page(tmp_path / "page", packed)
+    told = run(
+        tmp_path / "page",
+        [("set", {"controller": f"residual:{mine}", "scenario": "circle"}), ("reset", None), ("advance", 300)],
+    )
+    assert told[0][-1].lost is None
+    assert told[0][-1].settings["mass"] == 2.5
+    assert np.isfinite(told[0][-1].of("position")).all()
+
+
+def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
+    name = "circle_honest_student"
+    policy, _ = residual_parts(RIG, True, name)
+    cells = load_policy(best_policy(name)).network.cells
+    assert cells > 0
+    memory = policy.stages[-1].memory
+    assert memory is not None
+    np.testing.assert_array_equal(memory[:, 0], np.zeros(1 + cells))
+
+
+@pytest.mark.parametrize("where", [["--port", "0"], ["--static", "page"]])
+def test_what_is_no_policy_is_refused_in_one_line(
+    where: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, _, complained = call("live", monkeypatch, capsys, "--policy", "circle", "nowhere", *where)
+    assert status == 2
+    assert complained.strip().splitlines()[-1].startswith("birthsim live: error: policy = 'nowhere'")
+    assert not (tmp_path / "page").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[chambers]\ntube_length = 1.0\n", "tubes"),
+        ("[mechanics]\nmass = 90.0\n", "mass"),
+    ],
+)
+def test_a_rig_that_the_page_cannot_show_is_refused(text, said, tmp_path, monkeypatch, capsys):
+    (tmp_path / "rig.toml").write_text(text)
+    options = ("--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
+    status, _, complained = call("live", monkeypatch, capsys, *options)
+    assert status == 2
+    assert said in complained.splitlines()[-1]
+    assert not (tmp_path / "page").exists()
+
+
+def test_a_scenario_that_a_rig_cannot_do_is_no_choice() -> None:
+    rig = RIG.replace({"cylinder2.stroke": 0.04})
+    choices = {one["name"]: one for one in packed_page(rig).content["hello"]["choices"]["scenario"]}
+    assert "missing" not in choices["probe"]
+    assert choices["circle"]["missing"] == "not with this rig"
+    assert "unreachable" in choices["circle"]["about"]
+
+
+def test_a_controller_with_options_is_compiled_too() -> None:
+    names = ["pid[bandwidth=30]", "admittance", "limited:pid", "nobody"]
+    content = packed_page(RIG, [], names).content
+    listed = [one["name"] for one in content["hello"]["choices"]["controller"]]
+    assert listed[-2:] == names[:2]  # the others are for Python, or none
+    laws = content["parts"]["controllers"]
+    assert laws["pid[bandwidth=30]"] != laws["pid"]
+    assert laws["admittance"] == laws["admittance-adaptive"]
+
+
+def test_a_folder_with_something_in_it_is_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.txt").write_text("mine")
+    status, _, complained = call("live", monkeypatch, capsys, "--static", tmp_path)
+    assert status == 2
+    assert complained.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

@@ -1,0 +1,116 @@
+"""Controllers that run in Python for a rig in a browser: numbers in, openings out, or why not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocketDisconnect
+
+from birthsim_build.check.reference import whole_rows
+from birthsim_env.loop.rows import ASKED, OPENING, WORLD
+from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.folder import packed_page
+from birthsim_live.server.controller import offer
+from tests.live.server.conftest import HERE
+
+SOCKET = "ws://127.0.0.1:8000/controller?name="
+OWN = """
+import time
+
+import numpy as np
+from baselines.registry import make_controller
+
+class Law:
+    def __init__(self, parameters):
+        self.own = make_controller("backstepping", parameters)
+    def reset(self, lanes=None):
+        pass
+    def command(self, measurement, reference):
+        return self.own.command(measurement, reference)
+
+class Fails(Law):
+    def command(self, measurement, reference):
+        return 1 / 0
+
+class Slow(Law):
+    def command(self, measurement, reference):
+        time.sleep(0.02)
+        return self.own.command(measurement, reference)
+
+class Hangs(Law):
+    def command(self, measurement, reference):
+        time.sleep(5.0)
+        return self.own.command(measurement, reference)
+
+class Wide(Law):
+    def command(self, measurement, reference):
+        return np.full((4, 1), 2.0)
+"""
+
+
+def numbers(rows: np.ndarray | None = None, sampled: bool = False) -> bytes:
+    """What the page sends."""
+    return np.concatenate([[float(sampled)], np.zeros(ASKED) if rows is None else rows]).tobytes()
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> str:
+    (tmp_path / "mine.py").write_text(OWN)
+    return str(tmp_path / "mine.py")
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+def test_it_answers_what_it_commands_in_a_loop(sensors: str, own: str, app: Callable[..., ASGIApp]) -> None:
+    seen = whole_rows("circle", sensors, "backstepping", 100)[:, WORLD:]
+    name = f"{own}:Law"
+    with TestClient(app(name), base_url=HERE) as live, live.websocket_connect(SOCKET + name) as ws:
+        for before, after in pairwise(seen):
+            ws.send_bytes(numbers(before[:ASKED], sensors == "lab"))
+            assert np.array_equal(np.frombuffer(ws.receive_bytes()), after[OPENING : OPENING + 4])
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [("Fails", "ZeroDivisionError: division by zero"), ("Wide", "command()[0, 0] = 2.0; allowed"), ("None", "has no 'None'")],
+)
+def test_one_that_gives_up_says_why_and_is_closed(kind: str, said: str, own: str, app: Callable[..., ASGIApp], capfd) -> None:
+    name = f"{own}:{kind}"
+    with TestClient(app(name), base_url=HERE) as live, live.websocket_connect(SOCKET + name) as ws:
+        ws.send_bytes(numbers())
+        assert said in ws.receive_text()
+        with pytest.raises(WebSocketDisconnect):
+            ws.receive_text()
+    assert "Traceback" in capfd.readouterr().err  # where the author looks
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 7, b"\0" * 8 * ASKED, b"\0" * 3000])
+def test_what_is_no_measurement_is_refused(content: bytes, live: TestClient, capfd) -> None:
+    with live.websocket_connect(SOCKET + "shut-valves") as ws:
+        ws.send_bytes(content)
+        assert ws.receive_text().startswith("ValueError: ")
+
+
+@pytest.mark.parametrize("name", ["", "pid", "nobody", "/etc/passwd", "mine.py:Law"])
+def test_what_is_not_offered_does_not_run(name: str, live: TestClient) -> None:
+    with pytest.raises(WebSocketDisconnect), live.websocket_connect(SOCKET + name) as ws:
+        ws.receive_text()
+
+
+def test_the_page_offers_what_python_can_run(own: str) -> None:
+    content = packed_page(Parameters()).content
+    missing = [one["name"] for one in content["hello"]["choices"]["controller"] if "missing" in one]
+    assert missing == ["nonlinear-mpc", "shut-valves", "slammed-valves", "random-valves"]
+    offer(content, Parameters(), [f"{own}:Law", "backstepping"])
+    assert content["python"] == [*missing, f"{own}:Law"]
+    for name in ("controller", "compare"):
+        choices = {one["name"]: one for one in content["hello"]["choices"][name]}
+        assert choices[f"{own}:Law"]["title"] == "mine.py:Law"
+        assert all("missing" not in choices[name] or "mpc" in choices[name]["missing"] for name in missing)
+    with pytest.raises(ValueError, match=r"controller = 'nobody'"):
+        offer(content, Parameters(), ["nobody"])
