@@ -9,7 +9,7 @@ import pytest
 from birthsim_env import Circle, Hold, Parameters, Path
 from birthsim_env.parts.courses import check_drawn
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
-from tests.odd_rigs import odd_rig
+from studies.fuzz.odd_rigs import odd_rig
 
 LATE = (116, 243)
 """Seeds of odd rigs whose first episodes were reachable, and later ones not."""

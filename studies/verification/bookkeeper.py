@@ -71,4 +71,5 @@ class Bookkeeper:
 
     def gap(self) -> Array:
         """Largest relative difference of books and chambers, (mass, energy)."""
-        return np.abs(self.ledger / mass_and_energy(self.rig, self.plant.state) - 1).max(axis=(1, 2))
+        gap: Array = np.abs(self.ledger / mass_and_energy(self.rig, self.plant.state) - 1).max(axis=(1, 2))
+        return gap

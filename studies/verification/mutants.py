@@ -1,6 +1,6 @@
-"""Mutation scores as the report has them: a summary of what ``tests.mutation`` writes, with hashes and judgements.
+"""Mutation scores as the report has them: a summary of what ``birthsim study mutation`` writes, with hashes and judgements.
 
-python -m tests.mutation --out out/mutation.json && python -m tests.verification mutation out/mutation.json
+birthsim study mutation --out out/mutation.json && birthsim study verification mutation out/mutation.json
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from tests.mutation import HERE as TESTS
-from tests.mutation import MODULES
-from tests.verification import sources
+from studies.mutation.modules import MODULES, files_of
+from studies.verification import sources
 
 JUDGEMENTS = Path(__file__).parent / "survivors.toml"
 VERDICTS = ("equivalent", "numerical", "out of reach", "missing test")
@@ -21,12 +20,11 @@ any tolerance that means something. Out of reach: only inputs that callers exclu
 
 
 def summary(results: dict[str, Any]) -> dict[str, Any]:
-    """Of each module in a report of ``tests.mutation``: score, survivors, tests, and the hashes of what was measured."""
+    """Of each module in a report of the mutation tester: score, survivors, tests, and the hashes of what was measured."""
     found = {}
     for module, result in results.items():
         mutants = result["mutants"]
-        files = [sources.path_of(module)]
-        files += [str(path.relative_to(sources.ROOT)) for name in MODULES[module] for path in TESTS.rglob(f"test_{name}.py")]
+        files = [sources.path_of(module), *(str(path.relative_to(sources.ROOT)) for path in files_of(module))]
         found[module] = {
             "every": result["every"],
             "tried": len(mutants),
@@ -46,7 +44,7 @@ def summary(results: dict[str, Any]) -> dict[str, Any]:
 
 
 def take(path: Path) -> None:
-    """Put the modules of a report of ``tests.mutation`` in the place of their older measurements."""
+    """Put the modules of a report of ``birthsim study mutation`` in the place of their older measurements."""
     stored = sources.load("mutation") if (sources.MEASURED / "mutation.json").is_file() else {}
     new = stored | summary(json.loads(path.read_text(encoding="utf-8")))
     sources.keep("mutation", {module: new[module] for module in MODULES if module in new})

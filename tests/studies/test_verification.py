@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from tests.mutation import MODULES
-from tests.verification import balances, mutants, report, sources
+from studies.mutation.modules import MODULES
+from studies.verification import balances, mutants, report, sources
 
 TABLES = {name: report.entries(name) for name in ("equation", "promise")}
 NODES = sorted({node for table in TABLES.values() for entry in table for node in entry["tests"]})
@@ -47,7 +47,7 @@ def test_every_promise_has_its_page_and_its_bounds(entry):
 
 
 def test_the_page_is_the_one_that_tables_and_measurements_make():
-    """``make verify`` or ``python -m tests.verification report`` writes it anew."""
+    """``make verify`` or ``python -m studies.verification report`` writes it anew."""
     fresh, stored = report.page(), report.PAGE.read_text(encoding="utf-8")
     assert without_staleness(fresh) == without_staleness(stored)
 
@@ -132,7 +132,7 @@ def test_balances_close_at_the_plants_step(monkeypatch):
 def test_stages_run_as_plain_python():
     """What mutants and coverage rely on: a whole closed loop without machine code gives the compiled openings."""
     script = (
-        "import sys; from tests.uncompiled import switch_off\n"
+        "import sys; from studies.mutation.uncompiled import switch_off\n"
         "if len(sys.argv) > 1: switch_off()\n"
         "import numpy as np; from baselines import BacksteppingController\n"
         "from birthsim_env.physics.geometry import s_squared\n"

@@ -1,6 +1,6 @@
 """Balances of the plant in figures: mass and energy of the chambers, mechanical energy of the pistons.
 
-python -m tests.verification balances
+birthsim study verification balances
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles.bookkeeper import GAMMA, Bookkeeper, P, Volumes
+from studies.verification.bookkeeper import GAMMA, Bookkeeper, P, Volumes
 
 LANES, SECONDS = 6, 2.0
 COLLIDING = 36
 _PHYSICS = ("dynamics", "chambers", "valves", "mechanics", "friction", "geometry", "equilibrium", "lanes", "parameters")
 SOURCES = (
-    *("tests/verification/balances.py", "tests/oracles/bookkeeper.py"),
+    *("studies/verification/balances.py", "studies/verification/bookkeeper.py"),
     *(f"birthsim_env/physics/{name}.py" for name in _PHYSICS),
 )
 """Files that decide these figures."""
@@ -76,13 +76,14 @@ def mechanical_energy(step: float) -> dict[str, float]:
 
     def energy() -> Array:
         motion = plant.end_effector()
-        return 0.5 * mass * (motion[2] ** 2 + motion[3] ** 2) + weight * motion[1]
+        found: Array = 0.5 * mass * (motion[2] ** 2 + motion[3] ** 2) + weight * motion[1]
+        return found
 
     def power(push: Array) -> Array:
         # What the pistons pass on: m a = F, so that power is force times speed of each piston, friction taken off.
         rates, motion = plant.derivatives(plant.state, np.zeros((4, lanes)), push), plant.end_effector()
         s, friction = plant.state, rig.friction
-        total = push[0] * motion[2] + push[1] * motion[3]
+        total: Array = push[0] * motion[2] + push[1] * motion[3]
         for row, cylinder, pp, pn in ((0, rig.cylinder1, 6, 8), (2, rig.cylinder2, 10, 12)):
             speed, bristle = s[row + 1], s[4 + row // 2]
             net = s[pp] * cylinder.area_p - s[pn] * cylinder.area_n

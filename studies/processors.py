@@ -2,9 +2,9 @@
 
 Kernels are compiled for each, with a cache of its own; PyTorch, NumPy, OpenBLAS, oneDNN and the C library are held back to the
 same instructions. What this machine's processor lacks is left out, and said. A setting can also be taken alone:
-    python -m tests.processors x86-64                      its tests
-    python -m tests.processors x86-64 -- COMMAND ...       any command under it
-    python -m tests.processors here                        the numeric tests on this processor as it is: ``make oldest``
+    python -m studies.processors x86-64                      its tests
+    python -m studies.processors x86-64 -- COMMAND ...       any command under it
+    python -m studies.processors here                        the numeric tests on this processor as it is: ``make oldest``
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from llvmlite.binding import get_host_cpu_features
+from numpy._core import _multiarray_umath  # type: ignore[attr-defined]
 
 ROOT = Path(__file__).parent.parent
 NUMERIC = [f"tests/{room}" for room in ("oracles", "physics", "estimation", "contracts")]
@@ -55,8 +55,8 @@ class Processor:
     def environment(self, name: str) -> dict[str, str]:
         """Variables that make a process believe that it runs there."""
         # NumPy warns of a feature that it could not have used anyway.
-        dispatched = {name for name, used in np._core._multiarray_umath.__cpu_features__.items() if used}
-        dispatched &= set(np._core._multiarray_umath.__cpu_dispatch__)
+        dispatched = {name for name, used in _multiarray_umath.__cpu_features__.items() if used}
+        dispatched &= set(_multiarray_umath.__cpu_dispatch__)
         return {
             "NUMBA_CPU_NAME": self.llvm,
             "NUMBA_CPU_FEATURES": ",".join(f"+{feature}" for feature in self.features),

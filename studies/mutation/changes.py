@@ -6,9 +6,11 @@ import ast
 import copy
 import inspect
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from types import CodeType, ModuleType
+from typing import Any
 
 ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
 BOUNDARY = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
@@ -29,7 +31,7 @@ class Mutant:
     apply: Callable[[], None]
 
 
-def alternatives(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+def alternatives(node: Any) -> Iterator[tuple[str, Any]]:
     """The changes of one node: name of the operator and new node."""
     changed = copy.copy(node)
     match node:
@@ -38,10 +40,10 @@ def alternatives(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield "arithmetic", changed
         case ast.Compare(ops=ops):
             for name, table in (("boundary", BOUNDARY), ("opposite", OPPOSITE)):
-                for k, op in enumerate(ops):
-                    if type(op) in table:
+                for k, comparison in enumerate(ops):
+                    if type(comparison) in table:
                         changed = copy.copy(node)
-                        changed.ops = [*ops[:k], table[type(op)](), *ops[k + 1 :]]
+                        changed.ops = [*ops[:k], table[type(comparison)](), *ops[k + 1 :]]
                         yield name, changed
         case ast.BoolOp(op=op):
             changed.op = ast.And() if isinstance(op, ast.Or) else ast.Or()
@@ -69,11 +71,12 @@ def alternatives(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
                 yield "call", node.args[0]
 
 
-def sites(node: ast.AST) -> Iterator[tuple[ast.AST, list | dict, int | str]]:
+def sites(node: ast.AST) -> Iterator[tuple[Any, Any, int | str]]:
     """Every node below ``node`` in the order of the text, with the list or dictionary that holds it and its key there."""
     for field, value in ast.iter_fields(node):
         if field not in UNTOUCHED:
-            holder, keys = (value, range(len(value))) if isinstance(value, list) else (vars(node), [field])
+            holder: Any = value if isinstance(value, list) else vars(node)
+            keys: Iterable[int | str] = range(len(value)) if holder is value else [field]
             for key in keys:
                 if isinstance(child := holder[key], ast.AST):
                     yield child, holder, key
@@ -96,19 +99,19 @@ def compiled(function: ast.FunctionDef, path: str) -> CodeType:
 
 def function_mutants(module: ModuleType, function: ast.FunctionDef) -> Iterator[Mutant]:
     """The mutants of a function whose code differs."""
-    target, counts = inspect.unwrap(getattr(module, function.name)), Counter()
-    seen = {essence(compiled(function, module.__file__))}
+    target, counts, path = inspect.unwrap(getattr(module, function.name)), Counter[str](), str(module.__file__)
+    seen = {essence(compiled(function, path))}
     for node, holder, key in sites(function):
         for operator, new in alternatives(node):
             holder[key] = new
-            code = compiled(function, module.__file__)
+            code = compiled(function, path)
             holder[key] = node
             counts[operator] += 1
             if essence(code) not in seen:
                 seen.add(essence(code))
                 name = f"{module.__name__}:{function.name}:{operator}:{counts[operator]}"
                 change = f"{ast.unparse(node)}  ->  {ast.unparse(new)}"
-                yield Mutant(name, node.lineno, change, lambda code=code: setattr(target, "__code__", code))
+                yield Mutant(name, node.lineno, change, partial(setattr, target, "__code__", code))
 
 
 def mutants_of(module: ModuleType) -> Iterator[Mutant]:
@@ -119,6 +122,6 @@ def mutants_of(module: ModuleType) -> Iterator[Mutant]:
                 yield from function_mutants(module, node)
             case ast.Assign(targets=[ast.Name(id=name)], value=ast.Constant(value=int() | float()) as old):
                 [(operator, new)] = alternatives(old)
-                change = f"{name} = {old.value}  ->  {new.value}"
-                apply = lambda name=name, new=new: setattr(module, name, new.value)  # noqa: E731
+                change = f"{name} = {old.value!r}  ->  {new.value!r}"
+                apply = partial(setattr, module, name, new.value)
                 yield Mutant(f"{module.__name__}:{name}:{operator}:1", node.lineno, change, apply)

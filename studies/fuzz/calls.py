@@ -10,8 +10,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import Rng, strange
+from studies.fuzz.harness import Case, Kind
+from studies.fuzz.mutations import Rng, strange
 
 CIRCLE, STEPS = "BirthSIM/Circle-v1", 4
 
@@ -73,7 +73,7 @@ def _ready(_: Path) -> None:
         env.step(np.zeros(env.action_space.shape))
 
 
-def _environment(_: None, rng: Rng, folder: Path, case: Case) -> None:
+def _environment(_prepared: None, rng: Rng, folder: Path, case: Case) -> None:
     vector = bool(rng.integers(2))
     arguments = _drawn(rng, {**GOOD, **(VECTOR if vector else {})}, 0.2)
     given = _drawn(rng, RESET if vector else {name: RESET[name] for name in ("seed", "position")}, 0.3)
@@ -166,7 +166,7 @@ def _use(made: Any, rng: Rng) -> None:
     from birthsim_env.vector_env import BirthSIMVectorEnv
 
     role = {Trajectory: "reference", UserForce: "user_force", StiffnessSchedule: "stiffness"}
-    arguments = {role[kind]: made for kind in role if isinstance(made, kind)}
+    arguments: dict[str, Any] = {role[kind]: made for kind in role if isinstance(made, kind)}
     env: Any = BirthSIMVectorEnv("circle", num_envs=2, duration=1.0, **arguments) if arguments else None
     if hasattr(made, "command"):
         env = BirthSIMVectorEnv("circle", num_envs=2, policy_period=0.001)
@@ -197,7 +197,8 @@ def _constructor(makers: dict[str, tuple[Callable[..., Any], bool]], rng: Rng, f
     if tunable:
         defaults = dict.fromkeys(tunable, 1.0)
     defaults.pop("parameters", None)
-    required = {one: value for one, value in (("sizes", (100.0,)), ("rate", 70.0), ("scenario", "probe")) if one in defaults}
+    every: dict[str, Any] = {"sizes": (100.0,), "rate": 70.0, "scenario": "probe"}
+    required = {one: value for one, value in every.items() if one in defaults}
     if name == "Plant":
         required = {"parameters": Parameters()}
     arguments = {**required}
@@ -212,11 +213,11 @@ def _constructor(makers: dict[str, tuple[Callable[..., Any], bool]], rng: Rng, f
     _use(made, rng)
 
 
-def _field(_: None, rng: Rng, folder: Path, case: Case) -> None:
+def _field(_prepared: None, rng: Rng, folder: Path, case: Case) -> None:
     import dataclasses
 
     from birthsim_env.physics.rig.parameters import Parameters
-    from tests.fuzz.files import run_a_little
+    from studies.fuzz.files import run_a_little
 
     rig = Parameters()
     sections = [field.name for field in dataclasses.fields(rig) if field.name != "ranges"]

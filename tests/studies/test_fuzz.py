@@ -11,15 +11,15 @@ import sys
 import numpy as np
 import pytest
 
+from studies.fuzz import harness
+from studies.fuzz.harness import Case, Kind, fuzz
+from studies.fuzz.kinds import KINDS
+from studies.fuzz.mutations import nested
 from tests.console import ROOT
-from tests.fuzz import harness
-from tests.fuzz.harness import Case, Kind, fuzz
-from tests.fuzz.kinds import KINDS
-from tests.fuzz.mutations import nested
 
 
 def assert_no_failures(tmp_path, cases, seed):
-    line = [sys.executable, "-m", "tests.fuzz", "--kind", *KINDS, "--cases", str(cases), "--seed", str(seed)]
+    line = [sys.executable, "-m", "birthsim", "study", "fuzz", "--kind", *KINDS, "--cases", str(cases), "--seed", str(seed)]
     line += ["--out", str(tmp_path / "fuzz.json")]
     ended = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout

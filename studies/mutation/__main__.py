@@ -1,6 +1,6 @@
 """Mutation tester of the small numerical modules: a changed operator or number in them should make some test fail.
 
-``python -m tests.mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the fraction of
+``birthsim study mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the fraction of
 mutants killed of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant;
 ``--again`` goes on from one: after new tests only the survivors are tried.
 
@@ -25,41 +25,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
-from tests.changes import mutants_of
-from tests.uncompiled import switch_off
-
-HERE = Path(__file__).parent
-
-MODULES = {
-    "birthsim_env.physics.geometry": ("dynamics", "strict_feedback", "inverse_kinematics", "geometry", "mechanics"),
-    "birthsim_env.physics.mechanics": ("dynamics", "strict_feedback", "cartesian_stiffness", "mechanics"),
-    "birthsim_env.physics.friction": ("dynamics", "strict_feedback", "reference_friction", "friction", "elasto_plastic"),
-    "birthsim_env.physics.chambers": ("dynamics", "chambers"),
-    "birthsim_env.physics.valves": ("dynamics", "valve_inverse", "valves"),
-    "birthsim_env.physics.control_model": ("strict_feedback", "valve_inverse", "control_model"),
-    "birthsim_env.physics.dynamics": ("dynamics", "mechanics", "plant"),
-    "birthsim_env.physics.equilibrium": ("equilibrium", "plant", "elasto_plastic", "mechanics"),
-    "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
-    "birthsim_env.physics.compiled.exact": ("exact",),
-    "baselines.backstepping.gains": ("gain_limits", "gains", "damping"),
-    "baselines.backstepping.law": (
-        "law_kernel",
-        "backstepping",
-        "damping",
-        "backstepping_lanes",
-        "one_valve",
-        "force_first_law",
-        "lyapunov",
-    ),
-    "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
-    "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
-    "baselines.admittance.law": ("admittance_law", "admittance_backstepping"),
-    "baselines.valve_inverse": ("valve_inverse", "backstepping", "one_valve", "force_first"),
-}
-"""The test files (``tests/*/test_*.py``) that concern a module, the quickest first."""
+from studies.mutation.changes import mutants_of
+from studies.mutation.modules import MODULES, files_of
+from studies.mutation.uncompiled import switch_off
 
 LIMIT = 40.0
 """CPU seconds of one test, uncompiled, beyond which it is left out (``--limit``). The balance of the chambers needs 25."""
@@ -121,7 +93,7 @@ def run_here(item: pytest.Item, seconds: float) -> str | None:
 class Tester:
     """A pytest plugin that runs the collected tests of each module once per mutant."""
 
-    def __init__(self, options: argparse.Namespace, report: Callable[[str, dict], None]) -> None:
+    def __init__(self, options: argparse.Namespace, report: Callable[[str, dict[str, Any]], None]) -> None:
         self.modules, self.every, self.report = options.module, options.every, report
         self.limit, self.budget = options.limit, options.budget
         self.again = json.loads(options.again.read_text()) if options.again else {}
@@ -163,10 +135,10 @@ class Tester:
                 chosen.append(item)
         return chosen, left_out
 
-    def examine(self, module: ModuleType, items: list[pytest.Item]) -> dict:
+    def examine(self, module: ModuleType, items: list[pytest.Item]) -> dict[str, Any]:
         """CPU seconds of the tests and of all mutants; the tests left out; what killed each mutant, None where it survived."""
         chosen, left_out = self.select(module.__name__, items)
-        cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter()
+        cost, kills = {item.nodeid: self.measured[item.nodeid][1] for item in chosen}, Counter[str | None]()
         control, together = run_in_child(chosen, 2 * self.budget + 5, lambda: None)
         if control:
             raise RuntimeError(f"{module.__name__} without a change: {control}")
@@ -185,7 +157,7 @@ class Tester:
         return found | {"seconds": total + earlier.get("seconds", 0.0)}
 
 
-def print_results(module: str, results: dict, before: dict) -> None:
+def print_results(module: str, results: dict[str, Any], before: dict[str, Any]) -> None:
     """The fraction of killed mutants, the survivors, and what differs from the mutants ``before``."""
     mutants = results["mutants"]
     alive = [name for name, mutant in mutants.items() if mutant["killed_by"] is None]
@@ -201,7 +173,8 @@ def print_results(module: str, results: dict, before: dict) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Mutation score of the tests of the small numerical modules.")
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="birthsim study mutation", description="Mutation score of numerical modules.")
     parser.add_argument("--module", nargs="+", choices=list(MODULES), default=list(MODULES), metavar="NAME")
     parser.add_argument("--every", type=int, default=1, metavar="K", help="try only every k-th mutant of a module")
     parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help="CPU seconds of a test (default: %(default)s)")
@@ -216,27 +189,14 @@ def main() -> None:
     switch_off()
     found = {}
 
-    def report(module: str, results: dict) -> None:
+    def report(module: str, results: dict[str, Any]) -> None:
         found[module] = results
         if options.out:
             options.out.write_text(json.dumps(found, indent=1))
         print_results(module, results, before.get(module, {}).get("mutants", {}))
 
-    files = sorted(
-        {str(path) for module in options.module for name in MODULES[module] for path in HERE.rglob(f"test_{name}.py")}
-    )
-    arguments = [
-        "-qq",
-        "-s",
-        "--tb=no",
-        "--no-header",
-        "-m",
-        "not slow",
-        "-p",
-        "no:xdist",
-        "-p",
-        "no:cacheprovider",
-    ]
+    files = sorted({str(path) for module in options.module for path in files_of(module)})
+    arguments = ["-qq", "-s", "--tb=no", "--no-header", "-m", "not slow", "-p", "no:xdist", "-p", "no:cacheprovider"]
     sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options, report)]))
 
 

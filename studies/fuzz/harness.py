@@ -219,7 +219,7 @@ def unclear(error: BaseException, names: tuple[str, ...]) -> str:
 def _place(error: BaseException) -> str:
     """The last line of ours on the way to an error."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if frame.filename.startswith(ROOTS[0]) and "/tests/" not in frame.filename]
+    own = [frame for frame in frames if frame.filename.startswith(ROOTS[0]) and "/studies/fuzz/" not in frame.filename]
     frame = (own or frames)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno} {frame.name}"
 

@@ -18,7 +18,7 @@ SETTINGS = {"NUMBA_DISABLE_JIT": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THRE
 _stages: list[Callable[..., int]] = []
 
 
-def interpreted(function: Callable | None = None, **_options: object) -> Callable:
+def interpreted(function: Any = None, **_options: object) -> Any:
     """Stands in for ``numba.njit``: the function as it is, also under the name ``py_func``."""
     if function is None:
         return interpreted
@@ -28,7 +28,7 @@ def interpreted(function: Callable | None = None, **_options: object) -> Callabl
 
 def pointer(address: int, kind: type) -> Any:
     """Stands in for the loop's own."""
-    numbers = {"float64": ctypes.c_double, "float32": ctypes.c_float, "int64": ctypes.c_int64}
+    numbers: dict[str, Any] = {"float64": ctypes.c_double, "float32": ctypes.c_float, "int64": ctypes.c_int64}
     return ctypes.cast(int(address), ctypes.POINTER(numbers[kind.__name__]))
 
 
@@ -58,7 +58,7 @@ def _named(layout: Any, address: int) -> Any:
 def switch_off() -> None:
     """Let every kernel of this process be plain Python."""
     os.environ |= SETTINGS
-    importlib.import_module("numba").njit = interpreted
+    vars(importlib.import_module("numba"))["njit"] = interpreted
     numpy = importlib.import_module("numpy")
     stage = importlib.import_module("birthsim_env.loop.stage")
     block = importlib.import_module("birthsim_env.physics.compiled.compilation").BLOCK

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.fuzz.files import written
-from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import Rng, altered, damaged, json_bytes
+from studies.fuzz.files import written
+from studies.fuzz.harness import Case, Kind
+from studies.fuzz.mutations import Rng, altered, damaged, json_bytes
 
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"law": {"pooled_mm": 2.5}, "policy": None, "curve": [{"steps": 0, "x": 0.1}]}
 

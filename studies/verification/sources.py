@@ -18,6 +18,7 @@ MEASURED = Path(__file__).parent / "measured"
 def digest(path: Path) -> str:
     """Hash of a Python file by what it does: comments, docstrings and layout do not count."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    node: Any
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):  # a string that stands alone says something to the reader only
@@ -46,7 +47,7 @@ def commit() -> str:
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
 
-    differing = git("status", "--porcelain", "--", ".", ":!tests/verification/measured", ":!docs")
+    differing = git("status", "--porcelain", "--", ".", ":!studies/verification/measured", ":!docs")
     return (git("rev-parse", "--short", "HEAD") or "unknown") + (", changed" if differing else "")
 
 

@@ -1,10 +1,10 @@
 """Measurements and page of the verification report.
 
-python -m tests.verification balances                # a quarter of a minute
-python -m tests.verification mutation REPORT.json    # what tests.mutation --out wrote
-python -m tests.verification coverage                # minutes
-python -m tests.verification accuracy FOLDER         # what birthsim study accuracy --out wrote
-python -m tests.verification report                  # docs/verification.md from what is stored
+birthsim study verification balances                # a quarter of a minute
+birthsim study verification mutation REPORT.json    # what birthsim study mutation --out wrote
+birthsim study verification coverage                # minutes
+birthsim study verification accuracy FOLDER         # what birthsim study accuracy --out wrote
+birthsim study verification report                  # docs/verification.md from what is stored
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import argparse
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
-from tests.verification import balances, mutants, reached, report, sources
+from studies.verification import balances, mutants, reached, report, sources
 
 ACCURACY = (
     *("studies/accuracy/errors.py", "studies/accuracy/motions.py", "studies/accuracy/second_model.py"),
@@ -24,12 +25,13 @@ ACCURACY = (
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m tests.verification", description="The verification report.")
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="birthsim study verification", description="The verification report.")
     chosen = parser.add_subparsers(dest="what", required=True)
     chosen.add_parser("balances", help="measure the balances")
     chosen.add_parser("coverage", help="measure the coverage, uncompiled")
     chosen.add_parser("report", help="write docs/verification.md")
-    chosen.add_parser("mutation", help="take a report of tests.mutation").add_argument("file", type=Path)
+    chosen.add_parser("mutation", help="take a report of birthsim study mutation").add_argument("file", type=Path)
     chosen.add_parser("accuracy", help="take what birthsim study accuracy wrote").add_argument("folder", type=Path)
     options = parser.parse_args()
     if options.what == "balances":
@@ -46,10 +48,6 @@ def main() -> None:
         report.PAGE.write_text(report.page(), encoding="utf-8")
 
 
-def keep(name: str, content: dict, files: tuple[str, ...] | list[str]) -> None:
+def keep(name: str, content: dict[str, Any], files: tuple[str, ...] | list[str]) -> None:
     """Store a measurement with what it was measured on."""
     sources.keep(name, {**content, "commit": sources.commit(), "sources": sources.digests(files)})
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """Lines and branches of physics and laws that tests reach, with the kernels as plain Python.
 
-    python -m tests.verification coverage
+    birthsim study verification coverage
 
 Machine code hides its lines from ``coverage``. The tests are those that the mutation tester found quick enough uncompiled.
 """
@@ -16,9 +16,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tests.mutation import MODULES
-from tests.uncompiled import SETTINGS, switch_off
-from tests.verification import sources
+from studies.mutation.modules import MODULES
+from studies.mutation.uncompiled import SETTINGS, switch_off
+from studies.verification import sources
 
 
 def measure() -> dict[str, Any]:
@@ -28,7 +28,7 @@ def measure() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder)
         (there / "tests.json").write_text(json.dumps(tests), encoding="utf-8")
-        line = [sys.executable, "-m", "tests.verification.reached", folder]
+        line = [sys.executable, "-m", "studies.verification.reached", folder]
         done = subprocess.run(
             line, cwd=sources.ROOT, env={**os.environ, **SETTINGS}, capture_output=True, text=True, check=False
         )

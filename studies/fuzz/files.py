@@ -13,13 +13,14 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, toml_bytes
+from studies.fuzz.harness import Case, Kind
+from studies.fuzz.mutations import NUMBERS, Rng, altered, damaged, json_bytes, toml_bytes
 
 STEPS = 12
 
 
 def written(case: Case, path: Path, content: bytes) -> Path:
+    """The path of a case's file, written."""
     path.write_bytes(content)
     case.names, case.shown = (path.name,), repr(content[:600])
     return path
@@ -41,7 +42,7 @@ def run_a_little(rig: Any, rng: Rng, **arguments: Any) -> None:
 
 def _rig_files(_: Path) -> list[dict[str, Any]]:
     from birthsim_env.physics.rig.parameters import Parameters
-    from tests.odd_rigs import odd_rig
+    from studies.fuzz.odd_rigs import odd_rig
 
     rig = Parameters()
     run_a_little(rig, np.random.default_rng(0), randomize="plant", policy_period=0.01)

@@ -1,6 +1,6 @@
 """A soak: 10^8 policy steps over all scenarios, laws, sensors and corners of the ranges.
 
-    python -m tests.soak --steps 100000000
+    birthsim study soak --steps 100000000
 
 Every lap is written as it ends; interrupted (Ctrl-C), the same command carries on. It exits with 1 where an observation,
 reward or state was not finite or outside its space, or where memory grew.
@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import platform
 import sys
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
-
 import numpy as np
 from tqdm import tqdm
 
 from baselines.work.files import make_folder, write_json, write_text
 from baselines.work.tasks import code_stamp
-from tests.soak.laps import LANES, STEPS, run
+from studies.soak.laps import LANES, STEPS, run
 
 GROWTH = 10.0
 """MB by which the last tenth of a soak may need more than the sixth; by then all kernels are loaded."""
@@ -100,7 +97,8 @@ def report(laps: Laps, setting: dict[str, Any]) -> str:
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="birthsim study soak", description=__doc__, formatter_class=raw)
     parser.add_argument("--steps", type=int, default=10**8, help="policy steps (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder for laps.jsonl, soak.md and soak.json")

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import Rng
+from studies.fuzz.harness import Case, Kind
+from studies.fuzz.mutations import Rng
 
 MODULES = {
     **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify")},
@@ -75,7 +75,7 @@ ODD = (
 )
 
 
-class Began(Exception):
+class BeganError(Exception):
     """A command has accepted its arguments."""
 
 
@@ -115,13 +115,13 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
 
     def parsed(parser: Any, action: Any) -> None:
         parser.parse_args()
-        raise Began
+        raise BeganError
 
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said), patch.object(sys, "argv", [name, *line]), patch.object(module, "run", parsed):
             module.main()
-    except Began:
+    except BeganError:
         return
     except SystemExit as end:
         lines = [text for text in said.getvalue().split("\n") if "error:" in text]

@@ -1,6 +1,6 @@
 """Fuzz kinds of input and print figures.
 
-    python -m tests.fuzz --kind rig --cases 5000 --seed 0
+    birthsim study fuzz --kind rig --cases 5000 --seed 0
 
 Exits with 1 where a case failed. A case is its kind, seed and number: ``--case N`` tries one alone, in this process.
 """
@@ -9,26 +9,22 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 from pathlib import Path
 
-# One thread: children are forked.
-os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
-os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-
 from tqdm import tqdm
 
-from tests.fuzz.harness import Case, Figures, fuzz, generator
-from tests.fuzz.kinds import KINDS
+from studies.fuzz.harness import Case, Figures, fuzz, generator
+from studies.fuzz.kinds import KINDS
 
 
 def _one(name: str, seed: int, number: int) -> None:
     """A case alone, with its traceback."""
     with tempfile.TemporaryDirectory() as place:
         valid, folder = Path(place) / "valid", Path(place) / "case"
-        valid.mkdir(), folder.mkdir()
+        valid.mkdir()
+        folder.mkdir()
         case = Case()
         try:
             KINDS[name].attempt(KINDS[name].prepare(valid), generator(name, seed, number), folder, case)
@@ -38,7 +34,8 @@ def _one(name: str, seed: int, number: int) -> None:
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="birthsim study fuzz", description=__doc__, formatter_class=raw)
     parser.add_argument("--kind", nargs="+", choices=tuple(KINDS), default=list(KINDS), help="default: all")
     parser.add_argument("--cases", type=int, default=1000, help="of each kind (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")

@@ -1,6 +1,6 @@
 """Random rigs through every command: each works or is refused in one line that names the cause.
 
-    python -m tests.odd_rigs --rigs 100
+    birthsim study odd-rigs --rigs 100
 
 Bores are 16 to 63 mm, strokes 50 to 600 mm, masses 0.5 to 20 kg, rods, friction and valves in proportion; a file names nothing
 else. Exits with 1 where a command ends in anything but success or one line.
@@ -56,7 +56,7 @@ def _live(path: Path) -> None:
 
 
 def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
-    """ "works", "refused" or "BAD", and what was said."""
+    """Whether it "works", is "refused" or is "BAD", and what was said."""
     out = folder / command
     lines = {
         "evaluate": ("--env", "BirthSIM/Probe-v2", "--controller", "admittance-backstepping", "--episodes", "2"),
@@ -88,7 +88,7 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="birthsim study odd-rigs", description=__doc__)
     parser.add_argument("--rigs", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()

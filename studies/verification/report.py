@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.accuracy import tables as accuracy_tables
-from tests.verification import mutants, sources
+from studies.verification import mutants, sources
 
 PAGE = sources.ROOT / "docs" / "verification.md"
 HERE = Path(__file__).parent
@@ -15,7 +15,7 @@ HERE = Path(__file__).parent
 INTRODUCTION = """# Verification
 
 This page says how the physics and the laws were checked, and what the checks found. The page is generated: edit
-`tests/verification/`, not this file. `make verify` measures accuracy and balances and writes the page anew.
+`studies/verification/`, not this file. `make verify` measures accuracy and balances and writes the page anew.
 `make verify-slow` also measures mutation scores and coverage. The mutants and the coverage below took {minutes} minutes;
 the choice of the tests comes on top.
 """
@@ -53,7 +53,7 @@ any mark of 20 ms.
 
 MUTATION = """## Mutation scores
 
-`python -m tests.mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
+`birthsim study mutation` changes one operator, number or function name at a time and runs the module's tests, uncompiled,
 until one fails. The score is the share of changes that some test notices. "One in 3" means that every third change was tried.
 Tests that need more than a few seconds uncompiled are left out, so the full set of tests notices at least as much. Files of
 data and interfaces (`parameters`, `quantities`, `lanes`, `plant`, `compilation`) and the estimators have no score.

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.fuzz.files import loaded, written
-from tests.fuzz.harness import Case, Kind
-from tests.fuzz.mutations import Rng, damaged, plain
+from studies.fuzz.files import loaded, written
+from studies.fuzz.harness import Case, Kind
+from studies.fuzz.mutations import Rng, damaged, plain
 
 
 def _csv(_: Any, rng: Rng, folder: Path, case: Case) -> None:
