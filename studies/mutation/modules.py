@@ -19,9 +19,7 @@ MODULES = {
     "birthsim_env.physics.inverse_kinematics": ("inverse_kinematics",),
     "birthsim_env.physics.compiled.exact": ("exact",),
     "baselines.backstepping.gains": ("gain_limits", "gains", "damping"),
-    "baselines.backstepping.law": (
-        *("law_kernel", "backstepping", "damping", "backstepping_lanes", "one_valve", "force_first_law", "lyapunov"),
-    ),
+    "baselines.backstepping.law": (*("law_kernel", "backstepping", "damping", "one_valve", "force_first_law", "lyapunov"),),
     "baselines.backstepping.cartesian_law": ("cartesian_backstepping",),
     "baselines.backstepping.cartesian_stiffness": ("cartesian_stiffness", "backstepping"),
     "baselines.admittance.law": ("admittance_law", "admittance_backstepping"),

@@ -12,6 +12,7 @@ import pytest
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
+from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
@@ -174,7 +175,7 @@ TABLE = [
     (partial(listed_option, "admittance"), "learn", (2.0,), "True or False"),
     (evaluation, "episodes", (0, -3), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
-    (Plant, "parameters", (42,), "None, a Parameters or the path"),
+    *((kind, "parameters", (42,), "None, a Parameters or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
     (score, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
     (score, "sensors", ("perfect",), "'ideal', 'lab'"),

@@ -198,10 +198,3 @@ def test_gains_yield_to_a_rig_that_is_lighter_and_slower_and_fixed_ones_do_not()
     assert calm[0] < 0.2 * shaking[0]
     assert 0.35 <= yielding.gain_fraction.min() < 1
     assert np.all(fixed.gain_fraction == 1)
-
-
-def test_springs_that_are_none_are_refused() -> None:
-    ((measured, wanted),) = recorded(3, 1, "ideal")
-    wanted.rows[14, 2] = 5000.0
-    with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 2; allowed: more than 0 N/m in every direction"):
-        AdmittanceController(BELIEVED, learn=False).command(measured, wanted)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 from functools import cache
 
@@ -108,7 +107,7 @@ def test_a_rival_renders_the_stiffness(rival: type[TrackingController]) -> None:
     np.testing.assert_allclose(plant.end_effector()[:2] - reference.position, np.transpose(expected), atol=6e-4)
 
 
-# Lanes, memory, bad input
+# Memory
 
 
 def signals(lanes: int, calls: int, sampled: bool) -> list[tuple[Measurement, Reference]]:
@@ -184,42 +183,6 @@ def test_the_dead_zone_is_continuous() -> None:
     errors = np.linspace(-3, 3, 61)
     kept = np.array([beyond.py_func(error, 1.0) for error in errors])
     np.testing.assert_allclose(kept, np.sign(errors) * np.maximum(np.abs(errors) - 1, 0), atol=1e-15)
-
-
-@every_rival
-def test_a_piston_past_its_stroke_gets_finite_openings(rival: type[TrackingController]) -> None:
-    rig, (law,) = Parameters(), rivals(rival, 1)
-    past = np.array([[1, -1, 1, -1], [1, 1, -1, -1]]) * np.array([[0.1005], [0.2005]])
-    measured = derived.seen(past, np.zeros((2, 4)), np.full((4, 4), 4e5), rig)
-    openings = law.command(measured, closed_loop.holding(measured.position, 2000.0))
-    assert np.all(np.abs(openings) <= 1)
-
-
-@every_rival
-def test_gains_that_cannot_be_are_refused(rival: type[TrackingController]) -> None:
-    least = {name: low for name, (low, _) in rival.TUNABLE.items()}
-    for name, low in least.items():
-        allowed = "zero or a positive number" if low == 0 else "a positive number"
-        for value in (-1.0, math.nan, math.inf, *([] if low == 0 else [0])):
-            with pytest.raises(ValueError, match=f"{name} = {value!r}; allowed: {allowed}"):
-                rival(**{name: value})
-    rival(**{name: 0.0 for name, low in least.items() if low == 0})
-
-
-@every_rival
-def test_what_a_rival_has_no_use_for_is_refused(rival: type[TrackingController]) -> None:
-    (law,), ((measured, reference),) = rivals(rival, 1), signals(2, 1, False)
-    for name in ("feedforward_force", "feedforward_rate"):
-        with pytest.raises(ValueError, match=f"{name} is given; allowed: damping_factor besides the signals"):
-            law.command(measured, reference, **{name: np.zeros((2, 2))})
-
-
-@every_rival
-def test_a_spring_that_pushes_is_refused(rival: type[TrackingController]) -> None:
-    (law,), ((measured, reference),) = rivals(rival, 1), signals(3, 1, False)
-    reference.rows[[8, 9, 14], 1] = 2000.0, 2000.0, 2500.0
-    with pytest.raises(ValueError, match=r"N/m in lane 1; allowed: more than 0 N/m in every direction"):
-        law.command(measured, reference)
 
 
 def test_rivals_go_by_name() -> None:
