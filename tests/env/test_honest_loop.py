@@ -52,18 +52,6 @@ def test_with_every_error_off_a_run_is_labs_to_the_last_bit(name):
     assert_same(*(course(gymnasium.make_vec(name, num_envs=3, sensors=kind, parameters=rig)) for kind in ("honest", "lab")))
 
 
-@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
-def test_a_lane_does_not_depend_on_the_others_nor_on_threads(name):
-    def run(lanes, threads, seed):
-        return course(
-            gymnasium.make_vec(name, num_envs=lanes, num_threads=threads, sensors="honest", randomize=True), seed=seed
-        )
-
-    many = run(70, 1, 3)
-    assert_same(many, run(70, 3, 3))
-    assert_same([values[..., 40:41] for values in many], run(1, 1, 43))
-
-
 class OwnHonest(HonestSensors):
     """Asked in Python."""
 
@@ -242,18 +230,6 @@ def test_a_laboratorys_own_figures_and_ranges_come_from_its_file(tmp_path):
     assert "pressure_range" in path.read_text(), "a file names every figure"
     assert rig.to_dict()["electronics"].keys() >= {"force_noise", "force_bias", "position_noise"}
     assert "pressure_range" not in rig.to_dict()["electronics"]
-
-
-def test_a_state_goes_on_to_the_bit():
-    envs = [gymnasium.make_vec(CIRCLE, num_envs=3, sensors="honest", randomize=True) for _ in range(2)]
-    envs[0].reset(seed=1)
-    actions = np.full((3, 4), 0.05, np.float32)
-    for _ in range(5):
-        envs[0].step(actions)
-    envs[1].reset(seed=9)
-    envs[1].unwrapped.set_state(envs[0].unwrapped.get_state())
-    for _ in range(5):
-        np.testing.assert_array_equal(envs[0].step(actions)[0], envs[1].step(actions)[0])
 
 
 def test_what_a_law_believes_of_the_sensors_may_differ_from_what_they_are():

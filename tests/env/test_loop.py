@@ -93,7 +93,7 @@ def test_a_stop_for_a_users_python_changes_no_bit(own, monkeypatch):
     assert pieces[0] == 1 < pieces[1], "what is compiled is one piece; a user's part stands between others"
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", SENSORS)
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
 def test_threads_change_no_bit(name, sensors):
     runs = [

@@ -221,36 +221,6 @@ def test_an_ended_lane_starts_its_next_episode_with_no_feedforward_force(told, u
     np.testing.assert_allclose(told[-1][:2, [0, 2]], 50, rtol=0.02)
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_every_episode_of_a_lane_is_that_of_the_single_environment(sensors):
-    arguments = {"sensors": sensors, "randomize": True, "duration": 0.4}
-    env, actions = lanes(35, **arguments), random_actions(100, 35)
-    chosen = (0, 1, 33)
-    alone = {lane: single(**arguments) for lane in chosen}
-    observation, _ = env.reset(seed=20)
-    for lane in chosen:
-        np.testing.assert_array_equal(alone[lane].reset(seed=20 + lane)[0], observation[lane])
-    for k, action in enumerate(actions):
-        observation, reward, terminated, truncated, infos = env.step(action)
-        assert truncated.all() == (k % 40 == 39)
-        for lane in chosen:
-            row = alone[lane].step(action[lane])
-            assert row[1:4] == (reward[lane], terminated[lane], truncated[lane])
-            last = infos["final_obs"][lane] if truncated[lane] else observation[lane]
-            np.testing.assert_array_equal(row[0], last)
-            if truncated[lane]:
-                np.testing.assert_array_equal(alone[lane].reset()[0], observation[lane])
-
-
-def test_the_same_actions_twice_are_the_same_rollout_in_the_same_environment():
-    env, actions, rollouts = lanes(2, sensors="lab", randomize=True), random_actions(30, 2), []
-    for _ in range(2):
-        rows = [env.reset(seed=9)[0]]
-        rows += [env.step(action)[0] for action in actions]
-        rollouts.append(np.array(rows))
-    np.testing.assert_array_equal(*rollouts)
-
-
 @pytest.mark.parametrize(
     ("arguments", "size"),
     [({}, 2), ({"impedance": "variable_kp"}, 4), ({"impedance": "variable"}, 5), ({"law": "none"}, 4)],
