@@ -5,23 +5,27 @@ A lane is the environment alone; a reset of some lanes leaves the others alone; 
 
 from __future__ import annotations
 
+import importlib
 import io
 import itertools
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check
+from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
+import birthsim_env
 from agents.residual.settings import IMPEDANCES, LAWS
 from birthsim_env.info import FIELDS
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.reward import REWARD_TERMS
 from tests.physics.plant.test_options import EACH, WORTH
 
 CIRCLE, RESIDUAL, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1", "BirthSIM/Forceps-v1"
-TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 FELT = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
 WORLDS = {
     **{f"{name} {sensors}": (environment_id(name), {"sensors": sensors, "randomize": True})
@@ -63,10 +67,46 @@ def follow(env, actions, seed):
 
 def assert_lane(infos, lane, info, where=""):
     """Equal to the last bit, NaN included."""
-    for name in (*FIELDS, *TERMS, "is_success"):
+    for name in (*FIELDS, *REWARD_TERMS, "is_success"):
         assert (name in infos) == (name in info), where
         if name in info:
             np.testing.assert_array_equal(infos[name][lane], np.asarray(info[name]), err_msg=f"{where} {name}", strict=True)
+
+
+IDS = sorted(name for name in gymnasium.registry if name.startswith("BirthSIM/"))
+FACES = [
+    dict(zip(("action_mode", "valves", "sensors"), face, strict=True))
+    for face in itertools.product(("valve", "flow"), ("two_valves", "one_valve"), SENSORS)
+]
+CHECKED = [(CIRCLE, face) for face in FACES] + [
+    (name, {"sensors": sensors, "randomize": True}) for name in IDS for sensors in SENSORS
+]
+
+
+@pytest.mark.parametrize(("name", "arguments"), CHECKED)
+def test_both_checkers_find_nothing_to_say(name, arguments, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    gymnasium_check(gymnasium.make(name, render_mode="rgb_array", **arguments).unwrapped)
+    stable_baselines_check(gymnasium.make(name, **arguments).unwrapped)
+
+
+def test_importing_again_neither_warns_nor_changes_the_registry():
+    before = {name: gymnasium.registry[name] for name in IDS}
+    assert set(IDS) == {environment_id(name, kind) for name in SCENARIOS for kind in ("", "Residual")}
+    importlib.reload(birthsim_env)
+    assert all(gymnasium.registry[name] is spec for name, spec in before.items())
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_a_spec_makes_both_classes_and_the_same_world_again(name):
+    env = gymnasium.make(name, sensors="lab", randomize=True, policy_period=0.02)
+    kind = "Residual" if "Residual" in name else "BirthSIM"
+    assert type(env.unwrapped).__name__ == f"{kind}Env"
+    copy = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    action = np.full(env.action_space.shape, 0.1, np.float32)
+    env.reset(seed=3), copy.reset(seed=3)
+    np.testing.assert_array_equal(env.step(action)[0], copy.step(action)[0])
+    assert type(gymnasium.make_vec(name, num_envs=2)).__name__ == f"{kind}VectorEnv"
 
 
 @every_world

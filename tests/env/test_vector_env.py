@@ -9,8 +9,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from birthsim_env.info import FIELDS
+from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.vector_env import BirthSIMVectorEnv
-from tests.contracts.test_environments import TERMS, assert_lane, follow
+from tests.contracts.test_environments import assert_lane, follow
 
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 
@@ -132,7 +133,7 @@ def test_every_step_returns_arrays_that_later_steps_leave_alone():
     kept = [(observation, observation.copy())] + [(value, value.copy()) for value in infos.values()]
     for action in random_actions(9, 3):
         observation, rewards, _, _, infos = env.step(action)
-        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *TERMS)), env.measurement.pressures)
+        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *REWARD_TERMS)), env.measurement.pressures)
         kept += [(value, value.copy()) for value in values]
     for value, copy in kept:
         np.testing.assert_array_equal(value, copy)
@@ -191,13 +192,6 @@ def test_gymnasiums_vector_wrappers_work():
     assert [info["time"] for info in infos] == [0.0, 0.0]
     assert [info["final_info"]["time"] for info in infos] == [0.01, 0.01]
     assert all(info["final_obs"].shape == (24,) for info in infos)
-
-
-def test_the_generic_vectorization_gives_the_same_numbers():
-    generic = gymnasium.make_vec(CIRCLE, num_envs=2, vectorization_mode="sync", randomize=True)
-    native, action = make(lanes=2, randomize=True), np.full((2, 4), 0.1, np.float32)
-    np.testing.assert_array_equal(generic.reset(seed=3)[0], native.reset(seed=3)[0])
-    np.testing.assert_array_equal(generic.step(action)[0], native.step(action)[0])
 
 
 def test_frames_of_every_lane_and_closing_twice():
