@@ -111,12 +111,6 @@ def test_a_lane_starts_anew():
     assert (out[:, 0] == 1.0).all(), "what was before a start does no work"
 
 
-@pytest.mark.parametrize(("name", "value"), [("capacity", 0.0), ("capacity", float("nan")), ("speed", -1.0), ("speed", "fast")])
-def test_limits_are_positive(name, value):
-    with pytest.raises(ValueError, match=f"{name} = "):
-        PortLimiter(Full(), RIG, **{name: value})
-
-
 def test_a_law_that_returns_no_openings_is_refused_by_name():
     law = Full()
     law.command = lambda measurement, reference: None
