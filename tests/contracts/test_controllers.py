@@ -14,7 +14,7 @@ from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
 from baselines.controller import COMMAND_OPTIONS
 from baselines.registry import LIMITED, SLOW, bare_name, known_options, listed_names, make_controller
-from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
@@ -66,9 +66,8 @@ def recorded(law, sensors, rig, lanes, ticks):
 def lane_of(signals, lane):
     """Signals of one rig, without a lane axis, and what is told of it."""
     measured, wanted, given = signals
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
     told_of = {name: value[..., lane] for name, value in given.items()}
-    return (Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])), told_of
+    return (closed_loop.of_lanes(measured, lane), Reference(wanted.rows[:, lane])), told_of
 
 
 @pytest.mark.parametrize(("name", "sensors", "rig"), CASES)

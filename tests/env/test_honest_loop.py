@@ -9,7 +9,6 @@ import pytest
 import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
 from birthsim_env import ForceProfile, Hold, Parameters, StiffnessSchedule
-from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
@@ -18,6 +17,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
 from studies.haptics.worlds import no_hand, resting
 from studies.stability.rig_port import RigPort
+from tests.env.test_loop import OwnValves, assert_same, course
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {
@@ -25,25 +25,6 @@ OFF = {
     for name in FIGURES
     if name not in ("position_noise", "position_latency", "pressure_noise", "distortion_length")
 }
-
-
-def course(env, steps=15, seed=3, actions=None):
-    """Observations, what is measured, openings and states of a run under random actions; the last axis is that of lanes."""
-    rng, found = np.random.default_rng(0), [env.reset(seed=seed)[0].T]
-    for _ in range(steps):
-        action = rng.uniform(-0.2, 0.2, env.single_action_space.shape).astype(np.float32)
-        found.append(env.step(np.tile(action, (env.num_envs, 1)))[0].T)
-        simulation = env.unwrapped.simulation
-        seen = simulation.measurement
-        found += [seen.position, seen.velocity, seen.position_time, seen.pressures, seen.user_force]
-        found += [simulation.openings, simulation.plant.state.copy()]
-    return found
-
-
-def assert_same(one, other):
-    assert len(one) == len(other)
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a, b)
 
 
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
@@ -67,12 +48,6 @@ class AskedForAll:
     def __init__(self, *setting):
         honest = HonestSensors(*setting)
         self.begin, self.measure, self.put_out, self.vary = honest.begin, honest.measure, honest.put_out, honest.vary
-
-
-class OwnValves(ValveActuation):
-    """Without stages the loop stops for it."""
-
-    stages = None
 
 
 @pytest.mark.parametrize("own", [OwnHonest, AskedForAll, "actuation"])

@@ -23,13 +23,15 @@ CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 
 
 def course(env, steps=25, seed=3):
-    """States, observations, rewards and info of a run under random actions."""
+    """States, openings, observations, measurements, rewards and info of a run under random actions."""
     rng, (first, info) = np.random.default_rng(0), env.reset(seed=seed)
     found = [first, *info.values()]
     for _ in range(steps):
         actions = rng.uniform(-0.2, 0.2, env.action_space.shape).astype(np.float32)
         observation, reward, terminated, truncated, info = env.step(actions)
-        found += [observation, reward, terminated, truncated, env.unwrapped.simulation.plant.state.copy()]
+        simulation = env.unwrapped.simulation
+        seen = [value for value in vars(simulation.measurement).values() if isinstance(value, np.ndarray)]
+        found += [observation, reward, terminated, truncated, *seen, simulation.openings, simulation.plant.state.copy()]
         found += [np.asarray(value) for name, value in info.items() if "final" not in name]
     return found
 

@@ -10,10 +10,8 @@ import pytest
 
 from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
@@ -79,19 +77,6 @@ def test_constant_speed_is_found_without_bias(rate: float, latency: float) -> No
             np.testing.assert_allclose(estimate[2:, 0], [0, 0.05], rtol=0, atol=1e-7)
 
 
-def tracker(rig: Parameters, lanes: int, seed: int = 0) -> Callable[[Plant, float, Array], Measurement]:
-    """The sensor model ``lab``, every lane with a seed of its own."""
-    sensors = LabSensors(rig.electronics, lanes)
-    for lane in range(lanes):
-        sensors.begin(lane, np.random.default_rng([seed, lane]))
-
-    def sense(plant: Plant, time: float, force: Array) -> Measurement:
-        ticks = np.full(lanes, round(time / PERIOD))
-        return sensors.measure(ticks, np.full(lanes, time), plant.end_effector(), plant.pressures, force)
-
-    return sense
-
-
 def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], Reference]:
     """50 mm in 4 s."""
     return lambda time: closed_loop.circling(time, 0.05, 4.0, stiffness, lanes)
@@ -99,7 +84,7 @@ def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], R
 
 def watched(rig: Parameters, lanes: int, seconds: float) -> dict[str, Array]:
     """A rig on the circle under exact measurements, while an observer watches through the tracker: (T, 2, N) after 1 s."""
-    reference, estimator, sense = circle(lanes), Sampled(rig), tracker(rig, lanes)
+    reference, estimator, sense = circle(lanes), Sampled(rig), closed_loop.tracker(rig, lanes)
     plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
     speed, piston_error, speed_error = [], [], []
     for time, _, push, _ in closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds):
@@ -151,7 +136,7 @@ def test_the_trackers_delay_is_made_up_for(rate: float, latency: float) -> None:
 
 def recorded(lanes: int, seconds: float) -> list[Measurement]:
     """Measurements of a rig on the circle through the tracker."""
-    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), tracker(closed_loop.FRICTIONLESS, lanes)
+    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), closed_loop.tracker(closed_loop.FRICTIONLESS, lanes)
     plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
     path = closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds)
     return [sense(plant, time, push) for time, _, push, _ in path]
@@ -190,7 +175,7 @@ def on_the_circle(
     reference, law = circle(lanes, np.repeat(setpoints, each)), BacksteppingController(rig, weight_compensation=True)
     plant, errors, full = closed_loop.resting_at(reference(0.0), rig), [], []
     command = law.command if observed else Differences(law).command
-    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, tracker(rig, lanes))
+    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, closed_loop.tracker(rig, lanes))
     for time, wanted, _, openings in path:
         if time > 1:
             errors.append(plant.end_effector()[:2] - wanted.position)

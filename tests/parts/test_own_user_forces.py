@@ -122,8 +122,3 @@ def test_answers_of_a_wrong_shape_are_refused_by_name(answer, words):
     with pytest.raises(ValueError, match="allowed") as refusal:
         gymnasium.make(PROBE, user_force=Spy(lambda *_: answer)).reset(seed=0)
     assert all(word in str(refusal.value) for word in words), refusal.value
-
-
-def test_a_hand_without_a_force_says_what_is_missing():
-    with pytest.raises(NotImplementedError, match=r"UserForce.force\(time, position, velocity\) is missing"):
-        gymnasium.make(PROBE, user_force=UserForce()).reset(seed=0)

@@ -14,7 +14,6 @@ from baselines.registry import make_controller
 from baselines.rivals import LinearQuadratic, PositionPID, SlidingMode
 from baselines.rivals.tracking import Integrals, TrackingController, beyond
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
@@ -25,15 +24,6 @@ from tests.oracles.observed import Sampled
 RIVALS = (PositionPID, LinearQuadratic, SlidingMode)
 PERIOD = 1e-3
 every_rival = pytest.mark.parametrize("rival", RIVALS, ids=lambda kind: kind.__name__)
-
-
-def lab_sense(rig: Parameters, lanes: int) -> Callable[..., Measurement]:
-    sensors = LabSensors(rig.electronics, lanes)
-    for lane in range(lanes):
-        sensors.begin(lane, np.random.default_rng([5, lane]))
-    return lambda plant, time, force: sensors.measure(
-        np.full(lanes, round(time / PERIOD)), np.full(lanes, time), plant.end_effector(), plant.pressures, force
-    )
 
 
 @cache
@@ -58,7 +48,7 @@ def circle_error(command: Callable[..., Array], rig: Parameters, lab: bool) -> t
     """RMS and largest distance from a circle of 50 mm in 4 s after 1 s, m, over four lanes."""
     reference = lambda time: closed_loop.circling(time, 0.05, 4.0, 2000.0, 4)  # noqa: E731
     plant, errors = closed_loop.resting_at(reference(0.0), rig), []
-    sense = lab_sense(rig, 4) if lab else closed_loop.ideal
+    sense = closed_loop.tracker(rig, 4, 5) if lab else closed_loop.ideal
     for time, wanted, _, _ in closed_loop.run(plant, command, reference, lambda t: np.zeros((2, 4)), 4.0, sense):
         if time > 1:
             errors.append(np.hypot(*(plant.end_effector()[:2] - wanted.position)))
