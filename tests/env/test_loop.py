@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
-from birthsim_env import StiffnessSchedule, Trajectory, UserForce
+from birthsim_env import StiffnessSchedule
 from birthsim_env.loop.loop import Loop, available_threads
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import ValveActuation
@@ -166,12 +166,6 @@ def test_an_array_that_does_not_fit_is_refused():
     for wrong in (np.zeros((2, 3)), np.zeros((2, 4), dtype=np.float32), np.zeros((4, 2)).T, np.zeros(4)):
         with pytest.raises(ValueError, match="allowed: float64"):
             Loop(4, [(wrong, 0)], [], [])
-
-
-def test_a_users_part_says_what_it_lacks():
-    for part, name in ((Trajectory(), "reference"), (UserForce(), "user_force")):
-        with pytest.raises(NotImplementedError, match="is missing"):
-            gymnasium.make(CIRCLE, **{name: part}).reset(seed=0)
 
 
 @pytest.mark.parametrize(

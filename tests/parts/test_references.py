@@ -191,33 +191,3 @@ def test_a_users_own_trajectory_serves_one_lane_and_many():
         np.testing.assert_array_equal(rows[lane], row)
         phase = stream(20 + lane, 0, "reference").uniform(0, 1)
         np.testing.assert_allclose(info["target"], (0.5 + 0.04 * math.sin(0.2 + phase), 0.02 * math.sin(0.4)))
-
-
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [
-        (lambda time: np.full((2, len(time)), 0.5), ("reference.sample(time)", "(2, 1)", "(8, 1)")),
-        (lambda time: np.zeros(8), ("reference.sample(time)", "(8,)", "(8, 1)")),
-        (lambda time: np.full((8, len(time)), np.nan), ("reference.sample(time)[0, 0] = nan", "finite")),
-        (lambda time: None, ("reference.sample(time)", "(8, 1)")),
-        (lambda time: [["a"]] * 8, ("reference.sample(time)", "'a'", "numbers of shape (8, 1)")),
-    ],
-)
-def test_answers_of_a_wrong_shape_are_refused_by_name(answer, words):
-    class Wrong(Trajectory):
-        def sample(self, time):
-            return answer(time)
-
-    with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Probe-v2", reference=Wrong()).reset(seed=0)
-    assert all(word in str(refusal.value) for word in words), refusal.value
-
-
-def test_a_trajectory_without_sample_says_what_is_missing():
-    with pytest.raises(NotImplementedError, match=r"Trajectory.sample\(time\) is missing; .*\(8, N\)"):
-        gymnasium.make("BirthSIM/Probe-v2", reference=Trajectory()).reset(seed=0)
-    for wrong in ((0.5, 0.0), lambda time: np.zeros((8, 1))):
-        with pytest.raises(
-            ValueError, match=r"(?s)reference.* = .*; allowed: (None, a birthsim_env\.Trajectory|a function of time)"
-        ):
-            gymnasium.make("BirthSIM/Probe-v2", reference=wrong)

@@ -17,28 +17,16 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor
-from agents.training import trainer as training
 from agents.training.algorithms import make_model, network_of
 from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_checkpoint
-from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
+from tests.training.brief import TINY
 
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
-TINY = TrainingSettings(
-    PROBE, steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
-    validation_lanes=2, validations=4,
-)  # fmt: skip
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"reached": {"policy": None, "curve": [{"steps": 0, "x": 0.1}]}, "due": 256.0}
-
-
-@pytest.fixture
-def brief(monkeypatch):
-    """Episodes of half a second."""
-    make_vec = gymnasium.make_vec
-    monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **more: make_vec(*args, **{"duration": 0.5, **more}))
 
 
 def new(algorithm="ppo", seed=0):
@@ -266,7 +254,7 @@ def test_whatever_an_intact_checkpoint_lacks_is_a_value_error(tmp_path):
         (TINY, RESIDUAL, "rig"),
     ],
 )
-def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, brief, settings, residual, named):
+def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, short_probe, settings, residual, named):
     model, env = new()
     save_checkpoint(tmp_path, model, env, monitor.described(TINY, RESIDUAL, Parameters()), PAST)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
