@@ -246,21 +246,3 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     limit = stable_up_to(hand, "as it is")[1]
     assert re.search(rf"\n +4000 +{'nowhere' if limit is None else round(limit)}\b", printed)
     assert f"written to {out}/: stability.json, stability_hand.png, stability_rig.png" in printed
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--controller", "nobody"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--points", "0"], "'0'; allowed: a whole number >= 1"),
-        (["--map", "moon"], "invalid choice: 'moon'"),
-        (["--parameters", "nowhere.toml"], "parameters = 'nowhere.toml' cannot be read"),
-    ],
-)
-def test_bad_input_is_one_plain_line(
-    arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("stability", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
-    assert status == 2
-    assert complaint in complained
-    assert not (tmp_path / "none").exists()

@@ -106,24 +106,6 @@ def test_the_phase_is_shown_near_the_declared_one() -> None:
     np.testing.assert_allclose(figures._phase(piece, felt), 190.0)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--controller", "nobody"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--subject", "moon"], "invalid choice: 'moon'"),
-        (["--rigs", "0"], "'0'; allowed: a whole number >= 1"),
-        (["--page", "nowhere.md"], "nowhere.md"),
-    ],
-)
-def test_bad_input_is_one_plain_line(
-    arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("haptics", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
-    assert status == 2
-    assert complaint in complained
-    assert not (tmp_path / "none").exists()
-
-
 @pytest.mark.slow
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
