@@ -36,7 +36,7 @@ from studies.stability.maps import (
     stability_tasks,
     stable_up_to,
 )
-from tests.console import call, strict
+from tests.console import OWN, call, strict
 
 RIG = Parameters()
 
@@ -171,21 +171,6 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     assert np.isnan(chart["variants"][f"{own}:Out"]["motion_mm"][0][0])
     stability_figure("own", chart, "with a file of one's own", tmp_path)
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
-
-
-OWN = """
-import numpy as np
-
-class Out:
-    def __init__(self, parameters):
-        pass
-
-    def reset(self, lanes=None):
-        pass
-
-    def command(self, measurement, reference):
-        return np.repeat([[1.0], [-1.0], [1.0], [-1.0]], measurement.position.shape[1], axis=1)
-"""
 
 
 def small_axes() -> tuple[Axis, Axis]:

@@ -14,7 +14,7 @@ from studies.haptics import figures as figures
 from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
 from studies.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
 from studies.stability import maps as stability
-from tests.console import call, strict
+from tests.console import OWN, call, strict
 
 SETTINGS: dict[str, Any] = {
     "controller": "admittance-backstepping", "source": "", "rig": Parameters().to_dict(), "sensors": "ideal", "seed": 3,
@@ -116,7 +116,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     page = tmp_path / "page.md"
     page.write_text(f"{BEGIN}\n{END}\n")
     out = tmp_path / "out"
-    options = ("--controller", "admittance-backstepping", f"{own}:Still", "--sensors", "ideal", "--nominal", "--page", page)
+    options = ("--controller", "admittance-backstepping", f"{own}:Held", "--sensors", "ideal", "--nominal", "--page", page)
     status, printed, _ = call("haptics", monkeypatch, capsys, *options, "--out", out)
     assert status == 0
     best, still = strict(out / "haptics.json")["runs"]
@@ -132,18 +132,3 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
         assert (out / f"{name}.png").stat().st_size > 20_000
     assert page.read_text() == f"{BEGIN}\n\n{(out / 'haptics.md').read_text()}\n{END}\n"
     assert (out / "haptics.md").read_text() in printed
-
-
-OWN = """
-import numpy as np
-
-class Still:
-    def __init__(self, parameters):
-        pass
-
-    def reset(self, lanes=None):
-        pass
-
-    def command(self, measurement, reference):
-        return np.zeros((4, measurement.position.shape[1]))
-"""

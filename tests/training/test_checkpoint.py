@@ -6,7 +6,6 @@ import contextlib
 import os
 import pickle
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -22,6 +21,7 @@ from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_check
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
+from tests.residual.policies import Trap
 from tests.training.brief import TINY
 
 PROBE = "BirthSIM/ProbeResidual-v2"
@@ -147,16 +147,6 @@ def test_tuples_are_what_json_makes_of_them(tmp_path):
     assert load_checkpoint(tmp_path, model, env, {"hidden": [8, 8]}) == load_checkpoint(
         tmp_path, model, env, {"hidden": (8, 8)}
     )
-
-
-class Trap:
-    """Unpickling one writes a file."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return (Path.touch, (self.path,))
 
 
 def assert_damaged(folder, model, env, words="(no birthsim-checkpoint-1 or )?damaged"):
