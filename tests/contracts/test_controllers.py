@@ -13,7 +13,7 @@ import pytest
 from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
 from baselines.controller import COMMAND_OPTIONS
-from baselines.registry import LIMITED, SLOW, bare_name, known_options, listed_names, make_controller
+from baselines.registry import LIMITED, SLOW, known_options, listed_names, make_controller
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
@@ -153,7 +153,7 @@ def test_a_spring_that_pushes_is_refused_by_its_lane(name):
 
 @pytest.mark.parametrize(
     ("name", "option"),
-    [(name, option) for name in {bare_name(one): one for one in NAMES}.values() for option in known_options(name) or ()],
+    [(name, option) for name in (*listed_names(), "limited:pid") for option in known_options(name) or ()],
 )
 def test_every_option_refuses_what_it_cannot_be(name, option):
     for value in (-1.0, math.nan, math.inf):

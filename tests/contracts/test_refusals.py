@@ -13,7 +13,6 @@ import pytest
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
 from baselines import BacksteppingController
-from baselines.backstepping.gains import gains_for
 from baselines.bench.evaluation import evaluate
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import make_controller
@@ -77,10 +76,6 @@ def evaluation(**given):
 
 def linear(**given):
     return linearize(None, (0.5, 0.0), **given)
-
-
-def equal_gains(**given):
-    return gains_for(**{"stiffness": 2000.0, "apparent_mass": 3.0, "viscous": 35.0, **given})
 
 
 def limits(**given):
@@ -255,13 +250,6 @@ TABLE = [
         ]
     ),
     (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
-    (equal_gains, "stiffness", (0.0,), "a positive number"),
-    (equal_gains, "apparent_mass", (-3.0,), "a positive number"),
-    (equal_gains, "viscous", (-1.0,), "a number >= 0"),
-    (equal_gains, "damping", (NAN,), "a positive number"),
-    (equal_gains, "gain_sum", (150,), "None"),
-    (partial(equal_gains, damping=150.0), "gain_sum", (INF,), "a positive number"),
-    (partial(equal_gains, damping=20.0), "stiffness", (2.5,), "more than m_e/s2 = 3 N/m"),
     (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
     (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),

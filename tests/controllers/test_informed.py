@@ -201,6 +201,15 @@ def test_the_observer_of_disturbances_takes_the_pressures_that_are_believed() ->
     assert np.abs(found[150.0, 1.0] - found[150.0, 0.0]).min() > 1e-4
 
 
+@either
+def test_springs_that_are_none_are_refused(sampled: bool) -> None:
+    wanted = closed_loop.holding(end_effector(PISTON), 2000.0)
+    measured = seen(0, PISTON, balanced(PISTON), np.zeros((2, 2)), sampled)
+    wanted.rows[14, 1] = -2500.0
+    with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 1; allowed: more than 0 N/m in every direction"):
+        aware().update(measured, wanted)
+
+
 def test_unseen_forces_are_friction_and_what_was_observed_up_to_a_limit() -> None:
     """m kappa^2 d along cylinder 1 and m d along cylinder 2, by the Jacobian of the rig of points; 5000 N are not believed."""
     wanted, part, user = closed_loop.holding(end_effector(PISTON), 2000.0), aware(), np.zeros((2, 2))

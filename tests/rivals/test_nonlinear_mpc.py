@@ -317,6 +317,13 @@ def test_tuned_gains_are_gains_and_every_gain_can_be_given() -> None:
         NonlinearMPC(RIG, **{name: limits[end] for name, limits in NonlinearMPC.TUNABLE.items()})
 
 
+def test_springs_that_are_none_are_refused() -> None:
+    ((measured, wanted),), (controller,) = recorded(3, 1, "ideal"), controllers(1)
+    wanted.rows[14, 2] = 5000.0
+    with pytest.raises(ValueError, match=r"stiffness setpoint .* in lane 2; allowed: more than 0 N/m in every direction"):
+        controller.command(measured, wanted)
+
+
 @pytest.mark.usefixtures("told")
 def test_it_is_known_by_name_and_left_out_of_comparisons_unless_named() -> None:
     assert isinstance(make_controller("nonlinear-mpc", RIG), NonlinearMPC)
