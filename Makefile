@@ -118,25 +118,25 @@ test-weekly:
 	python3 -m tests.weekly $(CLIENTS)
 
 portable: $(READY)
-	$(BIN)/python -m tests.processors
+	$(BIN)/python -m studies.processors
 
 # The oldest Numba that pyproject.toml allows, beside the installed rest; constraints.txt has the newest.
 oldest: $(READY)
 	test -d $(OUT)/oldest/numba || $(PIP) install --quiet --no-deps --target $(OUT)/oldest $(OLDEST)
-	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m tests.processors here
+	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m studies.processors here
 
 verify: $(READY)
 	$(BIN)/birthsim study accuracy --out $(OUT)/verify
-	$(BIN)/python -m tests.verification accuracy $(OUT)/verify
-	$(BIN)/python -m tests.verification balances
-	$(BIN)/python -m tests.verification report
+	$(BIN)/birthsim study verification accuracy $(OUT)/verify
+	$(BIN)/birthsim study verification balances
+	$(BIN)/birthsim study verification report
 
-# Survivors are judged by hand, in tests/verification/survivors.toml; a test names those that are not.
+# Survivors are judged by hand, in studies/verification/survivors.toml; a test names those that are not.
 verify-slow: $(READY)
 	mkdir -p $(OUT)/verify
-	$(BIN)/python -m tests.mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
-	$(BIN)/python -m tests.verification mutation $(OUT)/verify/mutation.json
-	$(BIN)/python -m tests.verification coverage
+	$(BIN)/birthsim study mutation --limit 3 --budget 4 --every 3 --out $(OUT)/verify/mutation.json
+	$(BIN)/birthsim study verification mutation $(OUT)/verify/mutation.json
+	$(BIN)/birthsim study verification coverage
 	$(MAKE) verify
 
 kills: $(READY)
@@ -266,7 +266,7 @@ targets: $(READY)
 
 fuzz: $(READY)
 	mkdir -p $(OUT)
-	$(BIN)/python -m tests.fuzz --cases 5000 --out $(OUT)/fuzz.json
+	$(BIN)/birthsim study fuzz --cases 5000 --out $(OUT)/fuzz.json
 
 # A warning fails it: a page that no list names, a link or an anchor that leads nowhere, a cell that fails.
 docs: $(READY) $(NPM)/.ready
@@ -279,7 +279,7 @@ docs-links: $(READY)
 
 # Interrupted, the same command carries on.
 soak: $(READY)
-	$(BIN)/python -m tests.soak --out $(OUT)/soak
+	$(BIN)/birthsim study soak --out $(OUT)/soak
 
 golden: $(READY)
 	$(BIN)/python -m tests.oracles.golden.make

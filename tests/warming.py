@@ -18,7 +18,7 @@ from numba.core.registry import CPUDispatcher
 from birthsim_env.loop.stage import ARGUMENTS, address_of
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.processors import ROOT
+from studies.processors import ROOT
 
 PACKAGES = ("birthsim_env", "baselines", "agents")
 

@@ -31,7 +31,7 @@ def policy_folders(path: str | Path) -> list[Path]:
 
     Raises ``ValueError`` where there is none.
     """
-    folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(path)
+    folder = SHIPPED / str(path) if str(path) in shipped_names() else Path(str(path))
     if (folder / WEIGHTS).is_file():
         return [folder]
     found = sorted(
@@ -51,7 +51,7 @@ def best_policy(path: str | Path) -> Path:
     try:
         folders = policy_folders(path)
     except ValueError:
-        return Path(path)
+        return Path(str(path))
     return min(folders, key=_validation_error) if len(folders) > 1 else folders[0]
 
 

@@ -95,7 +95,8 @@ class PortLimiter:
         that are none.
         """
         if measurement.position.ndim == 1:
-            return self.command(*one_lane(measurement, reference), **options)[:, 0]
+            told: dict[str, Any] = {name: np.asarray(given)[..., None] for name, given in options.items()}
+            return self.command(*one_lane(measurement, reference), **told)[:, 0]
         lanes = lanes_of(measurement, reference)
         if self.authority.size != lanes:
             self._past, self._energy, self._air = (

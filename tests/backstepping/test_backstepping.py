@@ -65,22 +65,8 @@ def many(lanes: int) -> tuple[Measurement, Reference, tuple[Array, Array, Array]
     measured, reference = as_signals(situation, Parameters())
     assert measured.time.size >= lanes
     told = situation["believed"][:, :lanes], situation["feedforward_rate"][:, :lanes], np.linspace(0.5, 2.0, lanes)
-    return *of_lanes(measured, reference, slice(lanes)), told
-
-
-def of_lanes(measured: Measurement, reference: Reference, lanes: Any) -> tuple[Measurement, Reference]:
-    """The same signals for some lanes, or for one rig without lanes where ``lanes`` is a number."""
-    signals = (
-        measured.time,
-        measured.position,
-        measured.position_time,
-        measured.velocity,
-        measured.pressures,
-        measured.user_force,
-    )
-    return Measurement(*(np.ascontiguousarray(a[..., lanes]) for a in signals), measured.sampled), Reference(
-        np.ascontiguousarray(reference.rows[:, lanes])
-    )
+    some = slice(lanes)
+    return closed_loop.of_lanes(measured, some), Reference(np.ascontiguousarray(reference.rows[:, some])), told
 
 
 TILTED = Parameters().replace(

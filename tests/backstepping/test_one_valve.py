@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-import birthsim_env
 from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from baselines.bench.probes import POSES, StiffnessTest, run_stiffness_test
@@ -120,9 +119,3 @@ def test_an_environment_with_one_valve_takes_rows_0_and_2() -> None:
             env.step(law.command(rig.measurement, rig.reference)[rows])
         states.append(np.concatenate([rig.measurement.position, rig.measurement.pressures]))
     np.testing.assert_array_equal(*states)
-
-
-def test_an_unknown_layout_is_refused() -> None:
-    with pytest.raises(ValueError, match="valves = 'three'; allowed: two_valves, one_valve"):
-        BacksteppingController(valves="three")
-    assert birthsim_env.parts.actuation.VALVE_LAYOUTS == ("two_valves", "one_valve")

@@ -15,7 +15,6 @@ from studies.accuracy import errors as accuracy
 from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.figure import accuracy_figure
 from studies.accuracy.motions import MOTIONS, smooth, stick_slip, strong
-from tests.console import call
 
 
 def test_the_rigs_are_of_the_documented_ranges() -> None:
@@ -118,12 +117,3 @@ def test_tables_show_the_plants_row_and_what_is_unstable(found: dict, tmp_path) 
     assert accuracy_tables.number(None) == "unstable" == accuracy_tables.number(math.inf)
     assert [accuracy_tables.number(v) for v in (12.3, 0.0123, 1.2e5)] == ["12", "0.012", "1.2e+05"]
     assert {path.name for path in accuracy_figure(found, tmp_path)} == {"accuracy.png", "accuracy.svg"}
-
-
-def test_the_command_refuses_plainly(monkeypatch, capsys, tmp_path) -> None:
-    status, _, complained = call("accuracy", monkeypatch, capsys, "--rigs", "0", "--out", tmp_path)
-    assert status == 2
-    assert "'0'; allowed: a whole number >= 1" in complained
-    status, _, complained = call("accuracy", monkeypatch, capsys, "--parameters", "none.toml", "--out", tmp_path)
-    assert status == 2
-    assert "'none.toml' cannot be read" in complained

@@ -34,14 +34,6 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
     assert f"{tmp_path.name:>14} times as fast" in printed
 
 
-def test_a_folder_without_the_project_is_named_at_once(tmp_path, monkeypatch, capsys):
-    status, _, complained = call("speed", monkeypatch, capsys, "--beside", tmp_path)
-    assert status == 2
-    assert complained == (
-        f"birthsim study speed: error: --beside {str(tmp_path)!r} has no birthsim_env; allowed: a checkout of the project\n"
-    )
-
-
 def test_what_a_checkout_cannot_do_ends_the_measurement():
     with speed.Process(speed.HERE) as process, pytest.raises(ValueError, match="has ended; its last words are above"):
         process.measure("step", environment="BirthSIM/Nothing-v1", budget=0.01)

@@ -36,7 +36,7 @@ from studies.stability.maps import (
     stability_tasks,
     stable_up_to,
 )
-from tests.console import call, strict
+from tests.console import OWN, call, strict
 
 RIG = Parameters()
 
@@ -173,21 +173,6 @@ def test_a_rig_that_runs_into_its_stop_is_lost(tmp_path: Path, monkeypatch: pyte
     assert "lost: ran into a stop" in "".join(re.findall("<!-- (.*?) -->", (tmp_path / "stability_own.svg").read_text()))
 
 
-OWN = """
-import numpy as np
-
-class Out:
-    def __init__(self, parameters):
-        pass
-
-    def reset(self, lanes=None):
-        pass
-
-    def command(self, measurement, reference):
-        return np.repeat([[1.0], [-1.0], [1.0], [-1.0]], measurement.position.shape[1], axis=1)
-"""
-
-
 def small_axes() -> tuple[Axis, Axis]:
     return Axis("stiffness of the hand (N/m)", 100.0, 30000.0, 2, True), Axis("asked for (N/m)", 1000.0, 4000.0, 2)
 
@@ -246,21 +231,3 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     limit = stable_up_to(hand, "as it is")[1]
     assert re.search(rf"\n +4000 +{'nowhere' if limit is None else round(limit)}\b", printed)
     assert f"written to {out}/: stability.json, stability_hand.png, stability_rig.png" in printed
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--controller", "nobody"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--points", "0"], "'0'; allowed: a whole number >= 1"),
-        (["--map", "moon"], "invalid choice: 'moon'"),
-        (["--parameters", "nowhere.toml"], "parameters = 'nowhere.toml' cannot be read"),
-    ],
-)
-def test_bad_input_is_one_plain_line(
-    arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("stability", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
-    assert status == 2
-    assert complaint in complained
-    assert not (tmp_path / "none").exists()

@@ -1,21 +1,29 @@
-"""Every registered controller over lanes: one rig is a lane of many, a reset starts that lane alone, mixed shapes are named."""
+"""Every registered controller: one rig is a lane of many, a reset starts that lane alone, what cannot be is refused."""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import math
 
 import gymnasium
 import numpy as np
 import pytest
 
-from baselines.registry import LIMITED, SLOW, listed_names, make_controller
-from birthsim_env.loop.signals import Measurement, Reference
+from agents.policy.seeds import shipped_names
+from agents.residual.settings import NO_LAW
+from baselines.controller import COMMAND_OPTIONS
+from baselines.registry import LIMITED, SLOW, known_options, listed_names, make_controller
+from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.oracles import closed_loop
+from tests.oracles import derived_law as derived
 
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
-NAMES = [*listed_names(), *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
+POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
+NAMES = [*listed_names(), *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
     pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW))
     for name in NAMES for sensors in SENSORS
@@ -23,64 +31,83 @@ CASES = [
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 RANDOM = {"random-valves"}
 """Its openings are drawn from one stream for all lanes."""
+CONTROLLED = [
+    pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES if not name.endswith("-valves")
+]  # fmt: skip
 
 
-def made(name, rig=RIG):
+def made(name, rig=RIG, **options):
     if name in SLOW:
         pytest.importorskip("casadi", reason="pip install 'birthsim[mpc]'")
-    return make_controller(name, rig)
+    return make_controller(name, rig, **options)
 
 
-def recorded(law, sensors, rig, ticks):
-    """What a law of three lanes is handed in closed loop with randomised rigs, and what it commands."""
+def told(law, lanes, rng):
+    """What a controller can be told besides the signals: forces, N, along the pistons, their rates, N/s, a damping factor."""
+    given = rng.normal(0, 9, (2, lanes)), rng.normal(0, 50, (2, lanes)), rng.uniform(0.5, 2.0, lanes)
+    return {name: one for name, one in zip(COMMAND_OPTIONS, given, strict=True) if name in getattr(law, "COMMAND_OPTIONS", ())}
+
+
+def recorded(law, sensors, rig, lanes, ticks):
+    """What a law is handed in closed loop with randomised rigs, told from half-time on, and what it commands."""
     env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=3, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
+        "BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
     )
     env.reset(seed=40)
-    signals, commands = [], []
-    for _ in range(ticks):
-        signals.append((env.measurement, env.reference))
-        commands.append(np.array(law.command(*signals[-1])))
+    rng, signals, commands = np.random.default_rng(0), [], []
+    for tick in range(ticks):
+        signals.append((env.measurement, env.reference, told(law, lanes, rng) if 2 * tick >= ticks else {}))
+        commands.append(np.array(law.command(*signals[-1][:2], **signals[-1][2])))
         env.step(commands[-1].T)
     env.close()
     return signals, commands
 
 
 def lane_of(signals, lane):
-    """Signals of one rig, without a lane axis."""
-    measured, wanted = signals
-    fields = {name: value[..., lane] for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
-    return Measurement(**fields, sampled=measured.sampled), Reference(wanted.rows[:, lane])
+    """Signals of one rig, without a lane axis, and what is told of it."""
+    measured, wanted, given = signals
+    told_of = {name: value[..., lane] for name, value in given.items()}
+    return (closed_loop.of_lanes(measured, lane), Reference(wanted.rows[:, lane])), told_of
 
 
 @pytest.mark.parametrize(("name", "sensors", "rig"), CASES)
 def test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone(name, sensors, rig):
-    ticks, fresh = 16 if name in SLOW else 60, np.array([False, True, False])
-    kept, reset, single, late, again = (made(name, rig) for _ in range(5))
-    signals, commands = recorded(kept, sensors, rig, ticks)
-    for tick, (pair, expected) in enumerate(zip(signals, commands, strict=True)):
-        if tick == ticks // 2:
+    """Of the first and of the next block of lanes; told of no force a law is the one that nothing is told, to the bit."""
+    ticks, lanes = (16, 3) if name in SLOW else (60, 34)
+    chosen = (1, lanes - 1)
+    fresh = np.isin(np.arange(lanes), chosen)
+    kept, reset, again, zero = (made(name, rig) for _ in range(4))
+    single, late = ([made(name, rig) for _ in chosen] for _ in range(2))
+    signals, commands = recorded(kept, sensors, rig, lanes, ticks)
+    for tick, ((*pair, given), expected) in enumerate(zip(signals, commands, strict=True)):
+        if tick == ticks // 3:
             reset.reset(fresh)
-        got = reset.command(*pair)
-        assert got.shape == (4, 3)
+        got = reset.command(*pair, **given)
+        assert got.shape == (4, lanes)
         assert np.abs(got).max() <= 1.0
         if name in RANDOM:
             continue
         np.testing.assert_array_equal(got[:, ~fresh], expected[:, ~fresh])
-        np.testing.assert_array_equal(single.command(*lane_of(pair, 1)), expected[:, 1])
-        if tick >= ticks // 2:
-            np.testing.assert_array_equal(got[:, 1], late.command(*lane_of(pair, 1)))
+        for lane, one, new in zip(chosen, single, late, strict=True):
+            own, of_own = lane_of((*pair, given), lane)
+            np.testing.assert_array_equal(one.command(*own, **of_own), expected[:, lane])
+            if tick >= ticks // 3:
+                np.testing.assert_array_equal(got[:, lane], new.command(*own, **of_own))
+        nothing = {option: np.zeros((2, lanes)) for option in told(zero, lanes, np.random.default_rng()) if "force" in option}
+        if not given:
+            np.testing.assert_array_equal(zero.command(*pair, **nothing), expected)
+        elif tick == ticks - 1:
+            assert (again.command(*pair) != again.command(*pair, **given)).any()
     reset.reset()
-    np.testing.assert_array_equal(reset.command(*signals[0]), again.command(*signals[0]))
+    again.reset()
+    np.testing.assert_array_equal(reset.command(*signals[0][:2]), again.command(*signals[0][:2]))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES if not name.endswith("-valves")]
-)
+@pytest.mark.parametrize("name", CONTROLLED)
 def test_signals_over_different_lanes_are_refused(name):
     """A compiled loop would read past the shorter array without a word."""
     law = made(name)
-    ((measured, wanted),), _ = recorded(law, "ideal", RIG, 1)
+    ((measured, wanted, _),), _ = recorded(law, "ideal", RIG, 3, 1)
     law.reset()
     for field in ("velocity", "pressures", "user_force"):
         wrong = dataclasses.replace(measured, **{field: getattr(measured, field)[:, :1]})
@@ -89,3 +116,46 @@ def test_signals_over_different_lanes_are_refused(name):
     for rows in (wanted.rows[:, :1], wanted.rows[:8]):
         with pytest.raises(ValueError, match=r"reference.rows has shape .* allowed: \(15, 3\)"):
             law.command(measured, Reference(rows.copy()))
+    taken = getattr(law, "COMMAND_OPTIONS", ())
+    for option in COMMAND_OPTIONS if taken or "damping_factor" in inspect.signature(law.command).parameters else ():
+        shape, words = ((3,), r"\(3,\)") if option == "damping_factor" else ((2, 3), r"\(2, 3\)")
+        match = f"{option} has shape .*; allowed: {words}" if option in taken else f"{option} is given; allowed: "
+        for wrong in (np.zeros(shape)[..., :1], np.zeros((1, *shape))):
+            with pytest.raises(ValueError, match=match):
+                law.command(measured, wanted, **{option: wrong})
+
+
+@pytest.mark.parametrize("name", CONTROLLED)
+def test_pistons_past_their_strokes_get_openings_that_valves_have(name):
+    """End stops give way a little and sensors have noise."""
+    past = np.array([[1, -1, 1, -1], [1, 1, -1, -1]]) * np.array([[0.1005], [0.2005]])
+    measured = derived.seen(past, np.zeros((2, 4)), np.full((4, 4), 4e5), RIG)
+    assert np.all(np.abs(made(name).command(measured, closed_loop.holding(measured.position, 2000.0))) <= 1)
+
+
+PAPERS = ("backstepping", "backstepping-weight", "backstepping-frozen", "backstepping-one-valve", "backstepping-force-first")
+"""They render no coupling, and so refuse none."""
+WRONG = ((8, -500.0), (9, 0.0), (14, 2500.0), (14, -2000.0))
+"""Row and value, N/m, beside 2000 N/m on both axes."""
+
+
+@pytest.mark.parametrize("name", CONTROLLED)
+def test_a_spring_that_pushes_is_refused_by_its_lane(name):
+    law, wanted = made(name), closed_loop.holding(np.repeat([[0.5], [0.0]], 3, axis=1), 2000.0)
+    measured = closed_loop.ideal(closed_loop.resting_at(wanted, RIG), 0.0, np.zeros((2, 3)))
+    base = law.settings.law if name.startswith("residual") else name.removeprefix(LIMITED)
+    for row, value in WRONG[: 0 if base == NO_LAW else 2 if base in PAPERS else 4]:
+        springs = Reference(wanted.rows.copy())
+        springs.rows[row, 2] = value
+        with pytest.raises(ValueError, match=r"N/m in lane 2.*; allowed: (more than|a positive number)"):
+            law.command(measured, springs)
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [(name, option) for name in (*listed_names(), "limited:pid") for option in known_options(name) or ()],
+)
+def test_every_option_refuses_what_it_cannot_be(name, option):
+    for value in (-1.0, math.nan, math.inf):
+        with pytest.raises(ValueError, match=rf"{option} = .*; allowed: "):
+            made(name, **{option: value})

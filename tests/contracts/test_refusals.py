@@ -12,7 +12,9 @@ import pytest
 
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings, override
+from baselines import BacksteppingController
 from baselines.bench.evaluation import evaluate
+from baselines.limiter.controller import PortLimiter
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Parameters, Path, Plant, StiffnessSchedule, linearize, normalized_score
 from birthsim_env.env import BirthSIMEnv
@@ -74,6 +76,18 @@ def evaluation(**given):
 
 def linear(**given):
     return linearize(None, (0.5, 0.0), **given)
+
+
+def limits(**given):
+    return PortLimiter(named("shut-valves"), RIG, **given)
+
+
+def residual_environment(**given):
+    return gymnasium.make("BirthSIM/CircleResidual-v1", **given)
+
+
+def residual_lanes(**given):
+    return gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=2, **given)
 
 
 def score(**given):
@@ -175,7 +189,7 @@ TABLE = [
     (partial(listed_option, "admittance"), "learn", (2.0,), "True or False"),
     (evaluation, "episodes", (0, -3), "a whole number >= 1"),
     (Plant, "num_envs", (0, 2.5), "a whole number >= 1"),
-    (Plant, "parameters", (42,), "None, a Parameters or the path"),
+    *((kind, "parameters", (42,), "None, a Parameters or the path") for kind in (Plant, BacksteppingController)),
     (linear, "friction", ("dry",), "'stuck', 'sliding'"),
     (score, "environment", ("BirthSIM/Square-v1", "BirthSIM/Circle-v0", "CartPole-v1", None), CIRCLE),
     (score, "sensors", ("perfect",), "'ideal', 'lab'"),
@@ -218,6 +232,27 @@ TABLE = [
     (partial(hand, Ramp), "amplitude", ((40.0, 5.0),), "ordered"),
     (partial(hand, AlternatingSteps), "ramp", (1.5,), "<= 0.3"),
     (partial(hand, Noise, 15.0), "band", ((0.0, 1.0), (2.0, 1.0)), "> 0"),
+    *(
+        row
+        for both in (residual_environment, residual_lanes)
+        for row in [
+            (both, "action_mode", ("flow", "valve"), "not given"),
+            (both, "valves", ("one_valve",), "not given"),
+            (both, "actuation", (None,), "not given"),
+            (both, "authority", (0.0, 500.1, NAN, "40"), "more than 0, at most 500"),
+            (both, "time_constant", (0.0, 1.5), "more than 0, at most 1"),
+            (both, "law", ("pid", None), "'backstepping', "),
+            (both, "impedance", ("soft",), "'fixed', 'variable_kp', 'variable'"),
+            (partial(both, law="none"), "impedance", ("variable",), "'fixed', law = 'none' has no impedance"),
+            (partial(both, law="admittance"), "impedance", ("variable_kp",), "'fixed', law = 'admittance' has no impedance"),
+            (both, "policy_period", (0.0105,), "a multiple of the control period 0.001 s"),
+            (both, "policy_period", (-0.01, "fast"), "more than 0"),
+            (both, "sensors", ("none",), "'ideal', 'lab'"),
+        ]
+    ),
+    (BacksteppingController, "valves", ("three",), "two_valves, one_valve"),
+    (limits, "capacity", (0.0, NAN), "a finite number > 0 (J)"),
+    (limits, "speed", (-1.0, "fast"), "a finite number > 0 (m/s)"),
     *((Contractions, name, (NAN,), "a finite number") for name in ("amplitude", "push", "heading")),
 ]  # fmt: skip
 

@@ -342,29 +342,3 @@ def test_a_belief_holds_the_pistons_against_it_whatever_the_observer_finds() -> 
     expected = -told / masses * (3 * c - viscous / masses) / (c**3 + 2 * c)
     np.testing.assert_allclose(moved, expected, rtol=0.01, atol=2e-6)
     assert np.abs(expected).max() > 1e-3
-
-
-def test_zero_told_is_bit_for_bit_nothing_told_and_a_lane_is_one_rig() -> None:
-    lanes = 3
-    wanted = closed_loop.holding(np.array([[0.5, 0.45, 0.55], [0.0, 0.05, -0.1]]), 2000.0)
-    plant = closed_loop.resting_at(wanted, Parameters())
-    plain, zero, several, single = (AdmittanceController(learn=False) for _ in range(4))
-    rng = np.random.default_rng(0)
-    for tick in range(50):
-        push = rng.uniform(-5, 5, (2, lanes))
-        seen = closed_loop.ideal(plant, tick * PERIOD, push)
-        openings = plain.command(seen, wanted)
-        assert np.array_equal(zero.command(seen, wanted, np.zeros((2, lanes)), np.zeros((2, lanes))), openings)
-        signals = {name: value[..., 1] for name, value in vars(seen).items() if isinstance(value, np.ndarray)}
-        one = Measurement(**signals, sampled=False)
-        force, rate = rng.uniform(-9, 9, (2, 2, lanes))
-        together = several.command(seen, wanted, force, rate)
-        assert not np.array_equal(together, openings)
-        alone = single.command(one, Reference(wanted.rows[:, 1]), force[:, 1], rate[:, 1])
-        assert np.array_equal(alone, together[:, 1])
-        plant.advance(openings, push, PERIOD)
-    for wrong in (np.zeros((2, 2)), np.zeros(3), np.zeros((1, 3))):
-        with pytest.raises(ValueError, match=r"feedforward_force has shape .*; allowed: \(2, 3\)"):
-            plain.command(seen, wanted, wrong)
-        with pytest.raises(ValueError, match=r"feedforward_rate has shape .*; allowed: \(2, 3\)"):
-            plain.command(seen, wanted, None, wrong)

@@ -9,7 +9,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers import vector as wrappers
 
 import birthsim_env
 
@@ -52,28 +51,6 @@ def test_a_lane_waits_for_its_reset_where_autoreset_is_disabled():
     assert info["time"][0] == 0.0
     assert info["time"][1] > 0.0
     env.step(SLAM)
-
-
-@pytest.mark.parametrize(
-    "wrap",
-    [
-        wrappers.NormalizeObservation,
-        wrappers.NormalizeReward,
-        wrappers.RecordEpisodeStatistics,
-        wrappers.DictInfoToList,
-        lambda env: wrappers.TransformObservation(env, lambda seen: 2 * seen),
-        lambda env: wrappers.RescaleAction(env, np.float32(-0.5), np.float32(0.5)),
-        lambda env: wrappers.ClipReward(env, -1.0, 1.0),
-        lambda env: wrappers.FlattenObservation(env),
-    ],
-)
-def test_gymnasiums_vector_wrappers_take_it(wrap):
-    env = wrap(make())
-    env.reset(seed=0)
-    for _ in range(60):
-        observation, rewards, *_ = env.step(0.5 * SLAM)
-    assert np.isfinite(observation).all()
-    assert np.isfinite(rewards).all()
 
 
 def test_reset_and_step_say_the_same_things():

@@ -120,6 +120,8 @@ def test_the_policy_period_follows_the_rigs_own_control_period():
         ("[motor]\nmass = 3.0\n", ("'motor'", "allowed", "mechanics")),
         ("[mechanics]\nmass = -3.0\n", ("Mechanics.mass = -3.0", "allowed", "> 0 and <= 1e+20 (kg)")),
         ("[cylinder1]\nrod_diameter = 0.03\n", ("rod_diameter = 0.03", "less than piston_diameter = 0.025")),
+        ("mass = 3\n", ("mass = 3", "allowed", "a section")),
+        ("[mechanics]\nmass = '3'\n", ("Mechanics.mass = '3' is impossible",)),
         ("mechanics = 3\n", ("mechanics = 3", "allowed", "section")),
     ],
 )

@@ -12,12 +12,12 @@ import pytest
 from birthsim_env.env import BirthSIMEnv
 from birthsim_env.info import FIELDS
 from birthsim_env.observation import ENTRIES
-from birthsim_env.parts.scenarios import environment_id
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.reward import REWARD_TERMS
 from tests.oracles import linkage_by_points as by_points
 
-IDS = tuple(environment_id(name) for name in ("circle", "probe", "descent", "forceps", "dystocia"))
-TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
+IDS = tuple(map(environment_id, SCENARIOS))
 
 
 def make(name=IDS[0], **arguments) -> BirthSIMEnv:
@@ -96,7 +96,7 @@ def test_info_has_every_documented_field_and_agrees_with_the_plant():
     env = make("BirthSIM/Forceps-v1", randomize=True)
     _, _, infos = run(env, random_actions(50, 4, reach=1.0), seed=2)
     for step, info in enumerate(infos):
-        assert set(info) == {*FIELDS, *TERMS, "is_success"}
+        assert set(info) == {*FIELDS, *REWARD_TERMS, "is_success"}
         for field, (size, _) in FIELDS.items():
             assert isinstance(info[field], float) if size == 1 else info[field].shape == (size,), field
         assert info["time"] == pytest.approx(0.01 * step, abs=1e-12)

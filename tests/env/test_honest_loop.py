@@ -9,7 +9,6 @@ import pytest
 import agents  # noqa: F401  registers the residual environments
 from baselines import make_controller
 from birthsim_env import ForceProfile, Hold, Parameters, StiffnessSchedule
-from birthsim_env.parts.actuation import ValveActuation
 from birthsim_env.parts.drawn.randomization import described, documented_ranges
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
@@ -18,6 +17,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.plant import Plant
 from studies.haptics.worlds import no_hand, resting
 from studies.stability.rig_port import RigPort
+from tests.env.test_loop import OwnValves, assert_same, course
 
 CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 OFF = {
@@ -27,41 +27,10 @@ OFF = {
 }
 
 
-def course(env, steps=15, seed=3, actions=None):
-    """Observations, what is measured, openings and states of a run under random actions; the last axis is that of lanes."""
-    rng, found = np.random.default_rng(0), [env.reset(seed=seed)[0].T]
-    for _ in range(steps):
-        action = rng.uniform(-0.2, 0.2, env.single_action_space.shape).astype(np.float32)
-        found.append(env.step(np.tile(action, (env.num_envs, 1)))[0].T)
-        simulation = env.unwrapped.simulation
-        seen = simulation.measurement
-        found += [seen.position, seen.velocity, seen.position_time, seen.pressures, seen.user_force]
-        found += [simulation.openings, simulation.plant.state.copy()]
-    return found
-
-
-def assert_same(one, other):
-    assert len(one) == len(other)
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
 def test_with_every_error_off_a_run_is_labs_to_the_last_bit(name):
     rig = Parameters().replace(OFF)
     assert_same(*(course(gymnasium.make_vec(name, num_envs=3, sensors=kind, parameters=rig)) for kind in ("honest", "lab")))
-
-
-@pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
-def test_a_lane_does_not_depend_on_the_others_nor_on_threads(name):
-    def run(lanes, threads, seed):
-        return course(
-            gymnasium.make_vec(name, num_envs=lanes, num_threads=threads, sensors="honest", randomize=True), seed=seed
-        )
-
-    many = run(70, 1, 3)
-    assert_same(many, run(70, 3, 3))
-    assert_same([values[..., 40:41] for values in many], run(1, 1, 43))
 
 
 class OwnHonest(HonestSensors):
@@ -79,12 +48,6 @@ class AskedForAll:
     def __init__(self, *setting):
         honest = HonestSensors(*setting)
         self.begin, self.measure, self.put_out, self.vary = honest.begin, honest.measure, honest.put_out, honest.vary
-
-
-class OwnValves(ValveActuation):
-    """Without stages the loop stops for it."""
-
-    stages = None
 
 
 @pytest.mark.parametrize("own", [OwnHonest, AskedForAll, "actuation"])
@@ -242,18 +205,6 @@ def test_a_laboratorys_own_figures_and_ranges_come_from_its_file(tmp_path):
     assert "pressure_range" in path.read_text(), "a file names every figure"
     assert rig.to_dict()["electronics"].keys() >= {"force_noise", "force_bias", "position_noise"}
     assert "pressure_range" not in rig.to_dict()["electronics"]
-
-
-def test_a_state_goes_on_to_the_bit():
-    envs = [gymnasium.make_vec(CIRCLE, num_envs=3, sensors="honest", randomize=True) for _ in range(2)]
-    envs[0].reset(seed=1)
-    actions = np.full((3, 4), 0.05, np.float32)
-    for _ in range(5):
-        envs[0].step(actions)
-    envs[1].reset(seed=9)
-    envs[1].unwrapped.set_state(envs[0].unwrapped.get_state())
-    for _ in range(5):
-        np.testing.assert_array_equal(envs[0].step(actions)[0], envs[1].step(actions)[0])
 
 
 def test_what_a_law_believes_of_the_sensors_may_differ_from_what_they_are():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
-from birthsim_env import StiffnessSchedule, Trajectory, UserForce
+from birthsim_env import StiffnessSchedule
 from birthsim_env.loop.loop import Loop, available_threads
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import ValveActuation
@@ -23,13 +23,15 @@ CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 
 
 def course(env, steps=25, seed=3):
-    """States, observations, rewards and info of a run under random actions."""
+    """States, openings, observations, measurements, rewards and info of a run under random actions."""
     rng, (first, info) = np.random.default_rng(0), env.reset(seed=seed)
     found = [first, *info.values()]
     for _ in range(steps):
         actions = rng.uniform(-0.2, 0.2, env.action_space.shape).astype(np.float32)
         observation, reward, terminated, truncated, info = env.step(actions)
-        found += [observation, reward, terminated, truncated, env.unwrapped.simulation.plant.state.copy()]
+        simulation = env.unwrapped.simulation
+        seen = [value for value in vars(simulation.measurement).values() if isinstance(value, np.ndarray)]
+        found += [observation, reward, terminated, truncated, *seen, simulation.openings, simulation.plant.state.copy()]
         found += [np.asarray(value) for name, value in info.items() if "final" not in name]
     return found
 
@@ -93,7 +95,7 @@ def test_a_stop_for_a_users_python_changes_no_bit(own, monkeypatch):
     assert pieces[0] == 1 < pieces[1], "what is compiled is one piece; a user's part stands between others"
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
+@pytest.mark.parametrize("sensors", SENSORS)
 @pytest.mark.parametrize("name", [CIRCLE, RESIDUAL])
 def test_threads_change_no_bit(name, sensors):
     runs = [
@@ -164,12 +166,6 @@ def test_an_array_that_does_not_fit_is_refused():
     for wrong in (np.zeros((2, 3)), np.zeros((2, 4), dtype=np.float32), np.zeros((4, 2)).T, np.zeros(4)):
         with pytest.raises(ValueError, match="allowed: float64"):
             Loop(4, [(wrong, 0)], [], [])
-
-
-def test_a_users_part_says_what_it_lacks():
-    for part, name in ((Trajectory(), "reference"), (UserForce(), "user_force")):
-        with pytest.raises(NotImplementedError, match="is missing"):
-            gymnasium.make(CIRCLE, **{name: part}).reset(seed=0)
 
 
 @pytest.mark.parametrize(

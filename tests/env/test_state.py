@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import itertools
 import threading
 
 import gymnasium
@@ -12,76 +10,16 @@ import pytest
 
 import agents  # noqa: F401  registers the residual environments
 import birthsim_env
-from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.state import give_state, take_state
+from tests.contracts.test_environments import WORLDS, assert_same_steps, made, random_actions, saved
 
-LANES, STEPS = 3, 40
-IDS = tuple(environment_id(name) for name in ("circle", "probe", "descent", "forceps", "dystocia"))
-LAWS = ("backstepping-force-first", "admittance-backstepping", "none")
-WORLDS = {
-    **{f"{name} {sensors}": (name, {"sensors": sensors, "randomize": True})
-       for name, sensors in itertools.product(IDS, ("ideal", "lab"))},
-    **{f"hand {hand}": ("BirthSIM/Circle-v1", {"user_force": hand, "randomize": True}) for hand in ("sine", "noise", "guided")},
-    **{f"law {law} {sensors}": ("BirthSIM/CircleResidual-v1", {"law": law, "sensors": sensors, "randomize": True})
-       for law, sensors in itertools.product(LAWS, ("ideal", "lab"))},
-    "every impedance": ("BirthSIM/DystociaResidual-v1", {"impedance": "variable"}),
-    "flows": ("BirthSIM/Forceps-v1", {"action_mode": "flow", "valves": "one_valve"}),
-    "one valve": ("BirthSIM/Forceps-v1", {"valves": "one_valve"}),
-    "drawn mass": ("BirthSIM/Descent-v1", {"randomize": {"mechanics.mass": (2, 5)}}),
-}  # fmt: skip
+LANES = 3
 
 
-def actions(env, seed=0):
-    return np.random.default_rng(seed).uniform(-1, 1, (2 * STEPS, LANES, *env.single_action_space.shape)).astype(np.float32)
-
-
-def made(world, duration=0.25, **more):
-    name, arguments = WORLDS[world]
-    return gymnasium.make_vec(name, num_envs=LANES, duration=duration, autoreset_mode="SameStep", **arguments, **more)
-
-
-def saved(state):
-    """The state as a file brings it back."""
-    file = io.BytesIO()
-    np.savez(file, **state)
-    file.seek(0)
-    with np.load(file, allow_pickle=False) as content:
-        return dict(content)
-
-
-def assert_same_steps(one, other, given):
-    for action in given:
-        expected, actual = one.step(action), other.step(action)
-        for mine, its in zip(expected[:4], actual[:4], strict=True):
-            np.testing.assert_array_equal(its, mine, strict=True)
-        for name in birthsim_env.info.FIELDS:
-            np.testing.assert_array_equal(actual[4][name], expected[4][name])
-
-
-@pytest.mark.parametrize("world", WORLDS)
-def test_another_environment_goes_on_to_the_bit_over_ends_of_episodes(world):
-    one, other = made(world), made(world)
-    given = actions(one)
-    one.reset(seed=5, options={"staggered": True})
-    for action in given[:STEPS]:
-        one.step(action)
-    state = one.get_state()
-    # Whatever the other one did before, and it may have stopped anywhere.
-    other.reset(seed=77)
-    for action in given[: STEPS // 3]:
-        other.step(action)
-    other.set_state(saved(state))
-    assert_same_steps(one, other, given[STEPS:])
-    # The state is a copy, and gives the same future once more.
-    other.set_state(state)
-    one.set_state(state)
-    assert_same_steps(one, other, given[:STEPS])
-
-
-@pytest.mark.parametrize("world", ["BirthSIM/Circle-v1 lab", "hand guided", "law admittance-backstepping lab"])
+@pytest.mark.parametrize("world", ["circle lab", "hand guided", "law admittance-backstepping lab"])
 def test_a_state_taken_right_after_reset_suits_one_that_has_stepped_and_one_that_was_never_reset(world):
-    one, stepped, fresh = (made(world) for _ in range(3))
-    given = actions(one)
+    one, stepped, fresh = (made(world, LANES) for _ in range(3))
+    given = random_actions(one, 40)
     one.reset(seed=2)
     state = one.get_state()
     stepped.reset(seed=3)
@@ -90,7 +28,7 @@ def test_a_state_taken_right_after_reset_suits_one_that_has_stepped_and_one_that
     for other in (stepped, fresh):
         one.set_state(state)
         other.set_state(state)
-        assert_same_steps(one, other, given[:STEPS])
+        assert_same_steps(one, other, given)
 
 
 def test_lanes_that_have_ended_and_the_seeds_to_come_are_part_of_it():
@@ -171,14 +109,12 @@ def test_without_episodes_there_is_no_state():
             env.get_state()
 
 
-@pytest.mark.parametrize(
-    ("world", "lanes"), [("BirthSIM/Circle-v1 lab", 4), ("BirthSIM/Circle-v1 ideal", 3), ("hand guided", 3), ("flows", 3)]
-)
+@pytest.mark.parametrize(("world", "lanes"), [("circle lab", 4), ("circle ideal", 3), ("hand guided", 3), ("flows", 3)])
 def test_the_state_of_another_environment_is_refused_and_changes_nothing(world, lanes):
     name, arguments = WORLDS[world]
     stranger = gymnasium.make_vec(name, num_envs=lanes, **arguments)
     stranger.reset(seed=0)
-    own = made("BirthSIM/Circle-v1 lab")
+    own = made("circle lab", LANES)
     own.reset(seed=6)
     own.step(np.zeros((LANES, 4)))
     before = own.get_state()
@@ -190,7 +126,7 @@ def test_the_state_of_another_environment_is_refused_and_changes_nothing(world, 
 
 @pytest.mark.parametrize("wrong", [{}, {"plain": np.zeros(3)}, {"plain": np.frombuffer(b"[1]", np.uint8)}, {"plain": None}])
 def test_what_is_no_state_is_refused(wrong):
-    env = made("BirthSIM/Circle-v1 ideal")
+    env = made("circle ideal", LANES)
     with pytest.raises(ValueError, match="state is of another environment: 'plain' is missing or damaged"):
         env.set_state(wrong)
 

@@ -9,10 +9,11 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from birthsim_env.info import FIELDS
+from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.vector_env import BirthSIMVectorEnv
+from tests.contracts.test_environments import assert_lane, follow
 
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
-TERMS = ("reward_survive", "reward_tracking", "reward_hunting", "reward_effort", "reward_action_change")
 
 
 def make(name=CIRCLE, lanes=3, **arguments) -> BirthSIMVectorEnv:
@@ -29,26 +30,6 @@ def random_actions(steps, lanes, size=4, reach=0.3, seed=0):
     return np.random.default_rng(seed).uniform(-reach, reach, (steps, lanes, size)).astype(np.float32)
 
 
-def assert_same(expected, actual, where=""):
-    """Equal to the last bit, NaN included."""
-    assert set(expected) == set(actual), where
-    for name, value in expected.items():
-        np.testing.assert_array_equal(np.asarray(actual[name]), np.asarray(value), err_msg=f"{where} {name}", strict=True)
-
-
-def lane_of(infos, lane):
-    return {name: infos[name][lane] for name in (*FIELDS, *TERMS, "is_success") if name in infos}
-
-
-def follow(env, actions, seed):
-    """What one environment returns from reset and, step by step, through autoresets made by hand."""
-    yield env.reset(seed=seed)
-    for action in actions:
-        observation, reward, terminated, truncated, info = env.step(action)
-        after = env.reset() if terminated or truncated else None
-        yield observation, reward, terminated, truncated, info, after
-
-
 def test_make_vec_gives_the_native_class_with_batched_spaces():
     env = make(lanes=5, valves="one_valve")
     assert (env.num_envs, env.metadata["autoreset_mode"]) == (5, AutoresetMode.SAME_STEP)
@@ -61,53 +42,6 @@ def test_make_vec_gives_the_native_class_with_batched_spaces():
         assert infos[name].shape == ((5,) if size == 1 else (5, size)), name
     for array in env.step(env.action_space.sample())[1:4]:
         assert array.shape == (5,)
-
-
-@pytest.mark.parametrize(
-    ("name", "arguments"),
-    [
-        (CIRCLE, {}),
-        (CIRCLE, {"randomize": True, "sensors": "lab"}),
-        pytest.param(
-            FORCEPS,
-            {"randomize": True, "sensors": "lab", "action_mode": "flow", "valves": "one_valve"},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "BirthSIM/Descent-v1",
-            {"randomize": True, "action_mode": "flow", "policy_period": 0.02},
-            marks=pytest.mark.slow,
-        ),
-    ],
-)
-def test_a_lane_of_a_hundred_is_the_single_environment(name, arguments):
-    """Of the first, a middle and the last, incomplete, block of 32 lanes, beyond the end of the episode."""
-    arguments = {**arguments, "duration": 1.2}
-    env = make(name, 100, **arguments)
-    actions = random_actions(160, 100, env.single_action_space.shape[0], reach=0.5)
-    lanes = (0, 1, 31, 32, 64, 99)
-    alone = {lane: follow(single(name, **arguments), actions[:, lane], 70 + lane) for lane in lanes}
-    observation, infos = env.reset(seed=70)
-    anew = 0
-    for lane, walk in alone.items():
-        first, info = next(walk)
-        np.testing.assert_array_equal(observation[lane], first)
-        assert_same(info, lane_of(infos, lane))
-    for step, action in enumerate(actions):
-        observation, rewards, terminated, truncated, infos = env.step(action)
-        for lane, walk in alone.items():
-            where = f"lane {lane}, step {step}"
-            last, reward, ended, cut, info, after = next(walk)
-            assert (rewards[lane], terminated[lane], truncated[lane]) == (reward, ended, cut), where
-            anew += after is not None
-            if after is None:
-                np.testing.assert_array_equal(observation[lane], last, err_msg=where)
-                assert_same(info, lane_of(infos, lane), where)
-            else:
-                np.testing.assert_array_equal(infos["final_obs"][lane], last, err_msg=where)
-                assert_same(info, lane_of(infos["final_info"], lane), where)
-                np.testing.assert_array_equal(observation[lane], after[0], err_msg=where)
-    assert anew >= len(lanes)
 
 
 def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
@@ -129,13 +63,14 @@ def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
             assert (rewards[lane], terminated[lane], truncated[lane]) == (reward, dead, cut)
             if not ended[lane]:
                 np.testing.assert_array_equal(observation[lane], last)
-                assert_same(info, lane_of(infos, lane))
+                assert_lane(infos, lane, info)
                 continue
             assert all((infos["_final_obs"][lane], infos["_final_info"][lane], infos["final_info"]["_time"][lane]))
             np.testing.assert_array_equal(infos["final_obs"][lane], last)
-            assert_same(info, lane_of(infos["final_info"], lane))
+            assert_lane(infos["final_info"], lane, info)
             np.testing.assert_array_equal(observation[lane], after[0])
-            assert_same({name: after[1][name] for name in FIELDS}, {name: infos[name][lane] for name in FIELDS})
+            for name in FIELDS:
+                np.testing.assert_array_equal(infos[name][lane], after[1][name], err_msg=name)
             assert (infos["time"][lane], infos["is_success"][lane]) == (0.0, False)
             assert not (dead and info["is_success"])
             instants[lane].append(step)
@@ -198,7 +133,7 @@ def test_every_step_returns_arrays_that_later_steps_leave_alone():
     kept = [(observation, observation.copy())] + [(value, value.copy()) for value in infos.values()]
     for action in random_actions(9, 3):
         observation, rewards, _, _, infos = env.step(action)
-        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *TERMS)), env.measurement.pressures)
+        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *REWARD_TERMS)), env.measurement.pressures)
         kept += [(value, value.copy()) for value in values]
     for value, copy in kept:
         np.testing.assert_array_equal(value, copy)
@@ -257,13 +192,6 @@ def test_gymnasiums_vector_wrappers_work():
     assert [info["time"] for info in infos] == [0.0, 0.0]
     assert [info["final_info"]["time"] for info in infos] == [0.01, 0.01]
     assert all(info["final_obs"].shape == (24,) for info in infos)
-
-
-def test_the_generic_vectorization_gives_the_same_numbers():
-    generic = gymnasium.make_vec(CIRCLE, num_envs=2, vectorization_mode="sync", randomize=True)
-    native, action = make(lanes=2, randomize=True), np.full((2, 4), 0.1, np.float32)
-    np.testing.assert_array_equal(generic.reset(seed=3)[0], native.reset(seed=3)[0])
-    np.testing.assert_array_equal(generic.step(action)[0], native.step(action)[0])
 
 
 def test_frames_of_every_lane_and_closing_twice():

@@ -241,33 +241,9 @@ def test_exact_cells_are_believed_bit_for_bit() -> None:
     for pressures, opening, now in zip(measured, openings, joints, strict=True):
         assert np.array_equal(estimator.update(pressures, now), pressures)
         estimator.openings[:] = opening
-
-
-def test_lanes_and_a_new_start() -> None:
-    """Lanes do not know of each other; a reset one starts like a new observer, the others go on as if nothing were."""
-    measured, openings, joints = wild(3, 40)
-    fresh, one = np.array([False, True, False]), slice(1, 2)
-    kept, reset, single, late = (Observer(Parameters(), 150.0, lanes) for lanes in (3, 3, 1, 1))
-    for tick in range(40):
-        if tick == 20:
-            reset.fresh[fresh] = 1.0
-        expected, got = (estimator.update(measured[tick], joints[tick]) for estimator in (kept, reset))
-        alone = np.ascontiguousarray(measured[tick][:, one]), np.ascontiguousarray(joints[tick][:, one])
-        assert np.array_equal(single.update(*alone), expected[:, one])
-        assert np.array_equal(got[:, ~fresh], expected[:, ~fresh])
-        assert np.array_equal(reset.spools[:, ~fresh], kept.spools[:, ~fresh])
-        if tick >= 20:
-            assert np.array_equal(late.update(*alone), got[:, one])
-            assert np.array_equal(late.spools, reset.spools[:, one])
-            late.openings[:] = openings[tick][:, one]
-        if tick == 20:
-            assert np.array_equal(got[:, one], alone[0])
-            assert not reset.spools[:, 1].any()
-            assert np.abs(kept.spools[:, 1]).min() > 0.01
-            assert np.abs(got[:, one] - expected[:, one]).min() > 1e3
-        for estimator in (kept, reset):
-            estimator.openings[:] = openings[tick]
-        single.openings[:] = openings[tick][:, one]
+    started = Observer(Parameters(), 150.0, 5)
+    assert np.array_equal(started.update(measured[0], joints[0]), measured[0]), "a start, too"
+    assert not started.spools.any()
 
 
 @pytest.mark.parametrize("period", [2.5e-4, 1e-3, 1e-2])

@@ -88,24 +88,3 @@ def test_unknown_forces_on_both_pistons_of_the_moving_rig() -> None:
             kappa = np.hypot(*by_points.cartesian_velocity(pose, r2, 1.0, 0.0)[0])
             expected = unknown / (RIG.mechanics.mass * np.array([kappa**2, 1.0]))
             np.testing.assert_allclose(estimator.pistons.disturbance[:, 0], expected, rtol=0, atol=0.02)  # m/s2
-
-
-def test_lanes_and_a_new_start() -> None:
-    """Lanes do not know of each other; a reset one starts from the speed that is measured, without a disturbance."""
-    now = rigid_body.near_balance(RIG, 3, seed=7, speed=0.1, push=20.0)
-    nothing, fresh = np.zeros((2, 3)), np.array([False, True, False])
-    kept, reset, single, late = (Measured(RIG, 60.0, lanes) for lanes in (3, 3, 1, 1))
-    seen = measured(now.piston, now.speed, now.pressures, RIG, nothing)
-    alone = measured(now.piston[:, 1:2], now.speed[:, 1:2], now.pressures[:, 1:2], RIG, nothing[:, :1])
-    for tick in range(40):
-        if tick == 20:
-            reset.pistons.fresh[fresh] = 1.0
-        for estimator in (kept, reset):
-            estimator.update(seen, nothing, nothing)
-        single.update(alone, nothing[:, :1], nothing[:, :1])
-        assert np.array_equal(single.pistons.disturbance[:, 0], kept.pistons.disturbance[:, 1])
-        assert np.array_equal(reset.pistons.disturbance[:, ~fresh], kept.pistons.disturbance[:, ~fresh])
-        if tick >= 20:
-            late.update(alone, nothing[:, :1], nothing[:, :1])
-            assert np.array_equal(reset.pistons.disturbance[:, 1], late.pistons.disturbance[:, 0])
-    assert np.abs(kept.pistons.disturbance[:, 1] - reset.pistons.disturbance[:, 1]).max() > 0.01

@@ -10,10 +10,8 @@ import pytest
 
 from baselines import BacksteppingController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import jacobian
-from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import linkage_by_points as by_points
@@ -79,19 +77,6 @@ def test_constant_speed_is_found_without_bias(rate: float, latency: float) -> No
             np.testing.assert_allclose(estimate[2:, 0], [0, 0.05], rtol=0, atol=1e-7)
 
 
-def tracker(rig: Parameters, lanes: int, seed: int = 0) -> Callable[[Plant, float, Array], Measurement]:
-    """The sensor model ``lab``, every lane with a seed of its own."""
-    sensors = LabSensors(rig.electronics, lanes)
-    for lane in range(lanes):
-        sensors.begin(lane, np.random.default_rng([seed, lane]))
-
-    def sense(plant: Plant, time: float, force: Array) -> Measurement:
-        ticks = np.full(lanes, round(time / PERIOD))
-        return sensors.measure(ticks, np.full(lanes, time), plant.end_effector(), plant.pressures, force)
-
-    return sense
-
-
 def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], Reference]:
     """50 mm in 4 s."""
     return lambda time: closed_loop.circling(time, 0.05, 4.0, stiffness, lanes)
@@ -99,7 +84,7 @@ def circle(lanes: int, stiffness: Array | float = 2000.0) -> Callable[[float], R
 
 def watched(rig: Parameters, lanes: int, seconds: float) -> dict[str, Array]:
     """A rig on the circle under exact measurements, while an observer watches through the tracker: (T, 2, N) after 1 s."""
-    reference, estimator, sense = circle(lanes), Sampled(rig), tracker(rig, lanes)
+    reference, estimator, sense = circle(lanes), Sampled(rig), closed_loop.tracker(rig, lanes)
     plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
     speed, piston_error, speed_error = [], [], []
     for time, _, push, _ in closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds):
@@ -151,52 +136,23 @@ def test_the_trackers_delay_is_made_up_for(rate: float, latency: float) -> None:
 
 def recorded(lanes: int, seconds: float) -> list[Measurement]:
     """Measurements of a rig on the circle through the tracker."""
-    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), tracker(closed_loop.FRICTIONLESS, lanes)
+    rig, reference, sense = closed_loop.FRICTIONLESS, circle(lanes), closed_loop.tracker(closed_loop.FRICTIONLESS, lanes)
     plant, law = closed_loop.resting_at(reference(0.0), rig), BacksteppingController(rig, weight_compensation=True)
     path = closed_loop.run(plant, law.command, reference, lambda t: np.zeros((2, lanes)), seconds)
     return [sense(plant, time, push) for time, _, push, _ in path]
 
 
-def lane_of(measured: Measurement, lane: int) -> Measurement:
-    signals = (
-        measured.time,
-        measured.position,
-        measured.position_time,
-        measured.velocity,
-        measured.pressures,
-        measured.user_force,
-    )
-    return Measurement(*(np.ascontiguousarray(a[..., lane : lane + 1]) for a in signals), measured.sampled)
-
-
-def test_lanes_do_not_know_of_each_other() -> None:
-    measurements = recorded(4, 0.4)
-    together = Sampled(closed_loop.FRICTIONLESS)
-    estimates = np.array([together.update(m).copy() for m in measurements])
-    assert len(np.unique(estimates[-1, 0])) == 4, "every lane has noise of its own"
-    for lane in range(4):
-        alone = Sampled(closed_loop.FRICTIONLESS)
-        assert np.array_equal([alone.update(lane_of(m, lane))[:, 0].copy() for m in measurements], estimates[:, :, lane])
-
-
-def test_reset_of_some_lanes_starts_only_those_anew() -> None:
-    """A lane that is reset takes what the tracker shows for its position and speed, and goes on from there."""
-    measurements, masked = recorded(3, 1.2), np.array([False, True, False])
-    kept, reset = Sampled(closed_loop.FRICTIONLESS), Sampled(closed_loop.FRICTIONLESS)
-    for tick, measured in enumerate(measurements):
-        if tick == 600:
-            reset.reset(masked)
-        expected, got = kept.update(measured).copy(), reset.update(measured).copy()
-        assert np.array_equal(got[:, ~masked], expected[:, ~masked])
-        if tick < 600:
-            assert np.array_equal(got, expected)
-        if tick == 600:
-            late = Sampled(closed_loop.FRICTIONLESS)
-            shown = np.linalg.solve(jacobian(got[:2, 1], closed_loop.FRICTIONLESS), measured.velocity[:, 1])
-            np.testing.assert_allclose(got[2:, 1], shown, rtol=1e-9)
-            assert np.abs(expected[2:, 1]).max() > 0.01
+def test_an_observer_starts_from_what_the_tracker_shows() -> None:
+    """Position and speed; 0.6 s later nothing is left of when it began."""
+    kept, late = Sampled(closed_loop.FRICTIONLESS), Sampled(closed_loop.FRICTIONLESS)
+    for tick, measured in enumerate(recorded(1, 1.2)):
+        expected = kept.update(measured).copy()
         if tick >= 600:
-            assert np.array_equal(got[:, 1], late.update(lane_of(measured, 1))[:, 0])
+            got = late.update(measured).copy()
+        if tick == 600:
+            shown = np.linalg.solve(jacobian(got[:2, 0], closed_loop.FRICTIONLESS), measured.velocity[:, 0])
+            np.testing.assert_allclose(got[2:, 0], shown, rtol=1e-9)
+            assert np.abs(expected[2:]).max() > 0.01
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
 
 
@@ -219,7 +175,7 @@ def on_the_circle(
     reference, law = circle(lanes, np.repeat(setpoints, each)), BacksteppingController(rig, weight_compensation=True)
     plant, errors, full = closed_loop.resting_at(reference(0.0), rig), [], []
     command = law.command if observed else Differences(law).command
-    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, tracker(rig, lanes))
+    path = closed_loop.run(plant, command, reference, lambda t: np.zeros((2, lanes)), seconds, closed_loop.tracker(rig, lanes))
     for time, wanted, _, openings in path:
         if time > 1:
             errors.append(plant.end_effector()[:2] - wanted.position)
@@ -252,20 +208,3 @@ def test_without_the_observer_a_stiff_setpoint_is_lost() -> None:
     root_mean_square, _, saturated = on_the_circle(closed_loop.FRICTIONLESS, (4000.0,), observed=False, seconds=2.0)
     assert root_mean_square.max() > 0.01
     assert saturated[0] > 0.1
-
-
-def test_one_rig_keeps_its_observer_from_call_to_call() -> None:
-    measurements, reference = recorded(1, 0.05), circle(1)
-    lanes, one = BacksteppingController(closed_loop.FRICTIONLESS), BacksteppingController(closed_loop.FRICTIONLESS)
-    for measured in measurements:
-        wanted = reference(float(measured.time[0]))
-        signals = (
-            measured.time,
-            measured.position,
-            measured.position_time,
-            measured.velocity,
-            measured.pressures,
-            measured.user_force,
-        )
-        single = Measurement(*(a[..., 0] for a in signals), measured.sampled)
-        assert np.array_equal(one.command(single, Reference(wanted.rows[:, 0])), lanes.command(measured, wanted)[:, 0])

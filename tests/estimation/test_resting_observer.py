@@ -15,7 +15,7 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, Array, parameter_arra
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import end_effector, jacobian
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.estimation.test_observers import PERIOD, lane_of, rms
+from tests.estimation.test_observers import PERIOD, rms
 from tests.oracles.observed import Sampled
 
 STUCK = np.array([[0.02], [-0.05]])
@@ -153,25 +153,3 @@ def test_at_rest_friction_takes_up_the_load_with_a_double_pole() -> None:
     left = error[2:] - 2 * kept * error[1:-1] + kept**2 * error[:-2]
     np.testing.assert_allclose(left[1:], 0, rtol=0, atol=2e-3 * np.abs(LOAD).max())
     assert np.abs(error[-1]).max() < 0.1
-
-
-def test_resting_lanes_do_not_know_of_each_other() -> None:
-    """Lanes of which one rests, one may not and one slips: each as if alone; and a reset one wakes like a new observer."""
-    rig, moving = Parameters(), np.array([0.0, 1.0, 0.0])
-    measurements = list(stuck(rig, 3, 1.4, 0.05, 0.9))
-    together, reset = Sampled(rig), Sampled(rig)
-    estimates = np.array([together.update(m, moving=moving).copy() for m in measurements])
-    late = Sampled(rig)
-    for lane in range(3):
-        alone = Sampled(rig)
-        own = [alone.update(lane_of(m, lane), moving=moving[lane : lane + 1])[:, 0].copy() for m in measurements]
-        assert np.array_equal(own, estimates[:, :, lane])
-    for tick, measured in enumerate(measurements):
-        if tick == 800:
-            assert reset.pistons.rest[1, 2] > 0.9
-            reset.reset(np.array([False, False, True]))
-        got = reset.update(measured, moving=moving)
-        if tick >= 800:
-            assert np.array_equal(got[:, 2], late.update(lane_of(measured, 2), moving=moving[2:])[:, 0])
-            assert np.array_equal(reset.pistons.rest[:, 2], late.pistons.rest[:, 0])
-        assert np.array_equal(got[:, :2], estimates[tick][:, :2])

@@ -14,7 +14,7 @@ from studies.haptics import figures as figures
 from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
 from studies.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
 from studies.stability import maps as stability
-from tests.console import call, strict
+from tests.console import OWN, call, strict
 
 SETTINGS: dict[str, Any] = {
     "controller": "admittance-backstepping", "source": "", "rig": Parameters().to_dict(), "sensors": "ideal", "seed": 3,
@@ -106,24 +106,6 @@ def test_the_phase_is_shown_near_the_declared_one() -> None:
     np.testing.assert_allclose(figures._phase(piece, felt), 190.0)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--controller", "nobody"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--subject", "moon"], "invalid choice: 'moon'"),
-        (["--rigs", "0"], "'0'; allowed: a whole number >= 1"),
-        (["--page", "nowhere.md"], "nowhere.md"),
-    ],
-)
-def test_bad_input_is_one_plain_line(
-    arguments: list[str], complaint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("haptics", monkeypatch, capsys, *arguments, "--out", tmp_path / "none")
-    assert status == 2
-    assert complaint in complained
-    assert not (tmp_path / "none").exists()
-
-
 @pytest.mark.slow
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Every subject on the nominal rig: strict JSON, tables, pictures; a controller that declares nothing has its errors."""
@@ -134,7 +116,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     page = tmp_path / "page.md"
     page.write_text(f"{BEGIN}\n{END}\n")
     out = tmp_path / "out"
-    options = ("--controller", "admittance-backstepping", f"{own}:Still", "--sensors", "ideal", "--nominal", "--page", page)
+    options = ("--controller", "admittance-backstepping", f"{own}:Held", "--sensors", "ideal", "--nominal", "--page", page)
     status, printed, _ = call("haptics", monkeypatch, capsys, *options, "--out", out)
     assert status == 0
     best, still = strict(out / "haptics.json")["runs"]
@@ -150,18 +132,3 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
         assert (out / f"{name}.png").stat().st_size > 20_000
     assert page.read_text() == f"{BEGIN}\n\n{(out / 'haptics.md').read_text()}\n{END}\n"
     assert (out / "haptics.md").read_text() in printed
-
-
-OWN = """
-import numpy as np
-
-class Still:
-    def __init__(self, parameters):
-        pass
-
-    def reset(self, lanes=None):
-        pass
-
-    def command(self, measurement, reference):
-        return np.zeros((4, measurement.position.shape[1]))
-"""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from baselines.bench import probes
 from birthsim_env.loop.signals import REFERENCES, Measurement, Reference
+from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.geometry import inverse_geometry, jacobian
@@ -34,6 +36,26 @@ def ideal(plant: Plant, time: float, force: Array) -> Measurement:
     """What exact sensors say of the plant."""
     motion, clock = plant.end_effector(), np.full(plant.num_envs, time)
     return Measurement(clock, motion[:2], clock, motion[2:], plant.pressures, force, sampled=False)
+
+
+def tracker(rig: Parameters, lanes: int, seed: int = 0) -> Callable[[Plant, float, Array], Measurement]:
+    """The sensor model ``lab``, every lane with a seed of its own."""
+    sensors = LabSensors(rig.electronics, lanes)
+    for lane in range(lanes):
+        sensors.begin(lane, np.random.default_rng([seed, lane]))
+
+    def sense(plant: Plant, time: float, force: Array) -> Measurement:
+        ticks = np.full(lanes, round(1000 * time))
+        return sensors.measure(ticks, np.full(lanes, time), plant.end_effector(), plant.pressures, force)
+
+    return sense
+
+
+def of_lanes(measured: Measurement, lanes: Any) -> Measurement:
+    """The signals of some lanes, or of one rig without a lane axis where ``lanes`` is a number."""
+    fields = {name: value for name, value in vars(measured).items() if isinstance(value, np.ndarray)}
+    some = {name: np.array(value[..., lanes], order="C") for name, value in fields.items()}
+    return Measurement(**some, sampled=measured.sampled)
 
 
 def holding(position: Array, stiffness: Array | float) -> Reference:

@@ -11,7 +11,6 @@ import pytest
 from scipy.signal import lfilter
 
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.hands.user_forces import ForceProfile
 from birthsim_env.parts.sensors.honest_sensors import HonestSensors
 from birthsim_env.parts.sensors.sensors import SENSORS, IdealSensors, LabSensors, ideal_stage
 from birthsim_env.physics.rig.parameters import Parameters
@@ -34,27 +33,6 @@ def test_it_changes_nothing_else_and_a_rig_without_one_tells_none(model):
     home = np.array([[0.5], [0.0], [0.0], [0.0]])
     seen = model(board(), 1).measure(np.zeros(1, dtype=int), np.zeros(1), home, np.full((4, 1), 3e5), np.zeros((2, 1)))
     assert seen.acceleration is None
-
-
-@pytest.mark.parametrize("sensors", ["lab", "honest"])
-def test_lanes_that_begin_anew_leave_the_others_alone(sensors):
-    """All lanes are measured anew where one begins, within the same control period."""
-    rig = Parameters().replace({"electronics.acceleration_bandwidth": 300.0, "electronics.force_bandwidth": 20.0})
-
-    def shown(anew):
-        pull = ForceProfile([(0.0, 0.0, 10.0), (0.05, 20.0, -10.0), (0.12, -20.0, 5.0)])
-        env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, sensors=sensors, parameters=rig, user_force=pull)
-        env.reset(seed=[3, 4])
-        for k in range(12):
-            if k % 5 == 4 and anew:
-                env.reset(options={"reset_mask": np.array([False, True])})
-            env.step(np.full((2, 4), 0.05, np.float32))
-            seen = env.measurement
-            yield np.concatenate([seen.acceleration, seen.user_force, seen.position])
-
-    one, other = np.array(list(shown(True))), np.array(list(shown(False)))
-    np.testing.assert_array_equal(one[:, :, 0], other[:, :, 0])
-    assert (one[:, :, 1] != other[:, :, 1]).any()
 
 
 class Untold(IdealSensors):

@@ -108,20 +108,14 @@ def test_asked_again_it_says_the_same_and_a_new_episode_takes_hold_anew():
 
 @pytest.mark.parametrize("name", HANDS)
 @pytest.mark.parametrize("randomize", [False, True])
-def test_every_environment_takes_them_and_lanes_are_the_single_one(name, randomize):
-    arguments = {"user_force": name, "randomize": randomize, "sensors": "lab"}
-    many = gymnasium.make_vec(CIRCLE, num_envs=3, **arguments)
-    single = gymnasium.make(CIRCLE, **arguments)
-    many.reset(seed=4), single.reset(seed=6)
+def test_every_lane_is_pushed_and_by_a_hand_of_its_own_where_it_draws(name, randomize):
+    env = gymnasium.make_vec(CIRCLE, num_envs=3, user_force=name, randomize=randomize, sensors="lab")
+    env.reset(seed=4)
     pushed = np.zeros((3, 2))
     for _ in range(250):
-        observations, _, _, _, infos = many.step(np.zeros((3, 4)))
-        observation, _, _, _, info = single.step(np.zeros(4))
-        np.testing.assert_array_equal(observations[2], observation)
-        np.testing.assert_array_equal(infos["user_force"][2], info["user_force"])
+        infos = env.step(np.zeros((3, 4)))[4]
         pushed = np.maximum(pushed, np.abs(infos["user_force"]))
     assert pushed.max() > 0.5
-    different = len({tuple(lane) for lane in pushed})
-    assert different == (3 if randomize or name in ("noise", "guided") else 1)
+    assert len({tuple(lane) for lane in pushed}) == (3 if randomize or name in ("noise", "guided") else 1)
     # What moves all the time is measured all the time.
     assert (infos["since_jump"] > 2.4).all() == (name != "steps")

@@ -106,24 +106,3 @@ def test_a_force_may_answer_with_one_array_that_it_fills_anew():
         jumps.append([env.step(np.zeros(4))[4]["since_jump"] for _ in range(60)])
     np.testing.assert_array_equal(*jumps)
     assert jumps[0][49] == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [
-        (np.zeros((2, 1)), ("user_force.force(...)", "(2, 1)", "(10, 2, 1)")),
-        (np.zeros((1, 2, 1)), ("user_force.force(...)", "(1, 2, 1)", "(10, 2, 1)")),
-        (np.full((10, 2, 1), np.inf), ("user_force.force(...)[0, 0, 0] = inf", "finite")),
-        (None, ("user_force.force(...)", "(10, 2, 1)")),
-        ("push", ("user_force.force(...) = 'push'", "numbers of shape (10, 2, 1)")),
-    ],
-)
-def test_answers_of_a_wrong_shape_are_refused_by_name(answer, words):
-    with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make(PROBE, user_force=Spy(lambda *_: answer)).reset(seed=0)
-    assert all(word in str(refusal.value) for word in words), refusal.value
-
-
-def test_a_hand_without_a_force_says_what_is_missing():
-    with pytest.raises(NotImplementedError, match=r"UserForce.force\(time, position, velocity\) is missing"):
-        gymnasium.make(PROBE, user_force=UserForce()).reset(seed=0)

@@ -12,7 +12,7 @@ from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, Array
 from birthsim_env.physics.dynamics import INTEGRATION_STEP
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from tests.oracles.bookkeeper import CP, CV, GAMMA, WALL, Bookkeeper, P, T, Volumes, mass_and_energy
+from studies.verification.bookkeeper import CP, CV, GAMMA, WALL, Bookkeeper, P, T, Volumes, mass_and_energy
 
 SEALED = {"valves.leakage_ratio": 0.0}
 INSULATED = {**SEALED, "chambers.wall_heat_transfer": 0.0, "chambers.piston_conductance": 0.0}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -30,6 +31,16 @@ def network(inputs=INPUTS, outputs=2, hidden=(16, 8), seed=0, squashed=False, ce
     if cells:
         layers[-1], memory = layer(widths[-2] + cells, outputs), (layer(widths[-2], 3 * cells), layer(cells, 3 * cells))
     return PolicyNetwork(mean, variance, tuple(layers), squashed, memory)
+
+
+class Trap:
+    """Unpickling one writes a file."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return (Path.touch, (self.path,))
 
 
 TRAINING = {"steps": 7, "seed": 3, "curve": [{"steps": 0, "pooled_mm": 1.5}]}

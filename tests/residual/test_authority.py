@@ -100,13 +100,6 @@ def test_a_reset_gives_a_lane_its_authority_back_and_forgets_its_half_waves() ->
     np.testing.assert_array_equal(limiter.fraction, np.ones((2, 2)))
 
 
-def test_lanes_do_not_know_of_each_other() -> None:
-    waves = [wave(2 * LEVEL), wave(2 * LEVEL, kept=0.6), wave(3 * LEVEL, 17.0), wave(0.01)]
-    together = watched(new(4), shaken(waves, 0))
-    for lane, one in enumerate(waves):
-        np.testing.assert_array_equal(watched(new(1), shaken([one], 0))[:, :, 0], together[:, :, lane])
-
-
 def softness_of(waves: list[Array], cylinder: int) -> Array:
     """The softness (T, N) while the pistons are shaken so."""
     limiter, softness = new(len(waves)), []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from tests.residual.policies import ENVIRONMENT, INPUTS, POLICY, REMEMBERS, SETTINGS, network
+from tests.residual.policies import ENVIRONMENT, INPUTS, POLICY, REMEMBERS, SETTINGS, Trap, network
 
 
 @pytest.fixture
@@ -212,16 +211,6 @@ def test_a_policy_period_that_the_rig_cannot_keep_is_refused(tmp_path, period):
     save_policy(Policy(network(), ENVIRONMENT, ResidualSettings(policy_period=period), {}), tmp_path)
     with pytest.raises(ValueError, match=rf"policy_period = {period}; allowed: a multiple of the control period 0\.001 s"):
         ResidualController(policy=tmp_path)
-
-
-class Trap:
-    """Unpickling one writes a file."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return (Path.touch, (self.path,))
 
 
 def test_a_pickle_under_another_name_is_refused_and_not_opened(folder, tmp_path):

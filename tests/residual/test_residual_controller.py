@@ -111,21 +111,6 @@ def steering(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_one_rig_without_lanes_gets_what_a_lane_gets(steering, sensors):
-    env = gymnasium.make("BirthSIM/Circle-v1", policy_period=1e-3, sensors=sensors).unwrapped
-    lanes = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, policy_period=1e-3, sensors=sensors)
-    one, several = ResidualController(policy=steering), ResidualController(policy=steering)
-    env.reset(seed=5)
-    lanes.reset(seed=5)
-    for _ in range(120):
-        alone, together = one.command(env.measurement, env.reference), several.command(lanes.measurement, lanes.reference)
-        assert alone.shape == (4,)
-        np.testing.assert_array_equal(alone, together[:, 0])
-        env.step(alone)
-        lanes.step(together.T)
-
-
 def test_any_function_is_a_policy(steering):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
     stored = load_policy(steering)
@@ -140,39 +125,6 @@ def test_any_function_is_a_policy(steering):
         ResidualController(None, lambda seen: np.zeros((3, 5))).command(env.measurement, env.reference)
     with pytest.raises(ValueError, match=r"settings = ResidualSettings\(.*\) beside policy = .*; allowed: beside a function"):
         ResidualController(None, steering, stored.settings)
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_a_reset_forgets_the_last_episode(steering, sensors):
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3, sensors=sensors)
-    controller, runs = ResidualController(policy=steering), []
-    for calls in (137, 150):
-        env.reset(seed=2)
-        controller.reset()
-        runs.append([])
-        for _ in range(calls):
-            runs[-1].append(controller.command(env.measurement, env.reference))
-            env.step(runs[-1][-1].T)
-    np.testing.assert_array_equal(runs[0], runs[1][:137])
-
-
-def test_a_policy_with_a_memory_forgets_the_lanes_that_are_reset(tmp_path):
-    """Two lanes with the same measurements: what one of them forgets shows in its openings alone."""
-    network = random_network(observation_size(ResidualSettings()), 2, cells=7)
-    save_policy(Policy(network, CIRCLE, ResidualSettings(), {}), tmp_path)
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
-    runs = []
-    for lanes in (np.zeros(3, bool), np.array([False, True, False]), None):
-        controller = ResidualController(policy=tmp_path)
-        env.reset(seed=2)
-        for _ in range(50):
-            env.step(controller.command(env.measurement, env.reference).T)
-        controller.reset(lanes)
-        runs.append([controller.command(env.measurement, env.reference) for _ in range(20)])
-    goes_on, one, anew = map(np.array, runs)
-    np.testing.assert_array_equal(one[:, :, [0, 2]], goes_on[:, :, [0, 2]])
-    np.testing.assert_array_equal(one[:, :, 1], anew[:, :, 1])
-    assert (one[-1, :, 1] != goes_on[-1, :, 1]).any()
 
 
 class Asked:

@@ -7,10 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from agents.residual.unexplained import MOVING, Forces
+from agents.residual.unexplained import MOVING
 from baselines.admittance.controller import AdmittanceController
 from birthsim_env.loop.signals import Measurement, Reference
-from birthsim_env.parts.sensors.sensors import LabSensors
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import Plant
@@ -54,20 +53,13 @@ def seen(sensors: str, seconds: float = 5.0) -> tuple[list[Measurement], Array]:
     plant = Plant(RIGS, LANES)
     reference = wanted(0.0)
     plant.state[[0, 2]] = inverse_geometry(reference.position, BELIEVED)
-    tracker = LabSensors(BELIEVED.electronics, LANES)
-    for lane in range(LANES):
-        tracker.begin(lane, np.random.default_rng(lane))
+    told = closed_loop.ideal if sensors == "ideal" else closed_loop.tracker(BELIEVED, LANES)
     law, record, truth = AdmittanceController(BELIEVED, learn=False), [], []
 
     def sense(plant: Plant, time: float, force: Array) -> Measurement:
-        exact = closed_loop.ideal(plant, time, force)
-        clock = np.full(LANES, time)
-        ticks = np.round(1000 * clock).astype(np.int64)
-        record.append(
-            exact if sensors == "ideal" else tracker.measure(ticks, clock, plant.end_effector(), plant.pressures, force)
-        )
+        record.append(told(plant, time, force))
         truth.append(np.concatenate([plant.piston, plant.piston_speed]))
-        return exact
+        return closed_loop.ideal(plant, time, force)
 
     force = np.repeat(PUSH, LANES, axis=1)
     for _ in closed_loop.run(plant, law.command, wanted, lambda t: force, seconds, sense):
@@ -83,13 +75,6 @@ def course(record: list[Measurement], lanes: int = LANES) -> Array:
         observer.update(measured)
         path.append(observer.met.copy())
     return np.array(path)
-
-
-def of_lanes(measured: Measurement, lanes: slice) -> Measurement:
-    fields = {
-        name: np.ascontiguousarray(value[..., lanes]) for name, value in vars(measured).items() if isinstance(value, np.ndarray)
-    }
-    return Measurement(**fields, sampled=measured.sampled)
 
 
 def unexplained(truth: Array) -> tuple[Array, Array]:
@@ -152,30 +137,6 @@ def test_the_way_not_taken_yet_shows_what_is_met_now_and_a_resting_piston_keeps_
             assert len(slow) > 500
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "lab"])
-def test_lanes_are_independent_and_a_reset_forgets_one_alone(sensors: str) -> None:
-    record = seen(sensors)[0][:1200]
-    together = course(record)
-    for lane in range(LANES):
-        alone = course([of_lanes(measured, slice(lane, lane + 1)) for measured in record], 1)
-        np.testing.assert_array_equal(alone[:, :, 0], together[:, :, lane])
-    observer, chosen = UnexplainedForceObserver(BELIEVED), np.array([False, True, False])
-    observer.reset(np.ones(LANES, dtype=np.bool_))
-    for measured in record:
-        observer.update(measured)
-    observer.reset(chosen)
-    np.testing.assert_array_equal(observer.met, np.where(chosen, 0.0, together[-1]))
-    fresh, later = UnexplainedForceObserver(BELIEVED), seen(sensors)[0][1200:1500]
-    fresh.reset(np.ones(LANES, dtype=np.bool_))
-    kept = course([*record, *later])
-    for k, measured in enumerate(later):
-        observer.update(measured)
-        fresh.update(measured)
-        np.testing.assert_array_equal(observer.met[:, 1], fresh.met[:, 1])
-        np.testing.assert_array_equal(observer.met[:, [0, 2]], kept[1200 + k][:, [0, 2]])
-    assert fresh.met.shape == (Forces.size, LANES)
-
-
 def test_joints_are_those_of_the_sensors() -> None:
     record, truth = seen("ideal")
     observer = UnexplainedForceObserver(BELIEVED)
@@ -186,5 +147,5 @@ def test_joints_are_those_of_the_sensors() -> None:
     # Another number of lanes is a new start.
     observer.reset(np.ones(1, dtype=np.bool_))
     assert not observer.met.any()
-    observer.update(of_lanes(record[0], slice(1)))
+    observer.update(closed_loop.of_lanes(record[0], slice(1)))
     assert observer.joints.shape == (4, 1)

@@ -278,7 +278,7 @@ def stiffness_of(plant: Plant) -> Array:
     return np.array(found)
 
 
-# Lanes, a new start, and what is refused
+# What is refused
 
 
 def test_a_lane_without_numbers_is_left_alone() -> None:

@@ -6,7 +6,6 @@ import contextlib
 import os
 import pickle
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -17,28 +16,17 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor
-from agents.training import trainer as training
 from agents.training.algorithms import make_model, network_of
 from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_checkpoint
-from agents.training.configuration import TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
+from tests.residual.policies import Trap
+from tests.training.brief import TINY
 
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
-TINY = TrainingSettings(
-    PROBE, steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
-    validation_lanes=2, validations=4,
-)  # fmt: skip
 SETTINGS, PAST = {"seed": 3, "hidden": [8, 8]}, {"reached": {"policy": None, "curve": [{"steps": 0, "x": 0.1}]}, "due": 256.0}
-
-
-@pytest.fixture
-def brief(monkeypatch):
-    """Episodes of half a second."""
-    make_vec = gymnasium.make_vec
-    monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **more: make_vec(*args, **{"duration": 0.5, **more}))
 
 
 def new(algorithm="ppo", seed=0):
@@ -161,16 +149,6 @@ def test_tuples_are_what_json_makes_of_them(tmp_path):
     )
 
 
-class Trap:
-    """Unpickling one writes a file."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return (Path.touch, (self.path,))
-
-
 def assert_damaged(folder, model, env, words="(no birthsim-checkpoint-1 or )?damaged"):
     with pytest.raises(ValueError, match=f"(?s) is {words}.*; allowed: a checkpoint that birthsim train wrote$") as caught:
         load_checkpoint(folder, model, env, SETTINGS)
@@ -266,7 +244,7 @@ def test_whatever_an_intact_checkpoint_lacks_is_a_value_error(tmp_path):
         (TINY, RESIDUAL, "rig"),
     ],
 )
-def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, brief, settings, residual, named):
+def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, short_probe, settings, residual, named):
     model, env = new()
     save_checkpoint(tmp_path, model, env, monitor.described(TINY, RESIDUAL, Parameters()), PAST)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

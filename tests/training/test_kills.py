@@ -18,15 +18,11 @@ from agents.residual.settings import ResidualSettings
 from agents.training import monitor
 from agents.training import trainer as training
 from agents.training.checkpoint import NAME, save_checkpoint
-from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
 from tests.console import PATIENCE, ROOT, run, strict
+from tests.training.brief import TINY, steady
 
 RESIDUAL = ResidualSettings("backstepping-force-first", "variable_kp")
-TINY = TrainingSettings(
-    "BirthSIM/ProbeResidual-v2", steps=1024, lanes=8, rollout=16, batch=64, epochs=1, gradient_steps=1, hidden=(8, 8),
-    validation_lanes=2, validations=4,
-)  # fmt: skip
 
 
 @pytest.fixture
@@ -34,12 +30,6 @@ def brief(monkeypatch):
     """Episodes of 1.2 seconds: some are settled, some end within a training."""
     make_vec = gymnasium.make_vec
     monkeypatch.setattr(training.gymnasium, "make_vec", lambda *args, **more: make_vec(*args, **{"duration": 1.2, **more}))
-
-
-def steady(curve):
-    """A learning curve without its clock, in the words of JSON, which knows that NaN is NaN."""
-    clock = {"seconds", "environment_fraction", "split"}
-    return json.dumps([{name: value for name, value in point.items() if name not in clock} for point in curve])
 
 
 class Killed(Exception):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,6 +20,7 @@ from agents.training.validation import VALIDATION_SEED, Score, validate
 from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.evaluation import evaluate
 from birthsim_env import Parameters
+from tests.training.brief import steady, zero
 
 PROBE = "BirthSIM/ProbeResidual-v2"
 RESIDUAL = ResidualSettings()
@@ -42,10 +42,6 @@ def trained(tmp_path_factory):
         return folder, train(SMALL, RESIDUAL, folder)
 
 
-def zero(observations):
-    return np.zeros((len(observations), 2), np.float32)
-
-
 def rollout(env, act, seed):
     """Rewards (T, N) and positions (T, N, 2) of one episode of every lane."""
     observation, _ = env.reset(seed=seed)
@@ -55,12 +51,6 @@ def rollout(env, act, seed):
         rewards.append(reward)
         positions.append(info["position"])
     return np.array(rewards), np.array(positions)
-
-
-def steady(curve):
-    """A learning curve without its clock, in the words of JSON, which knows that NaN is NaN."""
-    clock = {"seconds", "environment_fraction", "split"}
-    return json.dumps([{name: value for name, value in point.items() if name not in clock} for point in curve])
 
 
 def test_before_training_the_policy_is_the_law(tmp_path, monkeypatch, short_probe):

@@ -11,13 +11,10 @@ import pytest
 import agents
 from agents.training import validation
 from agents.training.validation import VALIDATION_SEED, Score, validate
+from tests.training.brief import zero
 
 assert agents  # importing it registers the ids
 PROBE = "BirthSIM/ProbeResidual-v2"
-
-
-def zero(observations):
-    return np.zeros((len(observations), 2), np.float32)
 
 
 class Fake:

@@ -126,32 +126,6 @@ def test_toml_file_names_only_what_differs(tmp_path: Path) -> None:
     assert load_parameters(path) == Parameters().replace({"mechanics.mass": 4.0, "friction.law": "coulomb"})
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[mechanics]\nmass = -1\n", r"Mechanics\.mass = -1 is impossible"),
-        ("[mechanics]\nmas = 3\n", r"unknown parameter 'mechanics\.mas'; allowed in mechanics: mass"),
-        ("mass = 3\n", r"mass = 3; allowed: a section"),
-        ("[mechanics\n", r"line 1"),
-        ("[mechanics]\nmass = '3'\n", r"Mechanics\.mass = '3' is impossible"),
-    ],
-)
-def test_wrong_toml_file_is_refused_with_its_name(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "wrong.toml"
-    path.write_text(text)
-    with pytest.raises(ValueError, match=message) as error:
-        load_parameters(path)
-    assert "wrong.toml" in str(error.value)
-
-
-def test_unreadable_files_are_refused_with_their_name(tmp_path: Path) -> None:
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    for name in ("absent.toml", "binary.toml", "."):
-        with pytest.raises(ValueError, match="parameters = ") as error:
-            load_parameters(tmp_path / name)
-        assert str(tmp_path) in str(error.value)
-
-
 def test_columns_of_the_kernels_follow_their_names() -> None:
     rig = Parameters().replace({"mechanics.mass": 4.5, "cylinder1.coulomb_friction": 10.0, "friction.static_ratio": 1.5})
     column = dict(zip(PARAMETER_NAMES, parameter_column(rig), strict=True))

@@ -1,0 +1,12 @@
+"""All kinds by name."""
+
+from __future__ import annotations
+
+from studies.fuzz.calls import CALLS
+from studies.fuzz.commands import COMMANDS
+from studies.fuzz.files import FILES
+from studies.fuzz.harness import Kind
+from studies.fuzz.own_parts import OWN_PARTS
+from studies.fuzz.sealed import SEALED
+
+KINDS: dict[str, Kind] = {**FILES, **OWN_PARTS, **SEALED, **CALLS, **COMMANDS}

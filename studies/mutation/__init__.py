@@ -1,0 +1,1 @@
+"""How many small changes of the numerical modules their tests notice."""

@@ -1,0 +1,94 @@
+"""Everything that is read or called with odd input: a valid object or a clear error, within limits, without other deeds."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from studies.fuzz import harness
+from studies.fuzz.harness import Case, Kind, fuzz
+from studies.fuzz.kinds import KINDS
+from studies.fuzz.mutations import nested
+from tests.console import ROOT
+
+
+def assert_no_failures(tmp_path, cases, seed):
+    line = [sys.executable, "-m", "birthsim", "study", "fuzz", "--kind", *KINDS, "--cases", str(cases), "--seed", str(seed)]
+    line += ["--out", str(tmp_path / "fuzz.json")]
+    ended = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout
+    figures = json.loads((tmp_path / "fuzz.json").read_text(encoding="utf-8"))["kinds"]
+    assert set(figures) == set(KINDS)
+    assert all(found["cases"] == cases for found in figures.values())
+
+
+@pytest.mark.slow
+def test_a_dozen_cases_of_every_kind(tmp_path):
+    assert_no_failures(tmp_path, 12, 1)
+
+
+@pytest.mark.slow
+def test_hundreds_of_cases_of_every_kind(tmp_path):
+    assert_no_failures(tmp_path, 400, 2)
+
+
+def _misbehave(_, rng, folder, case):
+    case.names = ("argument",)
+    match int(rng.integers(10)):
+        case 0:
+            return
+        case 1:
+            raise ValueError("argument = 3; allowed: less")
+        case 2:
+            raise ValueError("3; allowed: less")
+        case 3:
+            raise ValueError("argument = 3 is wrong")
+        case 4:
+            raise KeyError("argument = 3; allowed: less")
+        case 5:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        case 6:
+            np.ones(2**27)
+        case 7:
+            while True:
+                pass
+        case 8:
+            os.system("true")
+        case 9:
+            (folder.parent.parent / "elsewhere").write_text("x")
+
+
+@pytest.mark.slow
+def test_the_harness_sees_every_misbehaviour(monkeypatch):
+    monkeypatch.setattr(harness, "SECONDS", 0.5)
+    *_, figures = fuzz("misbehaviour", Kind(lambda folder: None, _misbehave), 120, 0)
+    found = {signature.partition(": ")[0].partition("elsewhere")[0] for signature, *_ in figures.signatures()}
+    assert figures.tried == 120
+    assert 0 < figures.valid < 30
+    assert 0 < figures.refused < 30
+    assert {"names neither argument nor file", "does not say what is allowed", "KeyError", "the process ends with -11"} <= found
+    assert {"MemoryError", "TooSlowError", "does os.system"} <= found
+    assert any(one.startswith("does writing to") for one in found)
+
+
+def test_any_value_is_shown_in_a_short_line():
+    from birthsim_env.physics.rig.values import LONGEST, shown
+
+    silent = type("Odd", (), {"__repr__": None})()
+    for value in (10**320, 16**5000, -(10**320), nested(3000), "x" * 5000, "a\nb", np.zeros((9, 9)), silent):
+        text = shown(value)
+        assert 0 < len(text) <= LONGEST
+        assert "\n" not in text
+
+
+def test_a_case_is_its_kind_seed_and_number():
+    draws = [harness.generator(*key).random() for key in (("a", 0, 1), ("a", 0, 1), ("b", 0, 1), ("a", 1, 1), ("a", 0, 2))]
+    assert draws[0] == draws[1]
+    assert len(set(draws)) == 4
+    assert Case().names == ()
