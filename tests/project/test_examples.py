@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import odd_rigs
+from studies.fuzz import odd_rigs
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
