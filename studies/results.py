@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from baselines.work.files import own_folder, whole_file
-from studies.sources import ROOT, hashes
+from baselines.work.sources import ROOT, hashes
 
 RESULTS = ROOT / "results"
 Rows = list[dict[str, str | float | None]]

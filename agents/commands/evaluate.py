@@ -27,7 +27,7 @@ from baselines.commands.shared import (
     whole_up_to,
 )
 from baselines.registry import controller_names
-from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -115,9 +115,9 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     if learned_with - {arguments.sensors}:
         print(f"the policy was trained with {', '.join(sorted(learned_with))} sensors; here they are {arguments.sensors}")
     jobs = arguments.jobs or JOBS
-    done, failures = run_tasks(
-        [task for tasks in pieces.values() for task in tasks], folder, jobs, "episodes", arguments.cluster
-    )
+    every = [task for tasks in pieces.values() for task in tasks]
+    with own_folder(folder):
+        done, failures = run_tasks(every, folder, jobs, "episodes", arguments.cluster)
     if failures:
         name, problem = next(iter(failures.items()))
         raise ValueError(f"{len(failures)} pieces failed, the first {name}: {problem}; what is complete is kept")

@@ -11,7 +11,7 @@ from baselines.bench.statistics import jsonable
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import EPISODES, JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
 from baselines.registry import CONTROLLERS, SLOW, bare_name
-from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, code_stamp, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -79,14 +79,13 @@ def _compare(arguments: argparse.Namespace) -> None:
     quick = [own for own in settings if bare_name(own["controller"]) not in SLOW]
     studies = {} if arguments.no_studies else study_tasks(quick, rig)
     print(described(rig, True))
-    done, failures = run_tasks(list(cells.values()), folder, jobs, "comparison", arguments.cluster)
-    felt, failed = run_tasks(list(studies.values()), folder, jobs, "studies", arguments.cluster)
+    with own_folder(folder):
+        done, problems = run_tasks([*cells.values(), *studies.values()], folder, jobs, "comparison", arguments.cluster)
     gathered = comparison.gather({key: done[task.name] for key, task in cells.items() if task.name in done})
-    found = {key: felt[task.name] for key, task in studies.items() if task.name in felt}
+    found = {key: done[task.name] for key, task in studies.items() if task.name in done}
     with whole_results(folder) as place:
         written = _write(arguments, rig, gathered, found, place)
     print(f"written to {folder}/: {', '.join(written)} (each picture as .svg too)")
-    problems = {**failures, **failed}
     if problems:
         name, problem = next(iter(problems.items()))
         raise ValueError(f"{len(problems)} of {len(cells) + len(studies)} pieces failed, the first {name}: {problem}")
@@ -122,7 +121,8 @@ def _write(
     for (study, label), result in studies.items():
         by_study.setdefault(study, {})[label] = result
     content = {
-        "arguments": shown_arguments(arguments), "code": code_stamp(), "rig": rig.to_dict(), "units": comparison.METRICS,
+        "arguments": shown_arguments(arguments), "code": code_stamp("studies.comparison.grid"), "rig": rig.to_dict(),
+        "units": comparison.METRICS,
         "cells": jsonable(figures), "studies": by_study,
     }  # fmt: skip
     write_json(folder / "comparison.json", content)

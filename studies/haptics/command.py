@@ -9,7 +9,7 @@ from typing import Any
 from baselines.bench.pieces import controller_settings
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, shown_arguments, whole_up_to
-from baselines.work.files import finite, make_folder, whole_results, write_json, write_text
+from baselines.work.files import finite, make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import run_tasks
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -66,7 +66,8 @@ def _haptics(arguments: argparse.Namespace) -> None:
     folder = make_folder(arguments.out)
     tasks = [haptic_tasks(key, subjects) for key in keys]
     pieces = [task for each in tasks for group in each.values() for task in group]
-    done, failures = run_tasks(pieces, folder, arguments.jobs or JOBS, "haptics", arguments.cluster)
+    with own_folder(folder):
+        done, failures = run_tasks(pieces, folder, arguments.jobs or JOBS, "haptics", arguments.cluster)
     if failures:
         raise ValueError(f"{len(failures)} of {len(pieces)} pieces failed, the first: {next(iter(failures.values()))}")
     runs: list[dict[str, Any]] = [gathered(key, each, done) for key, each in zip(keys, tasks, strict=True)]

@@ -14,7 +14,7 @@ import numpy as np
 from baselines.bench.statistics import quantile
 from baselines.commands.shared import JOBS, add_processes, finite_number, run, seed_number, whole_up_to
 from baselines.identification.quantities import QUANTITIES
-from baselines.work.files import make_folder, write_text
+from baselines.work.files import make_folder, own_folder, write_text
 from baselines.work.tasks import run_tasks
 from birthsim_env.physics.rig.parameters import field_of
 from studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
@@ -35,7 +35,8 @@ def main() -> None:
 def _recover(arguments: argparse.Namespace) -> None:
     folder = make_folder(arguments.out)
     tasks = recovery_tasks(arguments.rigs, arguments.seed, arguments.duration, arguments.experiment)
-    done, failures = run_tasks(tasks, folder, arguments.jobs or JOBS, "rigs", arguments.cluster)
+    with own_folder(folder):
+        done, failures = run_tasks(tasks, folder, arguments.jobs or JOBS, "rigs", arguments.cluster)
     for name, words in failures.items():
         print(f"{name}: {words}")
     if not done:

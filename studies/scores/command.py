@@ -16,7 +16,7 @@ from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
 from baselines.commands.shared import EPISODES, JOBS, add_processes, policy_of, run, seed_number, whole_up_to
 from baselines.registry import UNCONTROLLED, make_controller
-from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, code_stamp, run_tasks
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import RIGS, ROLES, SENSORS
@@ -53,7 +53,8 @@ def _scores(arguments: argparse.Namespace) -> None:
         (where, controller): _task(where, controller, seed, arguments)
         for where in conditions for controller, seed in _contestants(where[0])
     }  # fmt: skip
-    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "scores", arguments.cluster)
+    with own_folder(folder):
+        done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "scores", arguments.cluster)
     if failures:
         name, problem = next(iter(failures.items()))
         raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first {name}: {problem}")
@@ -68,7 +69,7 @@ def _scores(arguments: argparse.Namespace) -> None:
         found.append(Scored(short, sensors, RIGS[rig], rows, known))
     text = f"{_CAPTION.format(episodes=arguments.episodes, seed=arguments.seed)}\n\n{overview(found)}"
     with whole_results(folder) as place:
-        write_json(place / "scores.json", {"code": code_stamp("agents"), "seed": arguments.seed, "scores": scores})
+        write_json(place / "scores.json", {"code": code_stamp(__name__), "seed": arguments.seed, "scores": scores})
         write_text(place / "scores.csv", data(found))
         write_text(place / "scores.md", f"# Scores\n\n{text}\n\nEvery controller, with its returns: [scores.csv](scores.csv)\n")
     print(text)

@@ -9,7 +9,7 @@ from typing import Any
 from baselines.bench.pieces import controller_settings
 from baselines.commands.parts import add_set, with_options
 from baselines.commands.shared import JOBS, add_processes, run, seed_number, whole_up_to
-from baselines.work.files import make_folder, whole_results, write_json
+from baselines.work.files import make_folder, own_folder, whole_results, write_json
 from baselines.work.tasks import run_tasks
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -50,7 +50,8 @@ def _stability(arguments: argparse.Namespace) -> None:
 
     folder, chosen = make_folder(arguments.out), list(dict.fromkeys(arguments.map or MAPS))
     tasks = stability_tasks(chosen, settings, arguments.sensors, arguments.points, arguments.seed)
-    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "stability", arguments.cluster)
+    with own_folder(folder):
+        done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "stability", arguments.cluster)
     if failures:
         raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first: {next(iter(failures.values()))}")
     charts = {

@@ -84,7 +84,7 @@ def files_in(folder: Path) -> list[Path]:
 def is_leftover(path: Path, folder: Path) -> bool:
     """Whether a file is one that only a running command needs."""
     parts = path.relative_to(folder).parts
-    return any(part.endswith((".partial", ".claim", ".tmp")) for part in parts) or path.is_symlink()
+    return any(part.endswith((".partial", ".tmp")) for part in parts) or path.is_symlink()
 
 
 def leftovers(folder: Path) -> list[str]:

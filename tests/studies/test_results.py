@@ -6,9 +6,9 @@ import json
 
 import pytest
 
+from baselines.work.sources import ROOT, hashes
 from studies.door import STUDIES, state
 from studies.results import changed, measure
-from studies.sources import ROOT, hashes
 from tests.console import call
 
 MODULE = "studies.stability.stiffest"

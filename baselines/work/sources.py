@@ -1,4 +1,4 @@
-"""The files of this repository that a study depends on: imports followed without running anything, and their hashes."""
+"""The files that a module depends on: imports followed without running anything, and their hashes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
 
 
