@@ -12,12 +12,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
 
 
-def hashes(module: str) -> dict[str, str]:
-    """Path from the root to SHA-256, sorted by path, of each Python file that ``module`` imports, itself too.
+def hashes(*modules: str) -> dict[str, str]:
+    """Path from the root to SHA-256, sorted by path, of each Python file that ``modules`` import, they themselves too.
 
     A module that a string names ("package.module:name") counts as imported; weights of policies and other data do not count.
     """
-    waiting, found = [module], dict[str, str]()
+    waiting, found = [*modules], dict[str, str]()
     while waiting:
         file = _file(waiting.pop())
         if file is None or (path := file.relative_to(ROOT).as_posix()) in found:
