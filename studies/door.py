@@ -27,7 +27,7 @@ STUDIES = {
     "haptics": Entry("haptics.command", "", "what a hand feels"),
     "pools": Entry("pools", "", "what other processes and hosts cost"),
     "recovery": Entry("recovery.command", "", "how well identification finds rigs that are known"),
-    "scores": Entry("scores.command", "", "what every environment pays to whom"),
+    "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
     "speed": Entry("speed.command", "", "speeds, beside what they are to be compared with"),
     "stability": Entry("stability.command", "", "maps of where a controller is stable"),
     "stiffest": Entry("stability.stiffest", "STUDY", "the stiffest setpoints at which the paper's controller rests"),

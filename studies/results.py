@@ -26,7 +26,7 @@ def provenance(modules: tuple[str, ...]) -> Content:
     """What makes a result now, whose figures ``modules`` measure; ``dirty`` if one of their sources is not as committed."""
     sources = hashes(*modules)
     return {
-        "command": " ".join(("birthsim study", *sys.argv[1:])), "commit": _git("rev-parse", "HEAD"),
+        "command": " ".join(sys.argv), "commit": _git("rev-parse", "HEAD"),
         "dirty": bool(_git("status", "--porcelain", "--", *sources)), "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "processor": _processor(),
         "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
@@ -35,8 +35,13 @@ def provenance(modules: tuple[str, ...]) -> Content:
 
 
 def write_result(path: Path, content: Content) -> None:
-    """Write it whole, with a line for each innermost list; ``ValueError`` for a number that is not finite."""
-    write_text(path, _lines(content) + "\n")
+    """Write it whole, as ``written`` has it."""
+    write_text(path, written(content))
+
+
+def written(content: Any) -> str:
+    """JSON with a line for each innermost list or short dictionary; ``ValueError`` for a number that is not finite."""
+    return _lines(content) + "\n"
 
 
 def read_result(name: str, folder: Path = RESULTS) -> Content | None:

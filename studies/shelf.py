@@ -18,7 +18,10 @@ from studies.door import OWN, STUDIES
 from studies.results import changed, read_result
 from studies.study import Study
 
-DATA, README, SCORES = ROOT / "docs" / "data", ROOT / "README.md", "scores.json"
+DATA, README = ROOT / "docs" / "data", ROOT / "README.md"
+ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
+"""Texts that do not stand in ``DATA``."""
+
 _MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -65,7 +68,7 @@ def texts(name: str) -> Iterator[tuple[Path, str]]:
     """What shows the result of a study: files, and what should stand in them."""
     if (content := read_result(name)) is not None:
         for file, text in declared(name).show(content).items():
-            yield (ROOT / "birthsim_env" if file == SCORES else DATA) / file, text
+            yield ELSEWHERE.get(file, DATA / file), text
 
 
 def rendered() -> dict[Path, str]:
