@@ -18,7 +18,7 @@ RESULTS = ROOT / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 Content = dict[str, Any]
-"""What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces`` and how many of them were there
+"""What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
 before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, and hashes of ``sources``."""
 
 

@@ -68,12 +68,12 @@ class Study:
             before = sum((folder / task.file()).is_file() for task in tasks.values())
             done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, name, arguments.cluster)
             problem = f"{len(failures)} of {len(tasks)} pieces failed, the first {': '.join(next(iter(failures.items()), ()))}"
-            if failures and not (self.partial and arguments.out and done):
+            if failures and not (self.partial and done):
                 raise ValueError(problem)
             figures = self.keep(options, {key: done[task.name] for key, task in tasks.items() if task.name in done})
             content = {
                 **made, "seconds": round(time.perf_counter() - began, 1), "pieces": len(tasks), "pieces_kept": before,
-                "settings": vars(options), "units": self.units, "figures": figures,
+                "failed": failures, "settings": vars(options), "units": self.units, "figures": figures,
             }  # fmt: skip
             place = folder if arguments.out else RESULTS
             write_result(place / f"{name}.json", content)
