@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -31,7 +33,7 @@ def main() -> None:
     if name not in OWN:
         declared(name).main(name, STUDIES[name].measures)
         return
-    action = {"status": status, "render": render, "renew": renew}[name]
+    action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
     run(argparse.ArgumentParser(prog=f"birthsim study {name}", description=f"Says {OWN[name]}."), lambda _: action())
 
 
@@ -85,6 +87,16 @@ def render() -> None:
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             write_text(path, text)
             print(path.relative_to(ROOT))
+
+
+def draw() -> None:
+    """Draw the pictures of every result into docs."""
+    for name in names():
+        if (content := read_result(name)) is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                for path in declared(name).draw(content, Path(folder)):
+                    if path.suffix == ".png":
+                        shutil.copy(path, ROOT / "docs")
 
 
 def renew() -> None:

@@ -40,7 +40,7 @@ from studies.comparison.tables import (
     settled,
 )
 from studies.results import Content
-from studies.study import Found, Options, Study
+from studies.study import Found, Options, Study, no_pictures
 
 COLUMNS = ("environment", "sensors", "plant", "hand", "controller", "metric", *SUMMARY, *RATIO, "lost", "episodes")
 """Of the figures; ``SUMMARY`` is in the metric's unit."""
@@ -142,7 +142,8 @@ def pictures(content: Content, folder: Path) -> list[Path]:
 
 def comparison(
     name: str, show: Callable[[Content], dict[str, str]] | None = None,
-    wanted: Callable[[Conditions], bool] = lambda where: True, **options: Any,
+    wanted: Callable[[Conditions], bool] = lambda where: True, draw: Callable[[Content, Path], list[Path]] = no_pictures,
+    **options: Any,
 ) -> Study:  # fmt: skip
     """A study of some controllers under some conditions; ``options`` are defaults that differ from those of the comparison."""
     return Study(
@@ -151,7 +152,7 @@ def comparison(
             "env": ENVIRONMENTS, "controller": tuple(default_controllers()), "sensors": ("ideal", "lab", "honest"),
             "plant": tuple(PLANTS), "episodes": 64, "seed": 0, "parameters": "", **options,
         },
-        partial(cells, wanted=wanted), kept, METRICS, show or partial(tables, name=name), pictures, partial=True,
+        partial(cells, wanted=wanted), kept, METRICS, show or partial(tables, name=name), draw, partial=True,
         allowed={"env": ENVIRONMENTS, "sensors": tuple(SENSORS), "plant": tuple(PLANTS)},
         words={
             "controller": "registered names, with options, path/to/file.py:Class, or residual:POLICY",
@@ -160,7 +161,7 @@ def comparison(
     )  # fmt: skip
 
 
-COMPARISON = comparison("comparison", _cuts)
+COMPARISON = comparison("comparison", _cuts, draw=pictures)
 CIRCLES = comparison(
     "circle",
     partial(_table_of, settled, "circle"), lambda where: not where.hand, env=(CIRCLE,), plant=("randomised",),
