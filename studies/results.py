@@ -11,7 +11,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from baselines.work.files import write_text
 from baselines.work.sources import ROOT, hashes
 
 RESULTS = ROOT / "results"
@@ -32,11 +31,6 @@ def provenance(modules: tuple[str, ...]) -> Content:
         "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
         "sources": sources,
     }  # fmt: skip
-
-
-def write_result(path: Path, content: Content) -> None:
-    """Write it whole, as ``written`` has it."""
-    write_text(path, written(content))
 
 
 def written(content: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from baselines.commands.shared import EPISODES, JOBS, add_processes, finite_number, run, seed_number, whole_up_to
-from baselines.work.files import own_folder, write_text
+from baselines.work.files import own_folder, whole_results, write_text
 from baselines.work.sources import ROOT
 from baselines.work.tasks import Result, Task, run_tasks
-from studies.results import RESULTS, Content, provenance, write_result
+from studies.results import RESULTS, Content, provenance, written
 
 Options = argparse.Namespace
 Found = Mapping[Any, Result]
@@ -51,7 +52,7 @@ class Study:
         parser = argparse.ArgumentParser(
             prog=f"birthsim study {name}", description=f"Measures {measures}.",
             epilog="What there is of the same settings and code is kept, so that an interrupted run goes on. "
-            f"Without --out the result is results/{name}.json.",
+            f"Without --out the folder is out/studies/{name}, and the result is results/{name}.json too.",
         )  # fmt: skip
         for option, default in self.options.items():
             words = f"{self.words[option]} " if option in self.words else ""
@@ -75,20 +76,16 @@ class Study:
                 **made, "seconds": round(time.perf_counter() - began, 1), "pieces": len(tasks), "pieces_kept": before,
                 "failed": failures, "settings": vars(options), "units": self.units, "figures": figures,
             }  # fmt: skip
-            place = folder if arguments.out else RESULTS
-            write_result(place / f"{name}.json", content)
+            content = json.loads(written(content))
             texts = self.show(content)
-            print("\n\n".join(text for file, text in texts.items() if file.endswith(".md")))
-            drawn = self.draw(content, folder) if arguments.out else []
-            if arguments.out:
-                for file, text in texts.items():
-                    write_text(folder / file, text)
-            listed = [
-                f"{name}.json",
-                *(texts if arguments.out else ()),
-                *(path.name for path in drawn if path.suffix == ".png"),
-            ]
-            print(f"\nwritten to {place}/: {', '.join(listed)}")
+            with whole_results(folder) as place:
+                for file, text in {f"{name}.json": written(content), **texts}.items():
+                    write_text(place / file, text)
+                drawn = [path.name for path in self.draw(content, place) if path.suffix == ".png"]
+            if not arguments.out:
+                write_text(RESULTS / f"{name}.json", written(content))
+        print("\n\n".join(text for file, text in texts.items() if file.endswith(".md")))
+        print(f"\nwritten to {folder}/: {', '.join([f'{name}.json', *texts, *drawn])}")
         if failures:
             raise ValueError(problem)
 

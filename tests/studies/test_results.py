@@ -9,7 +9,7 @@ import pytest
 from baselines.work.sources import ROOT, hashes
 from studies import shelf
 from studies.door import OWN
-from studies.results import changed, provenance, read_result, write_result
+from studies.results import changed, provenance, read_result, written
 from tests.console import call
 
 MODULE = "studies.stability.stiffest"
@@ -24,7 +24,7 @@ def test_sources_follow_imports_and_names_in_strings():
 
 def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_path):
     assert read_result("one", tmp_path) is None
-    write_result(tmp_path / "one.json", provenance((MODULE,)) | {"figures": [["a", 2.0], ["b", None]]})
+    (tmp_path / "one.json").write_text(written(provenance((MODULE,)) | {"figures": [["a", 2.0], ["b", None]]}))
     result = read_result("one", tmp_path)
     assert result["figures"] == [["a", 2.0], ["b", None]]
     assert len(result["commit"]) == 40
@@ -34,10 +34,9 @@ def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_pa
     assert changed(result, (MODULE,)) == ["baselines/registry.py", "gone.py"]
 
 
-def test_what_is_no_number_is_no_result(tmp_path):
+def test_what_is_no_number_is_no_result():
     with pytest.raises(ValueError, match="JSON"):
-        write_result(tmp_path / "one.json", {"figures": [float("nan")]})
-    assert not list(tmp_path.iterdir())
+        written({"figures": [float("nan")]})
 
 
 @pytest.mark.parametrize("name", shelf.names())
