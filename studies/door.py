@@ -25,6 +25,7 @@ STUDIES = {
     "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
     "floor": Entry("honest.floor", "STUDY", "what the errors of honest sensors leave to the best controller"),
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
+    "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
     "pools": Entry("pools", "", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),

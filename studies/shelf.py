@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shutil
 import subprocess
@@ -55,7 +56,9 @@ def state(name: str) -> str:
         return "none"
     files = changed(content, study.code)
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
-    return f"stale; changed: {listed}" if files else "fresh"
+    other = {key: value for key, value in content["settings"].items() if value != json.loads(json.dumps(study.options[key]))}
+    said = "".join(f"; {key} = {value}, not {study.options[key]}" for key, value in other.items())
+    return (f"stale; changed: {listed}" if files else "fresh") + said
 
 
 def status() -> None:
@@ -102,5 +105,5 @@ def draw() -> None:
 def renew() -> None:
     """Run what is not fresh, each with its own defaults."""
     for name in names():
-        if state(name) != "fresh":
+        if not state(name).startswith("fresh"):
             subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True)

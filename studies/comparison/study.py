@@ -121,11 +121,10 @@ def tables(content: Content, name: str) -> dict[str, str]:
 
 
 def _cuts(content: Content) -> dict[str, str]:
-    """The master table, and what the pages on moving hands and on honest sensors take of it."""
+    """The master table, and what the page on moving hands takes of it."""
     figures = figures_of(content)
     moving = [cell for cell in figures if (cell["environment"], cell["plant"]) == (CIRCLE, "randomised")]
-    texts = {"moving.md": overview(moving), "honest.md": by_sensors(figures)} if moving else {}
-    return tables(content, "comparison") | {file: text + "\n" for file, text in texts.items()}
+    return tables(content, "comparison") | ({"moving.md": overview(moving) + "\n"} if moving else {})
 
 
 def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> dict[str, str]:
@@ -150,7 +149,7 @@ def comparison(
         ("studies.comparison.grid",),
         {
             "env": ENVIRONMENTS, "controller": tuple(default_controllers()), "sensors": ("ideal", "lab", "honest"),
-            "plant": tuple(PLANTS), "episodes": 64, "seed": 0, "parameters": "", **options,
+            "plant": tuple(PLANTS), "episodes": 100, "seed": 0, "parameters": "", **options,
         },
         partial(cells, wanted=wanted), kept, METRICS, show or partial(tables, name=name), draw, partial=True,
         allowed={"env": ENVIRONMENTS, "sensors": tuple(SENSORS), "plant": tuple(PLANTS)},
@@ -171,5 +170,10 @@ CIRCLES = comparison(
 BOUNDED = comparison(
     "bound", wanted=lambda where: not where.hand,
     env=(CIRCLE, PROBE), controller=("backstepping", "admittance-backstepping", "nonlinear-mpc"), sensors=("ideal", "lab"),
-    plant=("nominal", "randomised"), episodes=4,
+    plant=("nominal", "randomised"), episodes=8,
+)  # fmt: skip
+HONEST = comparison(
+    "honest", partial(_table_of, by_sensors, "honest"), env=(CIRCLE, PROBE), plant=("randomised", "described-sensors"),
+    controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"), episodes=128,
+    seed=70000,
 )  # fmt: skip
