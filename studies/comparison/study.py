@@ -14,6 +14,7 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.comparison.grid import (
+    COMPARED,
     ENVIRONMENTS,
     LEARNED,
     METRICS,
@@ -123,7 +124,8 @@ def tables(content: Content, name: str) -> dict[str, str]:
 def _cuts(content: Content) -> dict[str, str]:
     """The master table, and what the page on moving hands takes of it."""
     figures = figures_of(content)
-    moving = [cell for cell in figures if (cell["environment"], cell["plant"]) == (CIRCLE, "randomised")]
+    where = {(CIRCLE, "randomised", sensors) for sensors in COMPARED}
+    moving = [cell for cell in figures if (cell["environment"], cell["plant"], cell["sensors"]) in where]
     return tables(content, "comparison") | ({"moving.md": overview(moving) + "\n"} if moving else {})
 
 
