@@ -18,7 +18,7 @@ class Entry(NamedTuple):
 
 
 STUDIES = {
-    "accuracy": Entry("accuracy.command", "", "the error of the plant's integrator, against a second model"),
+    "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
     "beside-law": Entry("residual.beside_law", "", "policies of several seeds beside the controller that they correct"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
