@@ -75,7 +75,7 @@ def together(found: Found) -> dict[tuple[str, Conditions], Result]:
 
 
 def kept(options: Options, found: Found) -> Any:
-    """Every figure as a row with ``COLUMNS``, to four digits."""
+    """Every figure as a row with ``COLUMNS``, to six digits: tables have three."""
     rows = []
     for cell in statistics(gather(together(found))):
         place = [cell[name] for name in COLUMNS[:5]]
@@ -89,7 +89,7 @@ def kept(options: Options, found: Found) -> Any:
 
 
 def _digits(value: float) -> float | None:
-    return None if math.isnan(value) else float(f"{value:.4g}")
+    return None if math.isnan(value) else float(f"{value:.6g}")
 
 
 def figures_of(content: Content) -> list[dict[str, Any]]:
