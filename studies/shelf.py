@@ -53,7 +53,7 @@ def state(name: str) -> str:
     """Whether the result of a study is of the sources that are here."""
     study, content = declared(name), read_result(name)
     if content is None:
-        return "none"
+        return "not measured yet"
     files = changed(content, study.code)
     listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
     other = {key: value for key, value in content["settings"].items() if value != json.loads(json.dumps(study.options[key]))}

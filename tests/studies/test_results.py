@@ -43,7 +43,7 @@ def test_what_is_no_number_is_no_result():
 def test_every_declared_study_measures_with_files_that_there_are_and_has_a_state(name):
     study = shelf.declared(name)
     assert all(f"{module.replace('.', '/')}.py" in hashes(*study.code) for module in study.code)
-    assert shelf.state(name).partition(";")[0] in ("fresh", "stale", "none")
+    assert shelf.state(name).partition(";")[0] in ("fresh", "stale", "not measured yet")
 
 
 def test_every_stored_result_belongs_to_a_study():
