@@ -55,8 +55,13 @@ class Study:
             f"Without --out the folder is out/studies/{name}, and the result is results/{name}.json too.",
         )  # fmt: skip
         for option, default in self.options.items():
-            words = [self.words.get(option, ""), "" if default == "" else "(default: %(default)s)"]
-            _add(parser, option, default, " ".join(filter(None, words)), self.allowed.get(option))
+            allowed = self.allowed.get(option, ())
+            parts = [
+                self.words.get(option, ""),
+                allowed and f"of {', '.join(allowed)}",
+                default != "" and "(default: %(default)s)",
+            ]
+            _add(parser, option, default, " ".join(filter(None, parts)), allowed or None)
         add_processes(parser)
         parser.add_argument("--out", type=Path, help="folder for the result, its tables and its pictures")
         run(parser, lambda arguments: self._measure(name, arguments))
@@ -101,6 +106,4 @@ def _add(parser: argparse.ArgumentParser, option: str, default: Any, words: str,
     own: dict[str, Any] = (
         {"nargs": "+", "help": words % {"default": " ".join(map(str, default))}} if several else {"help": words}
     )
-    parser.add_argument(
-        flag, type=kind, default=default, choices=allowed, metavar=None if allowed else "NAME" if kind is str else "N", **own
-    )
+    parser.add_argument(flag, type=kind, default=default, choices=allowed, metavar="NAME" if kind is str else "N", **own)

@@ -233,7 +233,7 @@ def test_bad_input_ends_with_status_2_and_one_line_that_says_what_is_allowed(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("command", ["evaluate", "figure4", "animate", "tune", "stability", "train"])
+@pytest.mark.parametrize("command", ["evaluate", "figure4", "animate", "tune", "train"])
 def test_the_output_folder_is_asked_for(command, monkeypatch, capsys):
     status, _, complained = call(command, monkeypatch, capsys)
     assert status == 2
