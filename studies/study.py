@@ -56,11 +56,8 @@ class Study:
         )  # fmt: skip
         for option, default in self.options.items():
             allowed = self.allowed.get(option, ())
-            parts = [
-                self.words.get(option, ""),
-                allowed and f"of {', '.join(allowed)}",
-                default != "" and "(default: %(default)s)",
-            ]
+            parts = [self.words.get(option, ""), f"of {', '.join(allowed)}" if allowed else ""]
+            parts += ["(default: %(default)s)"] if default != "" else []
             _add(parser, option, default, " ".join(filter(None, parts)), allowed or None)
         add_processes(parser)
         parser.add_argument("--out", type=Path, help="folder for the result, its tables and its pictures")
