@@ -134,11 +134,12 @@ def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> di
 
 
 def pictures(content: Content, folder: Path) -> list[Path]:
-    """Both pictures of the figures."""
+    """Both pictures of the figures, with the sensors of the tables."""
     # pyplot takes half a second to load.
     from studies.comparison.figure import draw_comparison
 
-    return draw_comparison(figures_of(content), folder)
+    figures = figures_of(content)
+    return draw_comparison([cell for cell in figures if cell["sensors"] in COMPARED] or figures, folder)
 
 
 def comparison(
