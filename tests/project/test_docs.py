@@ -162,7 +162,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
         Path(link).name for text in [*PAGES.values(), *TABLES.values()] for link in re.findall(r"\]\((data/[^)]+)\)", text)
     }
     assert set(columns) <= linked
-    compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound_circle", "bound_probe")}
+    compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation_data.DATA)}
     assert columns == compared | others
 
