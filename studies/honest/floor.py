@@ -40,6 +40,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,),
+    ("studies.honest.sensor_floor",),
     {"episodes": 128, "seed": 70000, "parameters": ""}, _tasks, lambda _, found: dict(found), UNITS, _shown,
 )  # fmt: skip

@@ -9,28 +9,17 @@ leaves the nominal rig within 20 mm, over m/(tau + latency/4).
 from __future__ import annotations
 
 import itertools
-from typing import Any, cast
-
-import numpy as np
+from typing import Any
 
 from baselines.backstepping.stiffest import PART
-from baselines.registry import make_controller
-from baselines.staged import StagedController
-from baselines.work.tasks import Result, Task
-from birthsim_env.physics.rig.parameters import Parameters
+from baselines.work.tasks import Task
 from studies.comparison.tables import markdown
 from studies.results import Content
-from studies.stability.maps import Cases, judge
+from studies.stability.swinging import stiffest
 from studies.study import Found, Options, Study
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
 """kg, s and s; without latency positions are exact."""
-
-ASKED = np.array([1000.0 * 1.2**step for step in range(24)])
-
-SWING = 0.02
-"""m, peak to peak."""
-
 
 UNITS = {"controller": "", "mass": "kg", "valve": "s", "latency": "s", "limit": "N/m", "rate": "1/s"}
 """Columns of the figures; no limit (None) where it swings at no setpoint."""
@@ -39,12 +28,6 @@ UNITS = {"controller": "", "mass": "kg", "valve": "s", "latency": "s", "limit": 
 def _tasks(_: Options) -> dict[Any, Task]:
     cases = itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES)
     return {case: Task("-".join(map(str, case)), case[0], stiffest, dict(zip(UNITS, case, strict=False))) for case in cases}
-
-
-def stiffest(controller: str, mass: float, valve: float, latency: float) -> Result:
-    """``limit`` of a controller on a rig, N/m, infinite where it swings nowhere."""
-    rig = {"mechanics.mass": mass, "valves.time_constant": valve, "electronics.position_latency": latency}
-    return {"limit": rests_up_to(controller, Parameters().replace(rig), "lab" if latency else "ideal")}
 
 
 def _kept(_: Options, found: Found) -> Any:
@@ -61,14 +44,4 @@ def _entry(value: Any) -> str:
     return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
-def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
-    """N/m: the last of ``ASKED`` before the first at which the law swings, without its own bound; infinite where none does."""
-    law, still = cast(StagedController, make_controller(name, rig)), np.zeros(len(ASKED))
-    stages = law.law_stages
-    law.law_stages = lambda sampled: stages(sampled)[1:]  # type: ignore[method-assign]
-    verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), law, sensors, 0, None)
-    swings = verdict.lost | (verdict.motion > SWING)
-    return float(ASKED[max(int(np.argmax(swings)) - 1, 0)]) if swings.any() else np.inf
-
-
-STUDY = Study((__name__,), {}, _tasks, _kept, UNITS, _shown)
+STUDY = Study(("studies.stability.swinging",), {}, _tasks, _kept, UNITS, _shown)
