@@ -7,13 +7,12 @@
 # make verify measures accuracy and balances and writes docs/verification.md; make verify-slow mutation scores and coverage too
 # make lint   ruff, mypy and the order of the packages; make bench prints speeds, of built code too
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
-# make compare compares all controllers (an hour or so) and redraws the pictures of its section
+# make results runs every study whose result is stale, and writes the tables and pictures that show them
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
-# make scores measures what every environment pays, to laws and policies (some minutes); make scratch trains PPO from scratch;
+# make scratch trains PPO from scratch;
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
 # make prose reads the documentation for words that the glossary replaces and for long sentences, and counts its words; it needs npm
-# make moving compares the laws under hands that move; make haptics measures what a hand feels (some 20 minutes)
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
@@ -26,7 +25,6 @@ TOOLS := $(OUT)/tools
 NPM := $(OUT)/npm
 OLDEST := numba==0.65.0 llvmlite==0.47.0
 PYTEST := $(BIN)/python -m pytest -n 2 --durations 20 --durations-min 1
-BOUND := backstepping admittance-backstepping nonlinear-mpc
 # --no-input: a failing index must fail, not wait for somebody to type.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 # Every file of an installation has its hash in requirements/, which make lock writes from constraints.txt.
@@ -49,11 +47,10 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(STUDENT)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-# A page of docs/ keeps what stands above its mark; the tables that commands wrote follow, and their figures go to docs/data.
+# A page of docs/ keeps what stands above its mark; the tables that commands wrote follow.
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
-tables = sed '1d; s|\[.*\.csv\](.*\.csv)|[$(2).csv](data/$(2).csv)|' $(OUT)/$(1).md; cp $(OUT)/$(1).csv docs/data/$(2).csv
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench compare pictures policies learned scores scratch moving haptics targets docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml requirements/base.txt
@@ -200,22 +197,16 @@ pictures: $(READY)
 	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
 	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
 	  --out docs/vacuum.webp
-	$(BIN)/birthsim study comparison --studies-only --out $(OUT)/studies
-	cp $(OUT)/studies/*.png docs/
 	$(BIN)/birthsim study sweep examples/sweeps/robustness.toml --out $(OUT)/robustness
 	cp $(OUT)/robustness/map_0.png docs/robustness.png
 	$(BIN)/python examples/frequency_responses.py --out $(OUT)/frequency
 	cp $(OUT)/frequency/frequency_responses.png docs/
 
-compare: $(READY)
-	$(BIN)/birthsim study comparison --episodes 100 --out $(OUT)/comparison
-	$(BIN)/birthsim study comparison --controller $(BOUND) --env BirthSIM/Circle-v1 --episodes 8 --no-studies --out $(OUT)/bound
-	$(BIN)/birthsim study comparison --controller $(BOUND) --env BirthSIM/Probe-v2 --episodes 8 --no-studies --out $(OUT)/bound-probe
-	$(BIN)/birthsim study stability --sensors lab --out $(OUT)/stability
-	$(call renew,comparison,$(call tables,comparison/comparison,comparison))
-	$(call renew,bound,echo; echo "## Circle"; $(call tables,bound/comparison,bound_circle); \
-	  echo; echo "## Probe"; $(call tables,bound-probe/comparison,bound_probe))
-	cp $(OUT)/comparison/*.png $(OUT)/stability/*.png docs/
+# Interrupted, the same command goes on. What is fresh is left as it is; birthsim study status has the seconds of each.
+results: $(READY)
+	$(BIN)/birthsim study renew
+	$(BIN)/birthsim study render
+	$(BIN)/birthsim study draw
 
 # The student learns from teachers that are told the rig, which no controller can be.
 policies: $(READY)
@@ -244,22 +235,9 @@ learned: $(READY)
 	  $(foreach name,$(LEARNED),sed "1d; s/^/$(name),/" $(OUT)/learned/$(name)/evaluation.csv; ) } >docs/data/learned.csv
 	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
 
-scores: $(READY)
-	$(BIN)/birthsim study scores --out $(OUT)/scores
-	cp $(OUT)/scores/scores.json birthsim_env/
-	$(call renew,scores,$(call tables,scores/scores,scores))
-
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch
 	cp $(OUT)/scratch/scratch.png docs/
-
-moving: $(READY)
-	$(BIN)/birthsim study comparison --env BirthSIM/Circle-v1 --randomize all --no-studies --episodes 64 --out $(OUT)/moving
-	$(call renew,moving,$(call tables,moving/comparison,moving))
-
-haptics: $(READY)
-	$(BIN)/birthsim study haptics --out $(OUT)/haptics --page docs/haptics.md
-	cp $(OUT)/haptics/*.png docs/
 
 targets: $(READY)
 	$(BIN)/birthsim study targets --out $(OUT)/targets --page docs/targets.md

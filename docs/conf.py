@@ -22,7 +22,7 @@ copyright = author
 version = release = birthsim_env.__version__
 
 extensions = ["myst_nb"]
-exclude_patterns = ["_generate"]
+exclude_patterns = ["_generate", "data"]
 toc_object_entries = False
 # Indented and unnamed blocks hold commands, formulas and TOML; what is Python says so.
 highlight_language = "none"

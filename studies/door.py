@@ -7,36 +7,48 @@ from typing import NamedTuple
 
 from baselines.commands.start import perform
 from birthsim_env.physics.rig.values import near, shown
-from studies.results import changed
 
 
-class Study(NamedTuple):
-    """Where a study's command is, and what it measures."""
+class Entry(NamedTuple):
+    """Where a study is: a module below ``studies``, and in it the name of its declaration, or "" for a command of its own."""
 
     module: str
+    declaration: str
     measures: str
 
 
 STUDIES = {
-    "accuracy": Study("accuracy.command", "the error of the plant's integrator, against a second model"),
-    "beside-law": Study("residual.beside_law", "policies of several seeds beside the controller that they correct"),
-    "comparison": Study("comparison.command", "every controller under all conditions, and how the stiffness feels"),
-    "fuzz": Study("fuzz.command", "odd input to everything that is read or called"),
-    "haptics": Study("haptics.command", "what a hand feels"),
-    "honest": Study("honest.command", "what honest sensors cost"),
-    "mutation": Study("mutation.command", "how many small changes of the numerical modules their tests notice"),
-    "odd-rigs": Study("fuzz.odd_rigs", "random rigs through every command"),
-    "pools": Study("pools", "what other processes and hosts cost"),
-    "recovery": Study("recovery.command", "how well identification finds rigs that are known"),
-    "scores": Study("scores.command", "what every environment pays to whom"),
-    "soak": Study("soak.command", "10^8 policy steps over all scenarios, controllers, sensors and corners of the ranges"),
-    "speed": Study("speed.command", "speeds, beside what they are to be compared with"),
-    "stability": Study("stability.command", "maps of where a controller is stable"),
-    "stiffest": Study("stability.stiffest", "the stiffest setpoints at which the paper's controller rests"),
-    "sweep": Study("sweeps.command", "grids, random draws and searches, from a TOML file"),
-    "targets": Study("targets.command", "built code of every target, against Python"),
-    "verification": Study("verification.command", "balances, coverage and mutation scores, for docs/verification.md"),
-    "worst": Study("honest.worst", "the worst worlds, and what each owes to its figures"),
+    "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
+    "beside-law": Entry("residual.beside_law", "", "policies of several seeds beside the controller that they correct"),
+    "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
+    "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
+    "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
+    "floor": Entry("honest.floor", "STUDY", "what the errors of honest sensors leave to the best controller"),
+    "fuzz": Entry("fuzz.command", "", "odd input to everything that is read or called"),
+    "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
+    "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
+    "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
+    "mutation": Entry("mutation.command", "", "how many small changes of the numerical modules their tests notice"),
+    "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
+    "pools": Entry("pools", "", "what other processes and hosts cost"),
+    "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
+    "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
+    "soak": Entry("soak.command", "", "10^8 policy steps over all scenarios, controllers, sensors and corners of the ranges"),
+    "speed": Entry("speed.command", "", "speeds, beside what they are to be compared with"),
+    "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),
+    "stiffest": Entry("stability.stiffest", "STUDY", "the stiffest setpoints at which the paper's controller rests"),
+    "stiffness": Entry("comparison.feel", "STUDY", "how the stiffness of every controller feels"),
+    "sweep": Entry("sweeps.command", "", "grids, random draws and searches, from a TOML file"),
+    "targets": Entry("targets.command", "", "built code of every target, against Python"),
+    "verification": Entry("verification.command", "", "balances, coverage and mutation scores, for docs/verification.md"),
+    "worst": Entry("honest.worst", "", "the worst worlds, and what each owes to its figures"),
+}
+
+OWN = {
+    "status": "which results/*.json are fresh, and what changed since the others",
+    "render": "write the tables of docs, README and scores from results/*.json",
+    "draw": "draw the pictures of docs from results/*.json",
+    "renew": "run every study whose result is stale",
 }
 
 
@@ -44,16 +56,8 @@ def overview() -> str:
     """The help: one line a study."""
     width = max(map(len, STUDIES))
     lines = [f"  {name:{width}}  {study.measures}" for name, study in STUDIES.items()]
-    lines += ["", f"  {'status':{width}}  which results/*.json are fresh, and what changed since the others"]
-    return "\n".join(["usage: birthsim study NAME ...", "", *lines])
-
-
-def state(name: str) -> str:
-    """Whether the result of a study is of the sources that are here."""
-    files = changed(name, f"studies.{STUDIES[name].module}")
-    if files is None:
-        return "no result in results/"
-    return f"stale; changed: {', '.join(files)}" if files else "fresh"
+    own = [f"  {name:{width}}  {does}" for name, does in OWN.items()]
+    return "\n".join(["usage: birthsim study NAME ...", "", *lines, "", *own])
 
 
 def main(arguments: list[str]) -> None:
@@ -62,12 +66,10 @@ def main(arguments: list[str]) -> None:
         print(overview())
         raise SystemExit(0 if arguments else 2)
     name, *rest = arguments
-    if name == "status":
-        print("\n".join(f"{one:12} {state(one)}" for one in STUDIES))
-        return
-    if name not in STUDIES:
-        allowed = ", ".join(["status", *STUDIES])
+    if name not in {**STUDIES, **OWN}:
+        allowed = ", ".join([*OWN, *STUDIES])
         print(f"birthsim study: error: NAME = {shown(name)}{near(name, STUDIES)}; allowed: {allowed}", file=sys.stderr)
         raise SystemExit(2)
     sys.argv = ["", *rest]
-    perform(f"birthsim study {name}", "studies", STUDIES[name].module)
+    declared = name in OWN or STUDIES[name].declaration
+    perform(f"birthsim study {name}", "studies", "shelf" if declared else STUDIES[name].module)

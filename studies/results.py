@@ -6,53 +6,60 @@ import json
 import platform
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-from baselines.work.files import own_folder, whole_file
-from studies.sources import ROOT, hashes
+from baselines.work.sources import ROOT, hashes
 
 RESULTS = ROOT / "results"
-Rows = list[dict[str, str | float | None]]
-
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
-
-def measure(
-    name: str, module: str, units: dict[str, str], seeds: Sequence[int], rows: Callable[[], Rows], folder: Path = RESULTS
-) -> Path:
-    """Write what ``rows()`` measures, whole, as the result of the study ``name``, whose code is ``module``.
-
-    ``units`` has the unit of each column.
-    """
-    sources, commit = hashes(module), _git("rev-parse", "HEAD")
-    dirty = bool(_git("status", "--porcelain", "--", ".", ":!results"))
-    with own_folder(folder):
-        began = time.perf_counter()
-        found = rows()
-        result = {
-            "command": " ".join(("birthsim study", name, *sys.argv[1:])), "commit": commit, "dirty": dirty,
-            "date": datetime.now(UTC).isoformat(timespec="seconds"), "seconds": round(time.perf_counter() - began, 1),
-            "processor": _processor(),
-            "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
-            "seeds": list(seeds), "units": units, "rows": found, "sources": sources,
-        }  # fmt: skip
-        path = folder / f"{name}.json"
-        with whole_file(path) as file:
-            file.write((json.dumps(result, indent=1, allow_nan=False) + "\n").encode())
-    return path
+Content = dict[str, Any]
+"""What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
+before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, and hashes of ``sources``."""
 
 
-def changed(name: str, module: str, folder: Path = RESULTS) -> list[str] | None:
-    """Sources of ``module`` that changed, came or went since the result ``name`` was measured; None without one."""
+def provenance(modules: tuple[str, ...]) -> Content:
+    """What makes a result now, whose figures ``modules`` measure; ``dirty`` if one of their sources is not as committed."""
+    sources = hashes(*modules)
+    return {
+        "command": " ".join(sys.argv), "commit": _git("rev-parse", "HEAD"),
+        "dirty": bool(_git("status", "--porcelain", "--", *sources)), "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "processor": _processor(),
+        "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
+        "sources": sources,
+    }  # fmt: skip
+
+
+def written(content: Any) -> str:
+    """JSON with a line for each innermost list or short dictionary; ``ValueError`` for a number that is not finite."""
+    return _lines(content) + "\n"
+
+
+def read_result(name: str, folder: Path = RESULTS) -> Content | None:
+    """The stored result of a study, if there is one."""
     file = folder / f"{name}.json"
-    if not file.is_file():
-        return None
-    then, now = json.loads(file.read_text())["sources"], hashes(module)
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+
+
+def changed(content: Content, modules: tuple[str, ...]) -> list[str]:
+    """Sources of ``modules`` that changed, came or went since a result was measured."""
+    then, now = content["sources"], hashes(*modules)
     return sorted(path for path in then.keys() | now.keys() if then.get(path) != now.get(path))
+
+
+def _lines(content: Any, indent: str = "\n") -> str:
+    items = content.values() if isinstance(content, dict) else content if isinstance(content, (list, tuple)) else ()
+    if not any(isinstance(item, (dict, list, tuple)) for item in items) and not (isinstance(content, dict) and len(items) > 12):
+        return json.dumps(content, allow_nan=False)
+    inner = indent + " "
+    if isinstance(content, dict):
+        return (
+            "{" + ",".join(f"{inner}{json.dumps(key)}: {_lines(item, inner)}" for key, item in content.items()) + indent + "}"
+        )
+    return "[" + ",".join(inner + _lines(item, inner) for item in content) + indent + "]"
 
 
 def _git(*arguments: str) -> str:

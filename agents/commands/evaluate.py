@@ -29,7 +29,7 @@ from baselines.commands.settings import (
     whole,
 )
 from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
-from baselines.work.files import make_folder, whole_results, write_json, write_text
+from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -95,9 +95,9 @@ def main(settings: Settings) -> None:
     print(drawn)
     if learned_with - {settings.sensors}:
         print(f"the policy was trained with {', '.join(sorted(learned_with))} sensors; here they are {settings.sensors}")
-    done, failures = run_tasks(
-        [task for tasks in pieces.values() for task in tasks], folder, settings.jobs, "episodes", settings.cluster
-    )
+    every = [task for tasks in pieces.values() for task in tasks]
+    with own_folder(folder):
+        done, failures = run_tasks(every, folder, settings.jobs, "episodes", settings.cluster)
     if failures:
         name, problem = next(iter(failures.items()))
         raise ValueError(f"{len(failures)} pieces failed, the first {name}: {problem}; what is complete is kept")

@@ -130,14 +130,14 @@ def _run_batch(
     at_once = 1 if measures.stops else AT_ONCE
     bar = tqdm(total=env.steps, desc=f"{result.controller}, episodes {seeds[0]}-{seeds[-1]}", disable=not progress, leave=False)
     for step in range(0, env.steps, at_once):
-        simulation.run(min(at_once, env.steps - step))
+        steps = min(at_once, env.steps - step)
+        simulation.run(steps)
         fallen = measures.fallen()
         if fallen.any():
             controller.reset(fallen)
         if not own.alive.any():
             break
-        if step % AT_ONCE == 0:
-            bar.update(AT_ONCE)
+        bar.update(steps)
     bar.close()
     while len(driver.spent) < TIMED:
         driver.openings(simulation.plant, simulation.measurement, simulation.reference)

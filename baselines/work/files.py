@@ -137,28 +137,9 @@ def finite(content: Any) -> Any:
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
-def is_alive(host: str, process: int) -> bool:
-    """Whether a process may still run: one of another host always may."""
-    if host != _HOST:
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def this_process() -> tuple[str, int]:
-    """Host and number of this process."""
-    return _HOST, os.getpid()
-
-
 def _partial(path: Path) -> Path:
     """The hidden name of what this process writes and ``path`` will be."""
-    host, process = this_process()
-    return path.with_name(f".{path.name}.{host}-{process}{_PARTIAL}")
+    return path.with_name(f".{path.name}.{_HOST}-{os.getpid()}{_PARTIAL}")
 
 
 def _link(partial: Path, path: Path) -> None:
@@ -174,6 +155,12 @@ def _link(partial: Path, path: Path) -> None:
 
 
 def _is_written(partial: Path) -> bool:
-    """Whether the process that writes a hidden file may still run."""
+    """Whether the process that writes a hidden file may still run: one of another host always may."""
     host, _, process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2].rpartition("-")
-    return not process.isdecimal() or is_alive(host, int(process))
+    try:
+        os.kill(int(process) if host == _HOST and process.isdecimal() else os.getpid(), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True

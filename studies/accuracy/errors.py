@@ -160,22 +160,16 @@ def joined(courses: Iterable[Course]) -> Course:
     return Course(*lanes)
 
 
-def measure(
-    rigs: Mapping[str, Parameters], motions: Mapping[str, Motion], tick: Callable[[], object] = lambda: None
-) -> dict[str, Any]:
-    """Errors of every method and step on every rig and motion, observed orders, and adaptive methods on the first rig.
-
-    ``tick`` is called after each run of the reference.
-    """
+def measure(rigs: Mapping[str, Parameters], motions: Mapping[str, Motion]) -> dict[str, Any]:
+    """Errors of every method and step on every rig and motion, observed orders, and adaptive methods on the first rig."""
     found: dict[str, Any] = {"rigs": list(rigs), "steps_s": list(STEPS), "motions": {}}
     found["present_step_s"] = dynamics.INTEGRATION_STEP
     first = next(iter(rigs.values()))
     for name, motion in motions.items():
         shipped = run_method(list(rigs.values()), motion, runge_kutta, dynamics.INTEGRATION_STEP)
-        courses = []
-        for rig, clear in zip(rigs.values(), shipped.clear, strict=True):
-            courses.append(run_reference(rig, motion)[0] if clear else NOWHERE)
-            tick()
+        courses = [
+            run_reference(rig, motion)[0] if clear else NOWHERE for rig, clear in zip(rigs.values(), shipped.clear, strict=True)
+        ]  # fmt: skip
         reference = joined(courses)
         methods: dict[str, Any] = {}
         for method, advance in METHODS.items():
@@ -187,15 +181,15 @@ def measure(
         found["motions"][name] = {
             "clear_of_stops": list(map(bool, shipped.clear)),
             "methods": methods,
-            "adaptive": _adaptive(first, motion, courses[0], tick),
+            "adaptive": _adaptive(first, motion, courses[0]),
             "reference_itself": _reference_itself(first, motion, courses[0]),
         }
     found["smooth"] = observed_orders(rigs)
-    found["laws"] = _friction_laws(first, motions, tick)
+    found["laws"] = _friction_laws(first, motions)
     return found
 
 
-def _friction_laws(rig: Parameters, motions: Mapping[str, Motion], tick: Callable[[], object]) -> dict[str, Any]:
+def _friction_laws(rig: Parameters, motions: Mapping[str, Motion]) -> dict[str, Any]:
     """Error of the plant as it is on one rig with each friction law."""
     found: dict[str, Any] = {}
     for law in LAWS:
@@ -204,16 +198,10 @@ def _friction_laws(rig: Parameters, motions: Mapping[str, Motion], tick: Callabl
             course = run_method([changed], motion, runge_kutta, dynamics.INTEGRATION_STEP)
             position, pressure = errors(course, run_reference(changed, motion)[0] if course.clear[0] else NOWHERE)
             found[law][name] = {"position_m": float(position[0]), "pressure_relative": float(pressure[0])}
-            tick()
     return found
 
 
-def runs(rigs: int, motions: int) -> int:
-    """How often ``measure`` calls its ``tick``."""
-    return motions * (rigs + len(ADAPTIVE) * len(TOLERANCES) + len(LAWS))
-
-
-def _adaptive(rig: Parameters, motion: Motion, reference: Course, tick: Callable[[], object]) -> list[dict[str, Any]]:
+def _adaptive(rig: Parameters, motion: Motion, reference: Course) -> list[dict[str, Any]]:
     rows = []
     for method, tolerance in itertools.product(ADAPTIVE, TOLERANCES):
         course, evaluations = run_reference(rig, motion, method=method, tolerance=tolerance)
@@ -224,7 +212,6 @@ def _adaptive(rig: Parameters, motion: Motion, reference: Course, tick: Callable
                 "position_m": float(position[0]), "pressure_relative": float(pressure[0]),
             }
         )  # fmt: skip
-        tick()
     return rows
 
 

@@ -22,6 +22,7 @@ CONDITIONS = {
     ("honest", "nominal"): {"marker": "s", "color": MIDDLE, "mfc": MIDDLE},
     ("honest", "randomised"): {"marker": "s", "color": MIDDLE, "mfc": "white"},
     ("honest", "drawn-sensors"): {"marker": "D", "color": DARK, "mfc": "white"},
+    ("honest", "described-sensors"): {"marker": "D", "color": MIDDLE, "mfc": "white"},
 }
 """Sensors and plant -> how they look."""
 

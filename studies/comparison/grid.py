@@ -10,32 +10,50 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.policy.files import WEIGHTS
+from agents.policy.seeds import SHIPPED, policy_folders
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
-from baselines.bench.pieces import file_stem
+from baselines.bench.pieces import controller_settings, file_hash, file_stem
 from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
 from baselines.registry import LISTED, SLOW, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
+from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
 
 ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")
 """Sensor models of the bench's tables where none is named."""
-PLANTS: dict[str, bool | str] = {"nominal": "scenario", "randomised": True, "drawn-sensors": "sensors"}
+PLANTS: dict[str, bool | str] = {
+    "nominal": "scenario",
+    "randomised": True,
+    "drawn-sensors": "sensors",
+    "described-sensors": True,
+}
 """Plant -> the environments' argument ``randomize``. The law believes the rig as described: what is ``randomised`` differs from
-that in rig and sensors, ``drawn-sensors`` in the figures of its sensors alone, where the sensor model can draw them."""
+that in rig and sensors; where the sensor model can draw its figures, ``drawn-sensors`` in those alone, ``described-sensors`` in
+all others."""
 
-RIGS = {"nominal": "nominal rig", "randomised": "drawn rig", "drawn-sensors": "figures drawn, nominal rig"}
+RIGS = {
+    "nominal": "nominal rig",
+    "randomised": "drawn rig",
+    "drawn-sensors": "figures drawn, nominal rig",
+    "described-sensors": "figures as described, drawn rig",
+}
 """Plant -> its words in tables and pictures."""
 
 MOVING = ("sine", "noise", "guided")
 """Hands of ``birthsim_env.parts.hands.moving_hands`` that move all the time."""
+
+LEARNED = "residual:"
+"""Before the name of a policy, of which all training seeds are measured together."""
 
 REFERENCE = "backstepping"
 """The law that the others are compared with, episode by episode."""
@@ -99,16 +117,40 @@ def all_conditions(
     """Every combination that there is, and the moving hands on rigs drawn at random where the circle is among them."""
     own = [
         Conditions(*chosen) for chosen in product(environments, sensors, plants)
-        if chosen[2] != "drawn-sensors" or drawn_by(chosen[1])
+        if not chosen[2].endswith("-sensors") or drawn_by(chosen[1])
     ]  # fmt: skip
     where = [name for name in environments if name == ENVIRONMENTS[0]]
-    moving = product(where, sensors, [name for name in plants if name == "randomised"], MOVING)
-    return [*own, *(Conditions(*chosen) for chosen in moving)]
+    moving = product(where, sensors, [name for name in plants if PLANTS[name] is True], MOVING)
+    return [*own, *(Conditions(*chosen) for chosen in moving if not chosen[2].endswith("-sensors") or drawn_by(chosen[1]))]
+
+
+def settings_of(name: str, rig: Parameters) -> dict[str, dict[str, Any]]:
+    """Name -> settings of what is measured under a name: a controller's ``controller_settings``, or for "residual:POLICY" those
+    of the policies of all its training seeds. ``ValueError`` for what is neither."""
+    if not name.startswith(LEARNED):
+        return {name: {**controller_settings(name, rig), "policy": ""}}
+    folders = policy_folders(name.removeprefix(LEARNED))
+    own = {"controller": "residual", "rig": rig.to_dict()}
+    return {
+        f"{name} {place.name}": {**own, "source": file_hash(str(place / WEIGHTS)), "policy": _place(place)} for place in folders
+    }
+
+
+def _place(folder: Path) -> str:
+    """A policy's folder from that of the shipped ones, if it is one of these."""
+    return str(folder.relative_to(SHIPPED)) if folder.is_relative_to(SHIPPED) else str(folder)
+
+
+def as_described(rig: Parameters) -> Parameters:
+    """``rig`` whose sensors stay as they are described where everything else of it is drawn."""
+    board = rig.to_dict()["electronics"]
+    ranges = {f"electronics.{name}": [board.get(name, getattr(rig.electronics, name))] * 2 for name in FIGURES}
+    return Parameters.from_dict({**rig.to_dict(), "randomize": ranges})
 
 
 def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, seed: int) -> Task:
-    """The task that computes one cell of the controller with these ``controller_settings``."""
-    name = settings["controller"]
+    """The task that computes one cell of a controller with its ``settings_of``."""
+    name = " ".join(filter(None, (settings["controller"], settings["policy"])))
     where = {
         "environment": conditions.environment, "sensors": conditions.sensors, "plant": conditions.plant, "hand": conditions.hand
     }  # fmt: skip
@@ -117,17 +159,22 @@ def cell_task(settings: dict[str, Any], conditions: Conditions, episodes: int, s
 
 
 def run_cell(
-    controller: str, source: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, hand: str, episodes: int,
-    seed: int,
+    controller: str, source: str, policy: str, rig: dict[str, Any], environment: str, sensors: str, plant: str, hand: str,
+    episodes: int, seed: int,
 ) -> Result:  # fmt: skip
-    """Values per episode, lost episodes and cost of one cell; ``source`` only tells cells of different files apart."""
+    """Values, returns and success per episode, lost ones and cost of one cell; ``source`` only tells different files apart."""
     parameters = Parameters.from_dict(rig)
-    law = make_controller(controller, parameters)
+    law = make_controller(controller, parameters, **({"policy": SHIPPED / policy} if policy else {}))
+    parameters = as_described(parameters) if plant == "described-sensors" else parameters
     setting = {"parameters": parameters, "sensors": sensors, "randomize": PLANTS[plant], "user_force": hand or None}
     result = evaluate(environment, law, controller, episodes, seed, progress=False, **setting)
     if len(result.seeds) < episodes:
         raise KeyboardInterrupt  # which ``evaluate`` answers by what is complete; a cell is complete or it is none
-    return {"seeds": result.seeds, "metrics": result.metrics, "lost": result.lost, "cost": result.cost}
+    returns = {str(discount): values for discount, values in result.returns.items()}
+    return {
+        "seeds": result.seeds, "metrics": result.metrics, "lost": result.lost, "cost": result.cost, "success": result.success,
+        "returns": returns,
+    }  # fmt: skip
 
 
 def gather(named: dict[tuple[str, Conditions], Result]) -> Cells:
@@ -167,6 +214,7 @@ def statistics(cells: Cells) -> list[dict[str, Any]]:
             figures["metrics"][metric] = summary_with_interval(mine)
             if reference is not None and controller != REFERENCE and metric not in WITHOUT_RATIO:
                 theirs = penalize_lost(reference.metrics[metric], reference.lost, applies=True)
+                theirs = np.tile(theirs, len(mine) // len(theirs))  # the same worlds for every training seed
                 figures["ratios"][metric] = summary_with_interval(paired_ratios(mine, theirs))
         found.append({
             "controller": controller, "environment": conditions.environment, "sensors": conditions.sensors,

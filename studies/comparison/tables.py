@@ -28,7 +28,9 @@ OWN_HAND = "own"
 IN_FULL = ("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "cross_motion", "hunting", "air", "saturation")
 """Metrics of the data file; the JSON file holds all."""
 
-_INTERVAL = ("median", "low", "high")
+SUMMARY = ("median", "low", "high", "q95", "worst")
+RATIO = ("ratio", "ratio_low", "ratio_high")
+"""Columns of a figure and of its ratio to ``REFERENCE``."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,53 @@ def losses(figures: Figures) -> str:
     return markdown(rows)
 
 
+def settled(figures: Figures) -> str:
+    """Settled error by controller and sensors: median and 95 %, and how many of the episodes were lost; the best is bold."""
+    kinds = list(dict.fromkeys(cell["sensors"] for cell in figures))
+    found = {(cell["controller"], cell["sensors"]): cell for cell in figures}
+    names = controllers_of(figures)
+    best = {kind: min(names, key=lambda name: found[name, kind]["metrics"]["settled_rms"]["median"]) for kind in kinds}
+    rows = [["controller", "uses the hand's force", *(f"{kind} sensors" for kind in kinds), f"lost, {' and '.join(kinds)}"]]
+    for name in names:
+        own = [found[name, kind] for kind in kinds]
+        errors = [[cell["metrics"]["settled_rms"][key] for key in ("median", "q95")] for cell in own]
+        cells = ["; ".join(map(number, error)) for error in errors]
+        cells = [f"**{cell}**" if best[kind] == name else cell for kind, cell in zip(kinds, cells, strict=True)]
+        lost = " and ".join(str(cell["lost"]) for cell in own)
+        force = "no" if name.startswith("backstepping") or "sensorless" in name or "student" in name else "yes"
+        rows.append([f"`{name}`", force, *cells, f"{lost} of {own[0]['episodes']}"])
+    return markdown(rows)
+
+
+KINDS = {
+    ("ideal", "randomised"): "ideal", ("lab", "randomised"): "lab", ("honest", "described-sensors"): "honest",
+    ("honest", "randomised"): "honest, drawn",
+}  # fmt: skip
+"""Sensors and plant -> what the table of sensors calls them, on drawn rigs."""
+
+
+def by_sensors(figures: Figures) -> str:
+    """What sensors cost on drawn rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand."""
+    found = {(cell["controller"], *_place(cell)): cell for cell in figures}
+    rows = [[
+        "controller", "sensors", "Probe: stiffness error, %", "hunting, mm", "settled error, mm", "Circle: settled error, mm",
+        *(f"Circle, {hand} hand" for hand in MOVING), "lost",
+    ]]  # fmt: skip
+    columns = [(PROBE, "", metric) for metric in ("stiffness_error", "hunting", "settled_rms")]
+    columns += [(CIRCLE, hand, "settled_rms") for hand in ("", *MOVING)]
+    for name in controllers_of(figures):
+        for kind, words in KINDS.items():
+            cells = [found.get((name, environment, *kind, hand)) for environment, hand, _ in columns]
+            if None not in cells:
+                own = [(cell, metric) for cell, (*_, metric) in zip(cells, columns, strict=True) if cell]
+                three = [
+                    ", ".join(number(cell["metrics"][metric][key]) for key in ("median", "q95", "worst"))
+                    for cell, metric in own
+                ]
+                rows.append([name, words, *three, str(sum(cell["lost"] for cell, _ in own[2:]))])
+    return markdown(rows)
+
+
 def data(figures: Figures) -> str:
     """Every figure as CSV with the columns ``DATA``: a row per environment, sensor model, rig, hand, metric and controller."""
     rows: list[Sequence[str]] = [DATA]
@@ -126,8 +175,8 @@ def data(figures: Figures) -> str:
                 if (mine := cell["metrics"].get(metric)) is None:
                     continue
                 ratio = cell["ratios"].get(metric)
-                values = [mine[key] for key in (*_INTERVAL, "q95", "worst")]
-                others = ["", "", ""] if ratio is None else [number(ratio[key]) for key in _INTERVAL]
+                values = [mine[key] for key in SUMMARY]
+                others = ["", "", ""] if ratio is None else [number(ratio[key]) for key in SUMMARY[:3]]
                 count = [str(cell["lost"]), str(cell["episodes"])]
                 rows.append([*place, metric, METRICS[metric], cell["controller"], *map(number, values), *others, *count])
     text = io.StringIO()

@@ -17,7 +17,7 @@ from studies.fuzz.mutations import Rng
 MODULES = {
     **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify")},
     **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "explain")},
-    **{name: f"studies.{name}.command" for name in ("stability", "speed", "scores")},
+    "speed": "studies.speed.command",
     "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},
 }

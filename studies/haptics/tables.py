@@ -15,9 +15,6 @@ from studies.haptics.release import PULL, STIFFNESS
 Runs = Sequence[dict[str, Any]]
 """What ``studies.haptics.measurements.gathered`` gives, in the order of the rows."""
 
-BEGIN, END = "<!-- tables of birthsim study haptics -->", "<!-- end of tables -->"
-"""Marks in a page between which the tables stand."""
-
 PEAK = 10.0
 """N: the hand's force of the tables."""
 
@@ -26,15 +23,6 @@ def report(runs: Runs) -> str:
     """All tables for the subjects that were measured."""
     parts = [rendering_table(runs), release_table(runs), backdriving_table(runs), stability_table(runs)]
     return "\n\n".join([heading(runs), *(part for part in parts if part)]) + "\n"
-
-
-def page_with(page: str, tables: str) -> str:
-    """A Markdown page with ``tables`` between its marks ``BEGIN`` and ``END``; ``ValueError`` where it has not both."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise ValueError(f"the page has no {BEGIN!r} followed by {END!r}; allowed: a page with both marks")
-    return f"{before}{BEGIN}\n\n{tables}\n{END}{after}"
 
 
 def heading(runs: Runs) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import number, penalize_lost
+from baselines.bench.statistics import number, penalize_lost, quantile
 from baselines.commands.shared import EPISODES, finite_number, run, seed_number, whole_up_to
 from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
@@ -22,9 +22,10 @@ from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
 from birthsim_env.parts.scenarios import PROBE_REST, SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by
+from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
-from studies.honest.command import as_described, sizes_of, three
+from studies.comparison.grid import as_described
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = SCENARIOS["probe"].duration - PROBE_REST
@@ -128,6 +129,16 @@ def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], 
     figures |= {f"electronics.{name}": value for name, value in shown.items()}
     way = info["compliant_target"] - info["target"]
     return figures, float(np.hypot(*info["user_force"][0])), float(1e3 * np.hypot(*way[0]))
+
+
+def sizes_of(evaluation: Evaluation, metric: str) -> Array:
+    """The sizes of a metric per episode, infinite where the lane was lost."""
+    return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost, applies=True))
+
+
+def three(values: Array) -> str:
+    """Median, 95 % and worst."""
+    return ", ".join(number(quantile(values, fraction)) for fraction in (0.5, 0.95, 1.0))
 
 
 def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:

@@ -103,7 +103,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder for laps.jsonl, soak.md and soak.json")
     arguments = parser.parse_args()
-    setting = {"seed": arguments.seed, "lanes": LANES, "steps": STEPS, "code": code_stamp()}
+    setting = {"seed": arguments.seed, "lanes": LANES, "steps": STEPS, "code": code_stamp("tests.soak.__main__")}
     journal = make_folder(arguments.out) / "laps.jsonl"
     try:
         laps = stored(journal, setting)

@@ -8,61 +8,40 @@ leaves the nominal rig within 20 mm, over m/(tau + latency/4).
 
 from __future__ import annotations
 
-import argparse
 import itertools
-from typing import cast
-
-import numpy as np
-from tqdm import tqdm
+from typing import Any
 
 from baselines.backstepping.stiffest import PART
-from baselines.commands.shared import run
-from baselines.registry import make_controller
-from baselines.staged import StagedController
-from birthsim_env.physics.rig.parameters import Parameters
-from studies.results import Rows, measure
-from studies.stability.maps import Cases, judge
+from baselines.work.tasks import Task
+from studies.comparison.tables import markdown
+from studies.results import Content
+from studies.stability.swinging import stiffest
+from studies.study import Found, Options, Study
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
 """kg, s and s; without latency positions are exact."""
 
-ASKED = np.array([1000.0 * 1.2**step for step in range(24)])
-
-SWING = 0.02
-"""m, peak to peak."""
-
-
 UNITS = {"controller": "", "mass": "kg", "valve": "s", "latency": "s", "limit": "N/m", "rate": "1/s"}
+"""Columns of the figures; no limit (None) where it swings at no setpoint."""
 
 
-def main() -> None:
-    """Entry point."""
-    run(argparse.ArgumentParser(prog="birthsim study stiffest", description=(__doc__ or "").splitlines()[0]), _measure)
+def _tasks(_: Options) -> dict[Any, Task]:
+    cases = itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES)
+    return {case: Task("-".join(map(str, case)), case[0], stiffest, dict(zip(UNITS, case, strict=False))) for case in cases}
 
 
-def _measure(_: argparse.Namespace) -> None:
-    print(f"written to {measure('stiffest', 'studies.stability.stiffest', UNITS, (0,), _rows)}")
+def _kept(_: Options, found: Found) -> Any:
+    limits = [(*case, result["limit"]) for case, result in found.items()]
+    return [[*row, row[4] and row[4] * (row[2] + PART * row[3]) / row[1]] for row in limits]
 
 
-def _rows() -> Rows:
-    """A row per controller, mass, lag and latency; no limit (None) where it swings at no setpoint."""
-    cases = list(itertools.product(("backstepping", "backstepping-cartesian"), MASSES, LAGS, LATENCIES))
-    return [_row(*case) for case in tqdm(cases, "stiffest", leave=False)]
+def _shown(content: Content) -> dict[str, str]:
+    head = [f"{name}, {unit}" if unit else name for name, unit in UNITS.items()]
+    return {"stiffest.md": markdown([head, *([_entry(value) for value in row] for row in content["figures"])]) + "\n"}
 
 
-def _row(name: str, mass: float, lag: float, late: float) -> dict[str, str | float | None]:
-    rig = Parameters().replace({"mechanics.mass": mass, "valves.time_constant": lag, "electronics.position_latency": late})
-    limit = rests_up_to(name, rig, "lab" if late else "ideal")
-    rate = limit * (lag + PART * late) / mass
-    row = (name, mass, lag, late, *((limit, rate) if np.isfinite(limit) else (None, None)))
-    return dict(zip(UNITS, row, strict=True))
+def _entry(value: Any) -> str:
+    return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
-def rests_up_to(name: str, rig: Parameters, sensors: str) -> float:
-    """N/m: the last of ``ASKED`` before the first at which the law swings, without its own bound; infinite where none does."""
-    law, still = cast(StagedController, make_controller(name, rig)), np.zeros(len(ASKED))
-    stages = law.law_stages
-    law.law_stages = lambda sampled: stages(sampled)[1:]  # type: ignore[method-assign]
-    verdict = judge(Cases([rig] * len(ASKED), still, ASKED, still, still), law, sensors, 0, None)
-    swings = verdict.lost | (verdict.motion > SWING)
-    return float(ASKED[max(int(np.argmax(swings)) - 1, 0)]) if swings.any() else np.inf
+STUDY = Study(("studies.stability.swinging",), {}, _tasks, _kept, UNITS, _shown)

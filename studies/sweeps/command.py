@@ -20,8 +20,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="birthsim study sweep",
         description="Evaluate, or train and evaluate, every point of a grid, of random draws or of a search.",
-        epilog="What the output folder holds of the same settings and code is kept, so that an interrupted sweep goes on; "
-        "several processes, also of several hosts on a shared disk, may work on one folder. docs/sweeps.md has examples.",
+        epilog="What the output folder holds of the same settings and code is kept, so that an interrupted sweep goes on. "
+        "docs/sweeps.md has examples.",
     )
     parser.add_argument("file", type=Path, help="TOML file with tables [base], [grid], [draw], [search] and [[map]]")
     add_processes(parser)
@@ -38,11 +38,11 @@ def _sweep(arguments: argparse.Namespace) -> None:
         return _evaluated(points, sweep, folder, title, arguments)
 
     failures: dict[str, str] = {}
-    if sweep.search is None:
-        points = sweep.points
-        results, failures = evaluated(points, "sweep")
-    else:
-        with own_folder(folder):
+    with own_folder(folder):
+        if sweep.search is None:
+            points = sweep.points
+            results, failures = evaluated(points, "sweep")
+        else:
             points, results = search_points(sweep, evaluated, folder)
     whole = [(point, pieces) for point, pieces in zip(points, results, strict=True) if pieces is not None]
     if whole:

@@ -42,7 +42,7 @@ def main() -> None:
     elif options.what == "mutation":
         mutants.take(options.file)
     elif options.what == "accuracy":
-        keep("accuracy", json.loads((options.folder / "accuracy.json").read_text(encoding="utf-8")), ACCURACY)
+        keep("accuracy", json.loads((options.folder / "accuracy.json").read_text(encoding="utf-8"))["figures"], ACCURACY)
         shutil.copy(options.folder / "accuracy.png", sources.ROOT / "docs" / "accuracy.png")
     else:
         report.PAGE.write_text(report.page(), encoding="utf-8")

@@ -215,19 +215,18 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     monkeypatch.setattr(stability, "JUDGED", 0.9)
     monkeypatch.setattr(stability, "END", 1.2)
     out = tmp_path / "deeper" / "maps"
-    options = ("--map", "hand", "--map", "rig", "--points", 2, "--sensors", "lab", "--jobs", 1, "--out", out)
+    options = ("--map", "hand", "rig", "--points", 2, "--sensors", "lab", "--jobs", 1, "--out", out)
     status, printed, _ = call("stability", monkeypatch, capsys, *options)
     assert status == 0
     content = strict(out / "stability.json")
-    assert list(content["maps"]) == ["hand", "rig"]
-    assert content["sensors"] == "lab"
-    assert content["believed"]["mechanics"]["mass"] == 3.0
-    for name, chart in content["maps"].items():
+    assert list(content["figures"]) == ["hand", "rig"]
+    assert content["settings"]["sensors"] == "lab"
+    for name, chart in content["figures"].items():
         assert (out / f"stability_{name}.png").stat().st_size > 20_000
         assert "<svg" in (out / f"stability_{name}.svg").read_text()[:1000]
         assert list(chart["variants"]) == ["as it is", "gains that never yield", "half the friction fed forward"]
         assert np.shape(chart["variants"]["as it is"]["stable"]) == (2, 2)
-    hand = content["maps"]["hand"]
+    hand = content["figures"]["hand"]
     limit = stable_up_to(hand, "as it is")[1]
-    assert re.search(rf"\n +4000 +{'nowhere' if limit is None else round(limit)}\b", printed)
-    assert f"written to {out}/: stability.json, stability_hand.png, stability_rig.png" in printed
+    assert re.search(rf"\n\| 4000 +\| +{'nowhere' if limit is None else round(limit)}", printed)
+    assert f"written to {out}/: stability.json, stability.md, stability_hand.png, stability_rig.png" in printed

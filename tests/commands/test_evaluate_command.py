@@ -9,7 +9,9 @@ from functools import partial
 import pytest
 
 from baselines.bench.metrics import UNITS
+from baselines.work.files import own_folder
 from studies.comparison import stiffness as studies
+from studies.comparison.study import figures_of
 from tests.console import OWN, assert_picture, call, interrupted, strict
 
 
@@ -31,7 +33,15 @@ def test_evaluate_writes_a_table_json_and_a_figure(tmp_path, monkeypatch, capsys
     status, printed, complained = call("evaluate", monkeypatch, capsys, *arguments, "--out", out)
     assert status == 0, complained
     assert sorted(path.name for path in out.iterdir()) == [
-        *("error_over_time.png", "error_over_time.svg", "evaluation.csv", "evaluation.json", "evaluation.md", "pieces"),
+        *(
+            ".lock",
+            "error_over_time.png",
+            "error_over_time.svg",
+            "evaluation.csv",
+            "evaluation.json",
+            "evaluation.md",
+            "pieces",
+        ),
         "times.json",
     ]
     table = (out / "evaluation.md").read_text()
@@ -120,56 +130,53 @@ def small_studies(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys, small_studies):
+def test_the_comparison_compares_resumes_and_draws(tmp_path, monkeypatch, capsys):
     (tmp_path / "slam.py").write_text(OWN)
-    slam = f"{tmp_path}/slam.py:Slam"
-    arguments = (*NARROW, "--controller", "backstepping", slam, "--jobs", 1, "--out")
-    status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out")
+    slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
+    arguments = (*NARROW, "--plant", "nominal", "randomised", "--controller", "backstepping", slam, "--jobs", 1, "--out", out)
+    status, printed, complained = call("comparison", monkeypatch, capsys, *arguments)
     assert status == 0, complained
     assert "Warning" not in complained
-    for title, pieces in (("comparison", 4), ("studies", 8)):
-        assert f"{title}: 100%" in complained
-        assert f"{pieces}/{pieces} " in complained
-    content = strict(tmp_path / "out" / "comparison.json")
-    cells = {(cell["controller"], cell["plant"]): cell for cell in content["cells"]}
+    assert "comparison: 100%" in complained
+    assert "4/4 " in complained
+    content = strict(out / "comparison.json")
+    assert content["settings"]["controller"] == ["backstepping", slam]
+    cells = {(cell["controller"], cell["plant"]): cell for cell in figures_of(content)}
     assert set(cells) == {(name, plant) for name in ("backstepping", slam) for plant in ("nominal", "randomised")}
     law, lost = cells["backstepping", "nominal"], cells[slam, "nominal"]
     assert (law["episodes"], law["lost"], lost["lost"]) == (2, 0, 2)
     assert 0 < law["metrics"]["stiffness_error"]["median"] < 200
-    assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == "lost"
-    assert set(content["studies"]) == {"stiffness", "polar", "ellipses", "disturbance"}
-    assert set(content["studies"]["polar"]) == {"backstepping", slam}
-    assert content["studies"]["polar"][slam]["stiffness"] == [[None]] * 4
-    assert len(content["studies"]["polar"]["backstepping"]["stiffness"]) == 4
-    assert content["arguments"]["controller"] == ["backstepping", slam]
-    text = (tmp_path / "out" / "comparison.md").read_text()
-    table = text[text.index("| controller |") : text.index("Every figure")].strip()
-    assert table in printed
-    assert f"| {slam} | lost; lost |" in table
-    for name in (
-        *("settled_error", "air_against_error", "rendered_stiffness", "hunting", "disturbances"),
-        *("stiffness_by_direction", "stiffness_ellipses"),
-    ):
-        assert_picture(tmp_path / "out", name)
+    assert lost["metrics"]["stiffness_error"]["median"] == lost["ratios"]["air"]["low"] == math.inf
+    text = (out / "comparison.md").read_text()
+    assert text.strip() in printed
+    assert f"| {slam} | lost; lost |" in text
+    for name in ("settled_error", "air_against_error"):
+        assert_picture(out, name)
         assert f"{name}.png" in printed
     # Once more: nothing is computed, and all is the same.
-    written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.json") if path.parent != tmp_path / "out"}
-    assert len(written) == 12
-    status, again, _ = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out")
+    written = {path: path.stat().st_mtime_ns for path in out.rglob("*.json") if path.parent != out}
+    assert len(written) == 4
+    status, again, _ = call("comparison", monkeypatch, capsys, *arguments)
     assert status == 0
     assert f"comparison: 4 of 4 are there with these settings, rig and code, and are kept: backstepping 2, {slam} 2" in again
-    assert "studies: 8 of 8 are there" in again
     assert {path: path.stat().st_mtime_ns for path in written} == written
-    assert (tmp_path / "out" / "comparison.md").read_text() == text
-    assert strict(tmp_path / "out" / "comparison.json") == content
-    # The studies alone, from what is there of them.
-    (tmp_path / "out" / "comparison.md").unlink()
-    status, alone, _ = call("comparison", monkeypatch, capsys, *arguments, tmp_path / "out", "--studies-only")
-    assert status == 0
-    assert "settled_error.png" not in alone
-    assert "rendered_stiffness.png" in alone
-    assert not (tmp_path / "out" / "comparison.md").exists()
-    assert strict(tmp_path / "out" / "comparison.json")["studies"] == content["studies"]
+    assert (out / "comparison.md").read_text() == text
+    assert strict(out / "comparison.json")["figures"] == content["figures"]
+
+
+@pytest.mark.slow
+def test_how_the_stiffness_feels_is_kept_and_drawn(tmp_path, monkeypatch, capsys, small_studies):
+    (tmp_path / "slam.py").write_text(OWN)
+    slam, out = f"{tmp_path}/slam.py:Slam", tmp_path / "out"
+    status, printed, complained = call("stiffness", monkeypatch, capsys, "--controller", "backstepping", slam, "--out", out)
+    assert status == 0, complained
+    figures = strict(out / "stiffness.json")["figures"]
+    assert set(figures) == {"stiffness", "polar", "ellipses", "disturbance"}
+    assert set(figures["polar"]) == {"backstepping", slam}
+    assert figures["polar"][slam]["stiffness"] == [[None]] * 4
+    for name in ("rendered_stiffness", "hunting", "disturbances", "stiffness_by_direction", "stiffness_ellipses"):
+        assert_picture(out, name)
+        assert f"{name}.png" in printed
 
 
 WAITING = """
@@ -191,30 +198,28 @@ def test_the_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, 
     own, out = tmp_path / "own.py", tmp_path / "out"
     own.write_text(OWN + WAITING)
     names = ("--controller", f"{own}:Slam", f"{own}:Waits")
-    line = (*NARROW, "--episodes", 1, "--jobs", 2, "--randomize", "all", "--no-studies", *names, "--out", out)
-    status, printed = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
+    line = (*NARROW, "--episodes", 1, "--jobs", 2, "--plant", "randomised", *names, "--out", out)
+    status, _ = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
     assert status == 130
-    assert printed.startswith("rigs drawn: ")
     assert len(list(out.rglob("*.json"))) == 1
     (tmp_path / "go").touch()
     status, printed, _ = call("comparison", monkeypatch, capsys, *line)
     assert status == 0
     assert "comparison: 1 of 2 are there with these settings, rig and code, and are kept" in printed
-    assert "out" not in strict(out / "comparison.json")["arguments"], "results do not depend on where they are"
-    assert not list(out.rglob("*.claim"))
+    assert "out" not in strict(out / "comparison.json")["settings"], "results do not depend on where they are"
 
 
 @pytest.mark.usefixtures("brief")
 def test_the_comparison_keeps_what_others_reached_when_a_controller_fails(tmp_path, monkeypatch, capsys):
     (tmp_path / "own.py").write_text(OWN + FAILING)
     fails = f"{tmp_path}/own.py:Fails"
-    arguments = (*NARROW, "--randomize", "scenario", "--no-studies", "--jobs", 1, "--controller", fails, "backstepping")
+    arguments = (*NARROW, "--plant", "nominal", "--jobs", 1, "--controller", fails, "backstepping")
     status, printed, complained = call("comparison", monkeypatch, capsys, *arguments, "--out", tmp_path / "out")
     assert status == 2
     assert "| backstepping |" in printed
     assert "birthsim study comparison: error: 1 of 2 pieces failed, the first cells/" in complained
     assert "RuntimeError: no law at all" in complained
-    assert [cell["controller"] for cell in strict(tmp_path / "out" / "comparison.json")["cells"]] == ["backstepping"]
+    assert [cell["controller"] for cell in figures_of(strict(tmp_path / "out" / "comparison.json"))] == ["backstepping"]
 
 
 def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
@@ -225,7 +230,15 @@ def test_ctrl_c_during_an_evaluation_keeps_the_complete_episodes(tmp_path):
     kept = list(out.rglob("*.json"))
     assert status == 130
     assert f"episodes: {len(kept)} of 1563 are complete and kept; the same command goes on" in printed
-    assert [path for path in out.rglob("*") if path.is_file() and path not in kept] == [], "no claim, no half a file"
+    assert [path for path in out.rglob("*") if path.is_file() and path not in (*kept, out / ".lock")] == [], "no half a file"
+
+
+def test_a_second_evaluation_does_not_compute_in_the_folder_of_the_first(tmp_path, monkeypatch, capsys):
+    with own_folder(tmp_path):
+        status, _, complained = call("evaluate", monkeypatch, capsys, "--env", "BirthSIM/Probe-v2", "--out", tmp_path)
+    assert status == 2
+    assert complained.endswith("is in use by another process; allowed: to wait for it, or another folder\n")
+    assert {path.name for path in tmp_path.iterdir()} == {".lock"}
 
 
 def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monkeypatch, capsys):
@@ -239,16 +252,14 @@ def test_ctrl_c_before_anything_is_complete_ends_with_status_130(tmp_path, monke
 
 
 def test_the_comparison_names_the_case_of_drawn_sensors(tmp_path, monkeypatch, capsys):
-    case = ("--randomize", "sensors", "--no-studies", "--out", tmp_path / "out")
+    case = ("--plant", "drawn-sensors", "--out", tmp_path / "out")
     status, _, complained = call("comparison", monkeypatch, capsys, *case, "--sensors", "lab")
     assert status == 2
-    assert "--randomize 'sensors'; allowed: with --sensors honest" in complained
+    assert "--plant drawn-sensors; allowed: with --sensors honest" in complained
     own = ("--env", "BirthSIM/Probe-v2", "--sensors", "honest", "--episodes", 2, "--controller", "backstepping")
     status, _, complained = call("comparison", monkeypatch, capsys, *case, *own)
     assert status == 0, complained
     assert 'BirthSIM/Probe-v2,honest,"figures drawn, nominal",' in (tmp_path / "out/comparison.csv").read_text()
-    (cell,) = strict(tmp_path / "out" / "comparison.json")["cells"]
-    assert (cell["sensors"], cell["plant"]) == ("honest", "drawn-sensors")
     status, _, complained = call("evaluate", monkeypatch, capsys, "--randomize", "sensors", "--out", tmp_path / "one")
     assert status == 2
     assert "randomize = 'sensors' with sensors = 'ideal'; allowed: with sensors = 'honest'" in complained

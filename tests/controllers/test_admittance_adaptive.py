@@ -11,7 +11,7 @@ from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.honest.command import as_described
+from studies.comparison.grid import as_described
 from studies.honest.sensor_floor import circle_floor, probe_floor
 
 NAMES = ("admittance-adaptive", "admittance-sensorless")

@@ -1,4 +1,4 @@
-"""birthsim study haptics: files, tables and figures, what is refused, and pages that carry the tables."""
+"""birthsim study haptics: files, tables and figures, and what is refused."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from studies.haptics import backdriving, coupled, rendering
 from studies.haptics import figures as figures
 from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
-from studies.haptics.tables import BEGIN, END, backdriving_table, page_with, release_table
+from studies.haptics.tables import backdriving_table, release_table
 from studies.stability import maps as stability
 from tests.console import OWN, call, strict
 
@@ -90,15 +90,6 @@ def test_tables_say_lost_and_refused() -> None:
     )
 
 
-def test_a_page_carries_the_tables() -> None:
-    page = f"before\n{BEGIN}\nold\n{END}\nafter\n"
-    filled = page_with(page, "new\n")
-    assert filled == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
-    assert page_with(filled, "new\n") == filled
-    with pytest.raises(ValueError, match="the page has no"):
-        page_with("no marks", "new")
-
-
 def test_the_phase_is_shown_near_the_declared_one() -> None:
     """190 degrees beside 170, not -170."""
     piece = {"declared": [[[-1.0]], [[0.1]]], "peak": [10.0], "lost": [False]}
@@ -113,13 +104,11 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     monkeypatch.setattr(backdriving, "STIFFNESSES", (500.0, 0.0))
     own = tmp_path / "own.py"
     own.write_text(OWN)
-    page = tmp_path / "page.md"
-    page.write_text(f"{BEGIN}\n{END}\n")
     out = tmp_path / "out"
-    options = ("--controller", "admittance-backstepping", f"{own}:Held", "--sensors", "ideal", "--nominal", "--page", page)
+    options = ("--controller", "admittance-backstepping", f"{own}:Held", "--sensors", "ideal", "--nominal")
     status, printed, _ = call("haptics", monkeypatch, capsys, *options, "--out", out)
     assert status == 0
-    best, still = strict(out / "haptics.json")["runs"]
+    best, still = strict(out / "haptics.json")["figures"]
     assert best["uses_force"]
     assert not still["uses_force"]
     (middle,) = best["impedance"]
@@ -130,5 +119,4 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert best["backdriving"][-1]["refused"].startswith("stiffness setpoint")
     for name in ("haptics_impedance", "haptics_energy", "haptics_release", "stability_hand_mass_held_ideal", "haptics_z_width"):
         assert (out / f"{name}.png").stat().st_size > 20_000
-    assert page.read_text() == f"{BEGIN}\n\n{(out / 'haptics.md').read_text()}\n{END}\n"
     assert (out / "haptics.md").read_text() in printed

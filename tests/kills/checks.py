@@ -24,6 +24,10 @@ _FOREIGN = (".ses", "torchinductor_*")
 """What onnxruntime and PyTorch keep among temporary files, under names that stay the same."""
 
 
+MADE = ("command", "date", "seconds", "pieces_kept")
+"""Keys of a study's result that say when and how it was made."""
+
+
 def _json(path: Path) -> None:
     json.loads(path.read_text(encoding="utf-8"))
 
@@ -84,7 +88,7 @@ def files_in(folder: Path) -> list[Path]:
 def is_leftover(path: Path, folder: Path) -> bool:
     """Whether a file is one that only a running command needs."""
     parts = path.relative_to(folder).parts
-    return any(part.endswith((".partial", ".claim", ".tmp")) for part in parts) or path.is_symlink()
+    return any(part.endswith((".partial", ".tmp")) for part in parts) or path.is_symlink()
 
 
 def leftovers(folder: Path) -> list[str]:
@@ -107,7 +111,7 @@ def broken(folder: Path) -> list[str]:
 def results(target: Target, folder: Path) -> dict[str, str]:
     """Name -> digest of what a command has written, without what differs from run to run."""
     return {
-        str(path.relative_to(folder)): _digest(path, target.costs if path.parent != folder else ())
+        str(path.relative_to(folder)): _digest(path, target.costs if path.parent != folder else MADE)
         for path in files_in(folder)
         if not any(fnmatch(path.name, pattern) for pattern in (*target.differ, ".lock")) and not is_leftover(path, folder)
     }

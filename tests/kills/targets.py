@@ -45,20 +45,20 @@ TARGETS = {
         Target(
             "evaluate", "birthsim evaluate",
             ("--env", "BirthSIM/Probe-v2", "--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
-            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"), alone=True,
         ),
         Target(
             "compare", "birthsim study comparison",
             (
-                *("--no-studies", "--env", "BirthSIM/Probe-v2", "--sensors", "ideal"),
+                *("--env", "BirthSIM/Probe-v2", "--sensors", "ideal", "--plant", "nominal", "randomised"),
                 *("--controller", "backstepping", "pid", "--episodes", "2", "--out", "{out}"),
             ),
-            older=("--seed", "7"), differ=("times.json",), costs=("cost", "sha256"),
+            older=("--seed", "7"), costs=("cost", "sha256"), alone=True,
         ),
         Target(
             "stability", "birthsim study stability",
             ("--controller", "backstepping", "--map", "rig", "--points", "2", "--out", "{out}"),
-            older=("--seed", "7", "--sensors", "lab"),
+            older=("--seed", "7", "--sensors", "ideal"), alone=True,
         ),
         Target(
             "tune", "birthsim tune",
@@ -74,7 +74,7 @@ TARGETS = {
         Target("figure4", "birthsim figure4", ("--out", "{out}"), older=("--controller", "pid")),
         Target(
             "sweep", "birthsim study sweep", ("--out", "{out}"), first=("{inputs}/sweep.toml",), older=("{inputs}/older.toml",),
-            costs=("cost", "sha256"),
+            costs=("cost", "sha256"), alone=True,
         ),
         Target(
             "search", "birthsim study sweep", ("{inputs}/search.toml", "--out", "{out}"), differ=("trials.journal",),

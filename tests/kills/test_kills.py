@@ -32,9 +32,8 @@ def test_files_that_are_torn_are_seen_and_hidden_ones_are_leftovers(tmp_path):
     (tmp_path / "torn.md").write_text("| a |")
     (tmp_path / "trials.journal").write_text('{"a": 1}\n{"a"')
     (tmp_path / ".whole.json.host-1.partial").write_text("{")
-    (tmp_path / "piece.claim").write_text("")
     assert [line.partition(":")[0] for line in checks.broken(tmp_path)] == ["torn.json", "torn.md", "torn.png", "torn.svg"]
-    assert checks.leftovers(tmp_path) == [".whole.json.host-1.partial", "piece.claim"]
+    assert checks.leftovers(tmp_path) == [".whole.json.host-1.partial"]
 
 
 def test_results_are_equal_but_for_what_may_differ(tmp_path):
@@ -63,11 +62,11 @@ def test_progress_bars_are_no_complaints():
 def test_the_page_counts_and_names_what_fell_short(tmp_path):
     outcomes = [
         Outcome("tune", "SIGKILL", "1 s", 1, [-9, 0], equal=True),
-        Outcome("tune", "SIGKILL", "2 s", 3, [-9, -9, -9, 0], leftovers=["a.claim"], trouble=["differs: a"]),
+        Outcome("tune", "SIGKILL", "2 s", 3, [-9, -9, -9, 0], leftovers=["a.partial"], trouble=["differs: a"]),
     ]
     write_outcomes(tmp_path / "kills.json", outcomes[:1], 0)
     write_page(tmp_path / "kills.md", write_outcomes(tmp_path / "kills.json", outcomes, 0))
     page = (tmp_path / "kills.md").read_text()
     assert "| tune | SIGKILL | 4 | 2 | 1 | 0 | 0 | 1 | 0 | 0 | 0 | 1 |" in page
-    assert "- tune, SIGKILL, 2 s: left: a.claim" in page
+    assert "- tune, SIGKILL, 2 s: left: a.partial" in page
     assert "- tune, SIGKILL, 2 s: differs: a" in page

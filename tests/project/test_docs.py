@@ -22,7 +22,19 @@ from tests.live import axe, browser
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
-PAGES = {page.relative_to(DOCS).with_suffix("").as_posix(): page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md")}
+TABLES = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.md")}
+
+
+def with_tables(page):
+    """The text of a page, and that of the tables that it includes."""
+    text = page.read_text(encoding="utf-8")
+    return re.sub(r"^```\{include\} data/(.*)\n```$", lambda block: TABLES[block[1]], text, flags=re.MULTILINE)
+
+
+PAGES = {
+    page.relative_to(DOCS).with_suffix("").as_posix(): with_tables(page)
+    for page in DOCS.rglob("*.md") if page.parent.name != "data"
+}  # fmt: skip
 
 FIGURE = re.compile(r"\b\d+\.\d+\b")
 
@@ -57,7 +69,7 @@ def test_what_a_toctree_names_is_linked_for_readers_without_one(page):
 def test_every_figure_of_an_explanation_stands_in_a_page_that_it_links(page):
     prose = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
     links = {(DOCS / page).parent / link for link in re.findall(r"\]\(([^)#:]+\.md)", prose)}
-    known = {figure for link in links for figure in FIGURE.findall(link.read_text(encoding="utf-8"))}
+    known = {figure for link in links for figure in FIGURE.findall(with_tables(link))}
     assert set(FIGURE.findall(prose)) - known == set()
 
 
@@ -144,11 +156,13 @@ def page_of(chromium):
 
 
 def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands_write():
-    texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").iterdir()}
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "data").glob("*.csv")}
     columns = {name: tuple(next(csv.reader(text.splitlines()))) for name, text in texts.items()}
-    linked = {Path(link).name for text in PAGES.values() for link in re.findall(r"\]\((data/[^)]+)\)", text)}
-    assert set(columns) == linked
-    compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "moving", "bound_circle", "bound_probe")}
+    linked = {
+        Path(link).name for text in [*PAGES.values(), *TABLES.values()] for link in re.findall(r"\]\((data/[^)]+)\)", text)
+    }
+    assert set(columns) <= linked
+    compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
     others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation_data.DATA)}
     assert columns == compared | others
 

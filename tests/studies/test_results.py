@@ -1,4 +1,4 @@
-"""A result says which sources changed since it was measured."""
+"""A result says which sources changed since it was measured, and every table is that of its result."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import json
 
 import pytest
 
-from studies.door import STUDIES, state
-from studies.results import changed, measure
-from studies.sources import ROOT, hashes
+from baselines.work.sources import ROOT, hashes
+from studies import shelf
+from studies.door import OWN
+from studies.results import changed, provenance, read_result, written
 from tests.console import call
 
 MODULE = "studies.stability.stiffest"
@@ -22,35 +23,63 @@ def test_sources_follow_imports_and_names_in_strings():
 
 
 def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_path):
-    assert changed("one", MODULE, tmp_path) is None
-    path = measure("one", MODULE, {"mass": "kg"}, (3,), lambda: [{"mass": 2.0}], tmp_path)
-    result = json.loads(path.read_text())
-    assert (result["rows"], result["units"], result["seeds"]) == ([{"mass": 2.0}], {"mass": "kg"}, [3])
+    assert read_result("one", tmp_path) is None
+    (tmp_path / "one.json").write_text(written(provenance((MODULE,)) | {"figures": [["a", 2.0], ["b", None]]}))
+    result = read_result("one", tmp_path)
+    assert result["figures"] == [["a", 2.0], ["b", None]]
     assert len(result["commit"]) == 40
     assert set(result["versions"]) == {"python", "numpy", "numba", "scipy", "gymnasium"}
-    assert changed("one", MODULE, tmp_path) == []
-    sources = result["sources"] | {"baselines/registry.py": "0", "gone.py": "0"}
-    path.write_text(json.dumps(result | {"sources": sources}))
-    assert changed("one", MODULE, tmp_path) == ["baselines/registry.py", "gone.py"]
+    assert changed(result, (MODULE,)) == []
+    result["sources"] |= {"baselines/registry.py": "0", "gone.py": "0"}
+    assert changed(result, (MODULE,)) == ["baselines/registry.py", "gone.py"]
 
 
-def test_what_is_no_number_is_no_result(tmp_path):
+def test_what_is_no_number_is_no_result():
     with pytest.raises(ValueError, match="JSON"):
-        measure("one", MODULE, {"mass": "kg"}, (), lambda: [{"mass": float("nan")}], tmp_path)
-    assert not list(tmp_path.glob("*.json"))
+        written({"figures": [float("nan")]})
 
 
-@pytest.mark.parametrize("name", STUDIES)
-def test_every_study_is_a_file_and_has_a_state(name):
-    assert f"studies/{STUDIES[name].module.replace('.', '/')}.py" in hashes(f"studies.{STUDIES[name].module}")
-    assert state(name).partition(";")[0] in ("fresh", "stale", "no result in results/")
+@pytest.mark.parametrize("name", shelf.names())
+def test_every_declared_study_measures_with_files_that_there_are_and_has_a_state(name):
+    study = shelf.declared(name)
+    assert all(f"{module.replace('.', '/')}.py" in hashes(*study.code) for module in study.code)
+    assert shelf.state(name).partition(";")[0] in ("fresh", "stale", "not measured yet")
 
 
 def test_every_stored_result_belongs_to_a_study():
     stored = {path.stem for path in (ROOT / "results").glob("*.json")}
-    assert stored <= set(STUDIES)
+    assert stored <= set(shelf.names())
+
+
+def test_rendering_changes_nothing():
+    """What the tables say is what the results say: ``birthsim study render``."""
+    differs = [
+        path for path, text in shelf.rendered().items() if not path.is_file() or path.read_text(encoding="utf-8") != text
+    ]
+    assert differs == []
+
+
+def test_a_table_that_is_typed_is_written_anew(tmp_path, monkeypatch):
+    (name,) = [name for name in shelf.names() if read_result(name)][:1]
+    monkeypatch.setattr(shelf, "DATA", tmp_path)
+    expected = {path.name: text for path, text in shelf.texts(name)}
+    (tmp_path / next(iter(expected))).write_text("| typed |")
+    monkeypatch.setattr(shelf, "names", lambda: [name])
+    monkeypatch.setattr(shelf, "README", tmp_path / "README.md")
+    (tmp_path / "README.md").write_text("no table")
+    monkeypatch.setattr(shelf, "ROOT", tmp_path)
+    shelf.render()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir() if path.name != "README.md"} == expected
 
 
 def test_status_lists_every_study(monkeypatch, capsys):
     status, printed, _ = call("study", monkeypatch, capsys, "status")
-    assert (status, [line.split()[0] for line in printed.splitlines()]) == (0, list(STUDIES))
+    assert (status, [line.split()[0] for line in printed.splitlines()]) == (0, shelf.names())
+
+
+def test_what_is_no_study_is_named(monkeypatch, capsys):
+    status, _, complained = call("study", monkeypatch, capsys, "compare")
+    assert status == 2
+    assert "compare" in complained
+    assert json.dumps("comparison").strip('"') in complained
+    assert all(own in complained for own in OWN)

@@ -23,7 +23,7 @@ from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.scores.command import _contestants
+from studies.scores.study import _contestants
 
 
 def evaluation(name, error, lost=(), beyond=()):

@@ -1,4 +1,4 @@
-"""The files of this repository that a study depends on: imports followed without running anything, and their hashes."""
+"""The files that a module depends on: imports followed without running anything, and their hashes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("birthsim", "birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
 
 
-def hashes(module: str) -> dict[str, str]:
-    """Path from the root to SHA-256, sorted by path, of each Python file that ``module`` imports, itself too.
+def hashes(*modules: str) -> dict[str, str]:
+    """Path from the root to SHA-256, sorted by path, of each Python file that ``modules`` import, they themselves too.
 
     A module that a string names ("package.module:name") counts as imported; weights of policies and other data do not count.
     """
-    waiting, found = [module], dict[str, str]()
+    waiting, found = [*modules], dict[str, str]()
     while waiting:
         file = _file(waiting.pop())
         if file is None or (path := file.relative_to(ROOT).as_posix()) in found:

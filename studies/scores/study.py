@@ -1,10 +1,8 @@
-"""birthsim study scores: what every environment pays to shut valves, to every law and to the shipped policies."""
+"""What every environment pays to shut valves, to every controller and to the shipped policies."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,65 +12,20 @@ from agents.policy.seeds import SHIPPED, policy_folders, shipped_names
 from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash, file_stem
 from baselines.bench.statistics import penalize_lost, summarize
-from baselines.commands.shared import EPISODES, JOBS, add_processes, policy_of, run, seed_number, whole_up_to
 from baselines.registry import UNCONTROLLED, make_controller
-from baselines.work.files import make_folder, whole_results, write_json, write_text
-from baselines.work.tasks import Result, Task, code_stamp, run_tasks
+from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import RIGS, ROLES, SENSORS
 from studies.comparison.grid import ENVIRONMENTS, default_controllers
+from studies.results import Content, written
 from studies.scores.tables import Scored, data, overview
+from studies.study import Found, Options, Study
+
+REFERENCE = "reference_scores.json"
+"""What stands in ``birthsim_env/scores.json``."""
 
 Rows = dict[str, dict[str, Any]]
 """Controller -> its figures in one environment under one condition."""
-
-
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim study scores",
-        description="Measure what every environment pays: shut, slammed and random valves, every law that is not slow, and the "
-        "policies that come with the package, with every sensor model, on the nominal rig and on rigs drawn at random.",
-        epilog="What the output folder holds of the same settings and code is kept, so that an interrupted run goes on.",
-    )
-    parser.add_argument(
-        "--episodes", type=whole_up_to(EPISODES), default=64, help="per controller and condition (default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=seed_number, default=70000, help="seed of the first episode (default: %(default)s)")
-    add_processes(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for scores.json, scores.csv and scores.md")
-    run(parser, _scores)
-
-
-def _scores(arguments: argparse.Namespace) -> None:
-    if arguments.episodes < 2:
-        raise ValueError(f"--episodes {arguments.episodes}; allowed: 2 or more, half of them choose the best law")
-    folder = make_folder(arguments.out)
-    conditions = [(name, sensors, rig) for name in ENVIRONMENTS for sensors in SENSORS for rig in RIGS]
-    tasks = {
-        (where, controller): _task(where, controller, seed, arguments)
-        for where in conditions for controller, seed in _contestants(where[0])
-    }  # fmt: skip
-    done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, "scores", arguments.cluster)
-    if failures:
-        name, problem = next(iter(failures.items()))
-        raise ValueError(f"{len(failures)} of {len(tasks)} pieces failed, the first {name}: {problem}")
-    scores: dict[str, Any] = {}
-    found = []
-    for where in conditions:
-        name, sensors, rig = where
-        rows = {controller: done[task.name] for (place, controller), task in tasks.items() if place == where}
-        short = name.removeprefix("BirthSIM/").rpartition("-v")[0]
-        known = _roles(rows)
-        scores.setdefault(short, {}).setdefault(sensors, {})[RIGS[rig]] = known
-        found.append(Scored(short, sensors, RIGS[rig], rows, known))
-    text = f"{_CAPTION.format(episodes=arguments.episodes, seed=arguments.seed)}\n\n{overview(found)}"
-    with whole_results(folder) as place:
-        write_json(place / "scores.json", {"code": code_stamp("agents"), "seed": arguments.seed, "scores": scores})
-        write_text(place / "scores.csv", data(found))
-        write_text(place / "scores.md", f"# Scores\n\n{text}\n\nEvery controller, with its returns: [scores.csv](scores.csv)\n")
-    print(text)
-
 
 _CAPTION = (
     "{episodes} episodes from seed {seed}. Where the rig is drawn, so is the scenario. Laws run at 1 kHz; random openings last "
@@ -82,23 +35,33 @@ _CAPTION = (
 )
 
 
+def _tasks(options: Options) -> dict[Any, Task]:
+    if options.episodes < 2:
+        raise ValueError(f"--episodes {options.episodes}; allowed: 2 or more, half of them choose the best law")
+    conditions = [(name, sensors, rig) for name in ENVIRONMENTS for sensors in SENSORS for rig in RIGS]
+    return {
+        (where, controller): _task(where, controller, policy, options)
+        for where in conditions for controller, policy in _contestants(where[0])
+    }  # fmt: skip
+
+
 def _contestants(environment: str) -> Iterable[tuple[str, str]]:
     """Names and policy folders ("" for a law) of whatever is measured in an environment: of policies, those that were trained
     with sensors of the table."""
     for law in (*UNCONTROLLED, *default_controllers()):
         yield law, ""
     for name in shipped_names():
-        if name.partition("_")[0] == policy_of(environment):
+        if name.partition("_")[0] == _short(environment).lower():
             for folder in (one for one in policy_folders(name) if load_policy(one).training["sensors"] in SENSORS):
                 yield f"{name} {folder.name}", f"{name}/{folder.name}"
 
 
-def _task(where: tuple[str, str, bool], controller: str, policy: str, arguments: argparse.Namespace) -> Task:
+def _task(where: tuple[str, str, bool], controller: str, policy: str, options: Options) -> Task:
     environment, sensors, randomize = where
     stem = f"cells/{file_stem(controller)}/{environment.removeprefix('BirthSIM/')}-{sensors}-{RIGS[randomize]}"
     settings = {
         "controller": controller, "policy": policy, "environment": environment, "sensors": sensors, "randomize": randomize,
-        "episodes": arguments.episodes, "seed": arguments.seed,
+        "episodes": options.episodes, "seed": options.seed,
         "network": file_hash(str(SHIPPED / policy / WEIGHTS)) if policy else "",
     }  # fmt: skip
     return Task(stem, "policies" if policy else controller, score_cell, settings)
@@ -123,6 +86,19 @@ def score_cell(
     }  # fmt: skip
 
 
+def _kept(_: Options, found: Found) -> Any:
+    """Scenario -> sensors -> rig -> controller -> its figures."""
+    kept: dict[str, Any] = {}
+    for ((name, sensors, rig), controller), result in found.items():
+        place = kept.setdefault(_short(name), {}).setdefault(sensors, {}).setdefault(RIGS[rig], {})
+        place[controller] = result
+    return kept
+
+
+def _short(environment: str) -> str:
+    return environment.removeprefix("BirthSIM/").rpartition("-v")[0]
+
+
 def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
     """Who plays which of ``ROLES``: the best are chosen by one half of the episodes, all are measured by the other.
 
@@ -142,3 +118,24 @@ def _roles(rows: Rows) -> dict[str, dict[str, Any]]:
         }
         for role, name in zip(ROLES, chosen, strict=False)
     }  # fmt: skip
+
+
+def _shown(content: Content) -> dict[str, str]:
+    found = [
+        Scored(short, sensors, rig, rows, _roles(rows))
+        for short, by_sensors in content["figures"].items() for sensors, by_rig in by_sensors.items()
+        for rig, rows in by_rig.items()
+    ]  # fmt: skip
+    scores: dict[str, Any] = {}
+    for one in found:
+        scores.setdefault(one.scenario, {}).setdefault(one.sensors, {})[one.rig] = one.roles
+    own = {name: content[name] for name in ("command", "commit", "date", "settings")}
+    linked = "Every controller, with its returns: [scores.csv](data/scores.csv)"
+    text = "\n\n".join((_CAPTION.format(**content["settings"]), overview(found), linked))
+    return {"scores.md": text + "\n", "scores.csv": data(found), REFERENCE: written({**own, "scores": scores})}
+
+
+STUDY = Study(
+    (__name__,), {"episodes": 64, "seed": 70000}, _tasks, _kept,
+    {"returns": "reward", "halves": "reward", "error": "mm", "lost": "", "success": ""}, _shown,
+)  # fmt: skip

@@ -1,0 +1,43 @@
+"""How the stiffness of every controller feels: pushes at the stiffness test's poses, kept as they are and drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from baselines.bench.pieces import controller_settings
+from baselines.registry import SLOW, bare_name
+from baselines.work.tasks import Task
+from birthsim_env.physics.rig.parameters import load_parameters
+from studies.comparison.grid import default_controllers
+from studies.comparison.stiffness import study_tasks
+from studies.results import Content
+from studies.study import Found, Options, Study
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    rig = load_parameters(options.parameters or None)
+    quick = [name for name in dict.fromkeys(options.controller) if bare_name(name) not in SLOW]
+    return study_tasks([controller_settings(name, rig) for name in quick], rig)
+
+
+def _kept(_: Options, found: Found) -> Any:
+    kept: dict[str, dict[str, Any]] = {}
+    for (study, label), result in found.items():
+        kept.setdefault(study, {})[label] = result
+    return kept
+
+
+def _pictures(content: Content, folder: Path) -> list[Path]:
+    # pyplot takes half a second to load.
+    from studies.comparison.stiffness_figures import draw_studies
+
+    return draw_studies(content["figures"], folder)
+
+
+STUDY = Study(
+    ("studies.comparison.stiffness",),
+    {"controller": tuple(default_controllers()), "parameters": ""}, _tasks, _kept,
+    {"stiffness": "N/m", "error_mm": "mm", "error_percent": "%", "angles": "rad", "amplitudes": "N"}, lambda _: {}, _pictures,
+    partial=True, words={"controller": "registered names, with options, or path/to/file.py:Class"},
+)  # fmt: skip

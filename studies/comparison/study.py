@@ -1,0 +1,182 @@
+"""Every controller in the same worlds: what is compared where, and the figures that are kept of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from agents.policy.seeds import shipped_names
+from baselines.bench.statistics import jsonable
+from baselines.work.tasks import Result, Task
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import load_parameters
+from studies.comparison.grid import (
+    COMPARED,
+    ENVIRONMENTS,
+    LEARNED,
+    METRICS,
+    PLANTS,
+    Conditions,
+    all_conditions,
+    cell_task,
+    default_controllers,
+    gather,
+    settings_of,
+    statistics,
+)
+from studies.comparison.tables import (
+    CIRCLE,
+    IN_FULL,
+    PROBE,
+    RATIO,
+    SUMMARY,
+    Figures,
+    by_sensors,
+    data,
+    losses,
+    overview,
+    settled,
+)
+from studies.results import Content
+from studies.study import Found, Options, Study, no_pictures
+
+COLUMNS = ("environment", "sensors", "plant", "hand", "controller", "metric", *SUMMARY, *RATIO, "lost", "episodes")
+"""Of the figures; ``SUMMARY`` is in the metric's unit."""
+
+Key = tuple[str, Conditions, str]
+"""What the figures call it, where it is measured, and which of its training seeds it is, if it was trained."""
+
+
+def cells(options: Options, wanted: Callable[[Conditions], bool] = lambda where: True) -> dict[Key, Task]:
+    """The pieces: every controller under all conditions that the options leave and that are ``wanted``."""
+    rig = load_parameters(options.parameters or None)
+    conditions = [where for where in all_conditions(options.env, options.sensors, options.plant) if wanted(where)]
+    if not conditions:
+        raise ValueError(f"--plant {' '.join(options.plant)}; allowed: with --sensors honest, whose figures can be drawn")
+    if "residual" in options.controller:
+        raise ValueError(f"--controller 'residual'; allowed: {LEARNED}POLICY, a folder or one of {', '.join(shipped_names())}")
+    return {
+        (name, where, member): cell_task(own, where, options.episodes, options.seed)
+        for name in dict.fromkeys(options.controller) for member, own in settings_of(name, rig).items() for where in conditions
+    }  # fmt: skip
+
+
+def together(found: Found) -> dict[tuple[str, Conditions], Result]:
+    """The results of all training seeds as those of one controller."""
+    joined: dict[tuple[str, Conditions], Result] = {}
+    for (name, where, _), result in found.items():
+        one = joined.setdefault((name, where), {"metrics": {}, "lost": [], "cost": result["cost"]})
+        one["lost"] = [*one["lost"], *result["lost"]]
+        one["metrics"] = {metric: [*one["metrics"].get(metric, ()), *values] for metric, values in result["metrics"].items()}
+    return joined
+
+
+def kept(options: Options, found: Found) -> Any:
+    """Every figure as a row with ``COLUMNS``, to six digits: tables have three."""
+    rows = []
+    for cell in statistics(gather(together(found))):
+        place = [cell[name] for name in COLUMNS[:5]]
+        for metric in IN_FULL:
+            if metric in cell["metrics"]:
+                ratio = cell["ratios"].get(metric)
+                ratios = [ratio and _digits(ratio[name]) for name in SUMMARY[:3]]
+                own = [_digits(cell["metrics"][metric][name]) for name in SUMMARY]
+                rows.append([*place, metric, *own, *ratios, cell["lost"], cell["episodes"]])
+    return jsonable({"columns": list(COLUMNS), "rows": rows})
+
+
+def _digits(value: float) -> float | None:
+    return None if math.isnan(value) else float(f"{value:.6g}")
+
+
+def figures_of(content: Content) -> list[dict[str, Any]]:
+    """The cells, as ``statistics`` had them, from a result."""
+    cells: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for row in content["figures"]["rows"]:
+        found = dict(zip(COLUMNS, [math.inf if entry == "lost" else entry for entry in row], strict=True))
+        cell = cells.setdefault(tuple(row[:5]), {name: found[name] for name in (*COLUMNS[:5], "lost", "episodes")})
+        cell.setdefault("metrics", {})[found["metric"]] = {name: _number(found[name]) for name in SUMMARY}
+        ratio = {name: _number(found[column]) for name, column in zip(SUMMARY, RATIO, strict=False)}
+        cell.setdefault("ratios", {}).update({} if math.isnan(ratio["median"]) else {found["metric"]: ratio})
+    return list(cells.values())
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def tables(content: Content, name: str) -> dict[str, str]:
+    """The overview, the losses where there are several environments, and every figure as CSV."""
+    figures, settings = figures_of(content), content["settings"]
+    several = len({cell["environment"] for cell in figures}) > 1
+    parts = [
+        f"{settings['episodes']} episodes per cell from seed {settings['seed']}, the same worlds for every controller. Medians "
+        "with 95 % bootstrap intervals; a lost episode counts as infinitely bad.",
+        overview(figures), *([losses(figures)] if several else []),
+        f"Every figure, with its interval, its worst episode and its ratio to the paper's law: [{name}.csv](data/{name}.csv)",
+    ]  # fmt: skip
+    return {f"{name}.md": "\n\n".join(parts) + "\n", f"{name}.csv": data(figures)}
+
+
+def _cuts(content: Content) -> dict[str, str]:
+    """The master table, and what the page on moving hands takes of it."""
+    figures = figures_of(content)
+    where = {(CIRCLE, "randomised", sensors) for sensors in COMPARED}
+    moving = [cell for cell in figures if (cell["environment"], cell["plant"], cell["sensors"]) in where]
+    return tables(content, "comparison") | ({"moving.md": overview(moving) + "\n"} if moving else {})
+
+
+def _table_of(text: Callable[[Figures], str], name: str, content: Content) -> dict[str, str]:
+    return {f"{name}.md": text(figures_of(content)) + "\n"}
+
+
+def pictures(content: Content, folder: Path) -> list[Path]:
+    """Both pictures of the figures, with the sensors of the tables."""
+    # pyplot takes half a second to load.
+    from studies.comparison.figure import draw_comparison
+
+    figures = figures_of(content)
+    return draw_comparison([cell for cell in figures if cell["sensors"] in COMPARED] or figures, folder)
+
+
+def comparison(
+    name: str, show: Callable[[Content], dict[str, str]] | None = None,
+    wanted: Callable[[Conditions], bool] = lambda where: True, draw: Callable[[Content, Path], list[Path]] = no_pictures,
+    **options: Any,
+) -> Study:  # fmt: skip
+    """A study of some controllers under some conditions; ``options`` are defaults that differ from those of the comparison."""
+    return Study(
+        ("studies.comparison.grid",),
+        {
+            "env": ENVIRONMENTS, "controller": tuple(default_controllers()), "sensors": ("ideal", "lab", "honest"),
+            "plant": tuple(PLANTS), "episodes": 100, "seed": 0, "parameters": "", **options,
+        },
+        partial(cells, wanted=wanted), kept, METRICS, show or partial(tables, name=name), draw, partial=True,
+        allowed={"env": ENVIRONMENTS, "sensors": tuple(SENSORS), "plant": tuple(PLANTS)},
+        words={
+            "controller": "registered names, with options, path/to/file.py:Class, or residual:POLICY",
+            "plant": "what differs from episode to episode beside the scenario", "parameters": "TOML file of the rig",
+        },
+    )  # fmt: skip
+
+
+COMPARISON = comparison("comparison", _cuts, draw=pictures)
+CIRCLES = comparison(
+    "circle",
+    partial(_table_of, settled, "circle"), lambda where: not where.hand, env=(CIRCLE,), plant=("randomised",),
+    sensors=("ideal", "lab"), episodes=100, seed=60000,
+    controller=("backstepping", "pid", "admittance-backstepping", "admittance-adaptive", "residual:circle"),
+)  # fmt: skip
+BOUNDED = comparison(
+    "bound", wanted=lambda where: not where.hand,
+    env=(CIRCLE, PROBE), controller=("backstepping", "admittance-backstepping", "nonlinear-mpc"), sensors=("ideal", "lab"),
+    plant=("nominal", "randomised"), episodes=8,
+)  # fmt: skip
+HONEST = comparison(
+    "honest", partial(_table_of, by_sensors, "honest"), env=(CIRCLE, PROBE), plant=("randomised", "described-sensors"),
+    controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"), episodes=128,
+    seed=70000,
+)  # fmt: skip

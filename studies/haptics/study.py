@@ -1,0 +1,78 @@
+"""What a hand feels at the end effector: impedance, own error, energy, stability, friction and the release of a pull."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from baselines.bench.pieces import controller_settings
+from baselines.work.files import finite
+from baselines.work.tasks import Task
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import load_parameters
+from studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
+from studies.haptics.tables import report
+from studies.results import Content
+from studies.study import Found, Options, Study
+
+UNITS = {
+    "stiffness": "N/m", "peak": "N", "bandwidth": "Hz", "unnoticed": "Hz", "unnoticed_without_work": "Hz", "energy": "J",
+    "shortage": "J", "error_own_mm": "mm", "error_spring_mm": "mm", "air": "l/min", "saturation": "%", "motion_mm": "mm",
+    "overshoot_mm": "mm", "speed": "m/s", "kinetic": "J", "stored": "J", "mean": "N", "most": "N",
+}  # fmt: skip
+
+
+def _by_law(options: Options) -> list[tuple[Key, dict[str, list[Task]]]]:
+    """Each controller under each kind of sensors, and its pieces by subject."""
+    rig, rigs = load_parameters(options.parameters or None), 0 if options.nominal else options.rigs
+    keys = [
+        Key(controller_settings(name, rig), kind, options.seed, rigs, not options.no_force_sensor)
+        for name in dict.fromkeys(options.controller) for kind in dict.fromkeys(options.sensors)
+    ]  # fmt: skip
+    return [(key, haptic_tasks(key, options.subject)) for key in keys]
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    return {task.name: task for _, tasks in _by_law(options) for group in tasks.values() for task in group}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    return finite([gathered(key, tasks, dict(found)) for key, tasks in _by_law(options)])
+
+
+def _shown(content: Content, name: str) -> dict[str, str]:
+    return {f"{name}.md": report(content["figures"])}
+
+
+def _pictures(content: Content, folder: Path) -> list[Path]:
+    # pyplot takes half a second to load.
+    from studies.haptics.figures import haptic_figures
+
+    return haptic_figures(content["figures"], folder)
+
+
+def _haptics(name: str, **options: Any) -> Study:
+    """A study of some controllers; the seeds are of worlds on which nothing was tuned or decided."""
+    return Study(
+        ("studies.haptics.measurements",),
+        {
+            "controller": ("backstepping", "backstepping-cartesian", "admittance-backstepping", "pid"),
+            "sensors": ("ideal", "lab"), "subject": SUBJECTS, "rigs": 4, "nominal": False, "no_force_sensor": False,
+            "seed": 4_100_000, "parameters": "", **options,
+        },
+        _tasks, _kept, UNITS, partial(_shown, name=name), _pictures,
+        allowed={"sensors": tuple(SENSORS), "subject": SUBJECTS},
+        words={
+            "controller": "registered names, with options, or path/to/file.py:Class", "rigs": "drawn at random",
+            "nominal": "the rig as the controllers believe it, instead of rigs drawn",
+            "no_force_sensor": "show the controllers a hand's force of zero", "parameters": "TOML file of the rig",
+        },
+    )  # fmt: skip
+
+
+STUDY = _haptics("haptics")
+LIMITS = _haptics(
+    "limits", sensors=("lab", "honest"), subject=("hands", "release"), seed=6_400_000, rigs=24,
+    controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
+)  # fmt: skip

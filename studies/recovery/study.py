@@ -1,0 +1,65 @@
+"""Rigs drawn at random, identified from logs of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.statistics import quantile
+from baselines.identification.quantities import QUANTITIES
+from baselines.work.tasks import Task
+from birthsim_env.physics.rig.parameters import field_of
+from studies.recovery.tasks import EXPERIMENTS, RANGES, recovery_tasks
+from studies.results import Content
+from studies.study import Found, Options, Study
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    tasks = recovery_tasks(options.rigs, options.seed, options.duration, options.experiment)
+    return {task.name: task for task in tasks}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    if not found:
+        raise ValueError(f"none of {options.rigs} rigs was identified")
+    return list(found.values())
+
+
+def _shown(content: Content) -> dict[str, str]:
+    found, settings = content["figures"], content["settings"]
+    head = (
+        f"{len(found)} of {settings['rigs']} rigs, seeds from {settings['seed']}, experiment {settings['experiment']} of "
+        f"{settings['duration']:g} s, `lab` sensors."
+    )
+    worst = max(max(result["misfit"]) for result in found)
+    last = f"Largest residual over the noise of its log: {worst:.3f}."
+    return {"recovery.md": "\n".join([head, "", *recovery_table(found), "", last]) + "\n"}
+
+
+def recovery_table(results: list[dict[str, Any]]) -> list[str]:
+    """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
+    lines = [
+        "| parameter | drawn from | told in | error: median | 95 % | largest | half interval: median | true value inside |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in QUANTITIES:
+        rows = [result["rows"][one.name] for result in results]
+        told = [row for row in rows if row["told"]]
+        low, high = RANGES[one.name]
+        scale, unit, digits = (1e3, "ms", 2) if one.unit else (100.0, "%", 2)
+        errors = [scale * abs(row["value"] - row["true"]) / (1.0 if one.unit else row["true"]) for row in told]
+        halves = [scale * 0.5 * (row["high"] - row["low"]) / (1.0 if one.unit else row["true"]) for row in told]
+        cells = [quantile(np.array(errors), f) for f in (0.5, 0.95, 1.0)] + [quantile(np.array(halves), 0.5)]
+        inside = sum(row["low"] <= row["true"] <= row["high"] for row in told)
+        written = " | ".join(f"{cell:.{digits}g} {unit}" for cell in cells)
+        ranges = f"{low:g} to {high:g} {field_of(one.name).metadata['unit']}"
+        lines.append(f"| `{one.name}` | {ranges} | {len(told)} of {len(rows)} | {written} | {inside} of {len(told)} |")
+    return lines
+
+
+STUDY = Study(
+    ("studies.recovery.tasks",), {"rigs": 50, "seed": 82000, "duration": 12.0, "experiment": "proposed"}, _tasks, _kept,
+    {"misfit": "of the log's noise", "value": "the parameter's"}, _shown, partial=True,
+    allowed={"experiment": tuple(EXPERIMENTS)}, words={"duration": "s of each experiment", "rigs": "drawn at random"},
+)  # fmt: skip

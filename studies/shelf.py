@@ -1,0 +1,109 @@
+"""The results of all studies: which are stale, what shows them, and their renewal."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import cast
+
+from baselines.commands.shared import run
+from baselines.work.files import write_text
+from baselines.work.sources import ROOT
+from studies.door import OWN, STUDIES
+from studies.results import changed, read_result
+from studies.study import Study
+
+DATA, README = ROOT / "docs" / "data", ROOT / "README.md"
+ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
+"""Texts that do not stand in ``DATA``."""
+
+_MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def main() -> None:
+    """Entry point of ``birthsim study NAME`` for declared studies, and of ``OWN``."""
+    name = sys.argv[0].rpartition(" ")[2]
+    if name not in OWN:
+        declared(name).main(name, STUDIES[name].measures)
+        return
+    action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
+    run(argparse.ArgumentParser(prog=f"birthsim study {name}", description=f"Says {OWN[name]}."), lambda _: action())
+
+
+def declared(name: str) -> Study:
+    """The declaration of a study."""
+    entry = STUDIES[name]
+    return cast(Study, getattr(import_module(f"studies.{entry.module}"), entry.declaration))
+
+
+def names() -> list[str]:
+    """The declared studies."""
+    return [name for name, entry in STUDIES.items() if entry.declaration]
+
+
+def state(name: str) -> str:
+    """Whether the result of a study is of the sources that are here."""
+    study, content = declared(name), read_result(name)
+    if content is None:
+        return "not measured yet"
+    files = changed(content, study.code)
+    listed = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
+    other = {key: value for key, value in content["settings"].items() if value != json.loads(json.dumps(study.options[key]))}
+    said = "".join(f"; {key} = {value}, not {study.options[key]}" for key, value in other.items())
+    return (f"stale; changed: {listed}" if files else "fresh") + said
+
+
+def status() -> None:
+    """Print the state of each result, its date, its commit and its seconds."""
+    for name in names():
+        content = read_result(name)
+        made = f"{content['date'][:10]}  {content['commit'][:7]}  {content['seconds']:8.0f} s  " if content else ""
+        print(f"{name:12}{made}{state(name)}")
+
+
+def texts(name: str) -> Iterator[tuple[Path, str]]:
+    """What shows the result of a study: files, and what should stand in them."""
+    if (content := read_result(name)) is not None:
+        for file, text in declared(name).show(content).items():
+            yield ELSEWHERE.get(file, DATA / file), text
+
+
+def rendered() -> dict[Path, str]:
+    """Every file that shows results, and what should stand in it."""
+    found = {path: text for name in names() for path, text in texts(name)}
+    tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
+    readme = README.read_text(encoding="utf-8")
+    return found | {README: _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", readme)}
+
+
+def render() -> None:
+    """Write what differs."""
+    for path, text in rendered().items():
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+            print(path.relative_to(ROOT))
+
+
+def draw() -> None:
+    """Draw the pictures of every result into docs."""
+    for name in names():
+        if (content := read_result(name)) is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                for path in declared(name).draw(content, Path(folder)):
+                    if path.suffix == ".png":
+                        shutil.copy(path, ROOT / "docs")
+
+
+def renew() -> None:
+    """Run what is not fresh, each with its own defaults."""
+    for name in names():
+        if not state(name).startswith("fresh"):
+            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True)
