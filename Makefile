@@ -9,10 +9,11 @@
 # make pictures redraws the pictures of the README's gallery and the studies (some minutes)
 # make results runs every study whose result is stale, and writes the tables and pictures that show them
 # make policies trains the policies that come with the package (an hour or so); make learned evaluates them
-# make scratch trains PPO from scratch;
+# make scratch trains PPO from scratch
 # make lock pins every file of an installation; make audit, make sbom and make lint-workflows look at the supply chain
 # make docs builds the documentation site in out/docs and runs its notebooks; make docs-links looks at its links to the internet
 # make prose reads the documentation for words that the glossary replaces and for long sentences, and counts its words; it needs npm
+# make page builds the code and data of the page's rig, which the package carries, after a change of kernels, policies, words or version
 # make targets builds the loop without Python for every target and writes docs/targets.md (some minutes; qemu-user runs aarch64)
 
 VENV := .venv
@@ -50,7 +51,7 @@ POLICIES := agents/policies
 # A page of docs/ keeps what stands above its mark; the tables that commands wrote follow.
 renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
 
-.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets docs docs-links golden clean
+.PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
 
 # What a picture needs, and the project itself.
 $(BASE): pyproject.toml requirements/base.txt
@@ -241,6 +242,9 @@ scratch: $(READY)
 
 targets: $(READY)
 	$(BIN)/birthsim study targets --out $(OUT)/targets --page docs/targets.md
+
+page: $(READY)
+	$(BIN)/python -m birthsim_live.rig.build
 
 fuzz: $(READY)
 	mkdir -p $(OUT)

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from studies.fuzz import harness
+from studies.fuzz import harness, odd_rigs
 from studies.fuzz.harness import Case, Kind, fuzz
 from studies.fuzz.kinds import KINDS
 from studies.fuzz.mutations import nested
@@ -92,3 +92,12 @@ def test_a_case_is_its_kind_seed_and_number():
     assert draws[0] == draws[1]
     assert len(set(draws)) == 4
     assert Case().names == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(900, 908))
+def test_an_odd_rig_works_or_is_refused_in_a_line(seed, tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(odd_rigs.written(seed), encoding="utf-8")
+    verdicts = {command: odd_rigs.attempt(command, path, tmp_path) for command in odd_rigs.COMMANDS}
+    assert {command: words for command, (verdict, words) in verdicts.items() if verdict == "BAD"} == {}
