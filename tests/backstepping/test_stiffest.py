@@ -11,7 +11,7 @@ from baselines.registry import make_controller
 from birthsim_env import Parameters
 from studies.haptics.worlds import POSES, no_hand, resting
 from studies.stability.rig_port import RigPort
-from studies.stability.stiffest import ASKED, rests_up_to
+from studies.stability.swinging import ASKED, rests_up_to
 
 LAWS = ("backstepping", "backstepping-cartesian")
 LIGHT = Parameters().replace({"mechanics.mass": 1.6, "valves.time_constant": 0.008})
