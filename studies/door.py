@@ -19,7 +19,7 @@ class Entry(NamedTuple):
 
 STUDIES = {
     "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
-    "beside-law": Entry("residual.beside_law", "", "policies of several seeds beside the controller that they correct"),
+    "beside-law": Entry("residual.beside_law", "", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
     "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
@@ -28,12 +28,12 @@ STUDIES = {
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
-    "mutation": Entry("mutation.command", "", "how many small changes of the numerical modules their tests notice"),
+    "mutation": Entry("mutation.command", "", "how many small changes of the code tests notice"),
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
     "pools": Entry("pools", "", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
     "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
-    "soak": Entry("soak.command", "", "10^8 policy steps over all scenarios, controllers, sensors and corners of the ranges"),
+    "soak": Entry("soak.command", "", "10^8 policy steps over all that there is"),
     "speed": Entry("speed.command", "", "speeds, beside what they are to be compared with"),
     "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),
     "stiffest": Entry("stability.stiffest", "STUDY", "the stiffest setpoints at which the paper's controller rests"),
@@ -45,7 +45,7 @@ STUDIES = {
 }
 
 OWN = {
-    "status": "which results/*.json are fresh, and what changed since the others",
+    "status": "which results/*.json are fresh, and what has changed",
     "render": "write the tables of docs, README and scores from results/*.json",
     "draw": "draw the pictures of docs from results/*.json",
     "renew": "run every study whose result is stale",

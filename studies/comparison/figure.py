@@ -22,7 +22,7 @@ CONDITIONS = {
     ("honest", "nominal"): {"marker": "s", "color": MIDDLE, "mfc": MIDDLE},
     ("honest", "randomised"): {"marker": "s", "color": MIDDLE, "mfc": "white"},
     ("honest", "drawn-sensors"): {"marker": "D", "color": DARK, "mfc": "white"},
-    ("honest", "described-sensors"): {"marker": "D", "color": MIDDLE, "mfc": "white"},
+    ("honest", "described-sensors"): {"marker": "D", "color": MIDDLE, "mfc": MIDDLE},
 }
 """Sensors and plant -> how they look."""
 
@@ -42,6 +42,7 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
     environments = list(dict.fromkeys(cell["environment"] for cell in figures))
     size = (1.8 + 2.0 * len(environments), 1.4 + 0.42 * len(names))
     figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
+    present = [key for key in CONDITIONS if any((cell["sensors"], cell["plant"]) == key for cell in figures)]
     shown: dict[str, Any] = {}
     for axes, environment in zip(panels[0], environments, strict=True):
         here = [cell for cell in figures if cell["environment"] == environment]
@@ -49,7 +50,7 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
         for cell in here:
             key = cell["sensors"], cell["plant"]
             style, found = CONDITIONS[key], cell["metrics"]["settled_rms"]
-            row = names.index(cell["controller"]) + 0.17 * (list(CONDITIONS).index(key) - 1.5)
+            row = names.index(cell["controller"]) + 0.7 * ((present.index(key) + 0.5) / len(present) - 0.5)
             if np.isfinite(found["median"]):
                 axes.hlines(row, found["low"], min(found["high"], high), color=style["color"], lw=0.9)
                 shown[known(*key)] = axes.plot(found["median"], row, ls="", ms=4, **style)[0]

@@ -47,7 +47,7 @@ def test_every_promise_has_its_page_and_its_bounds(entry):
 
 
 def test_the_page_is_the_one_that_tables_and_measurements_make():
-    """``make verify`` or ``python -m studies.verification report`` writes it anew."""
+    """``make verify`` or ``birthsim study verification report`` writes it anew."""
     fresh, stored = report.page(), report.PAGE.read_text(encoding="utf-8")
     assert without_staleness(fresh) == without_staleness(stored)
 
