@@ -40,9 +40,9 @@ def settled_figure(figures: Figures, folder: Path) -> list[Path]:
     """Settled RMS error, median with its interval: a panel per environment, a row per controller."""
     names = controllers_of(figures)
     environments = list(dict.fromkeys(cell["environment"] for cell in figures))
-    size = (1.8 + 2.0 * len(environments), 1.4 + 0.42 * len(names))
-    figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
     present = [key for key in CONDITIONS if any((cell["sensors"], cell["plant"]) == key for cell in figures)]
+    size = (1.8 + 2.0 * len(environments), 0.9 + 0.42 * len(names) + 0.15 * len(present))  # of which the legend takes the last
+    figure, panels = plt.subplots(1, len(environments), figsize=size, layout="constrained", sharey=True, squeeze=False)
     shown: dict[str, Any] = {}
     for axes, environment in zip(panels[0], environments, strict=True):
         here = [cell for cell in figures if cell["environment"] == environment]
