@@ -87,9 +87,7 @@ def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
     for k in range(1500):
         moved = slides if k >= 500 else 0.0
         y = y + moved * PERIOD
-        pose = geometry.pose(
-            y[0], y[1], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
-        )
+        pose = geometry.pose(y[0], y[1], p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)
         kappa, sine, cosine = pose[5:]
         push = hand if k >= 500 else np.zeros(2)
         left = np.array([mechanics.user_force1(*push, kappa, sine, cosine), mechanics.user_force2(*push, sine, cosine)])
