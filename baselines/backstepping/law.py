@@ -16,7 +16,14 @@ import math
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2
 from baselines.backstepping.gains import damped_gains_miss, equal_gain, equal_gain_misses, inner_gain, outer_gain
-from baselines.valve_inverse import air_at, force_first_openings, one_valve_openings, stiffness_of, two_valve_openings
+from baselines.valve_inverse import (
+    CylinderAir,
+    air_at,
+    force_first_openings,
+    one_valve_openings,
+    stiffness_of,
+    two_valve_openings,
+)
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints, Reference
 from birthsim_env.loop.stage import scratch
@@ -263,24 +270,24 @@ def law(seen: Seen, joints: Joints, terms: Terms, p: Rig, options: Options, n: i
 
 
 @helper
+def openings_of(rate: float, stiffness_rate: float, air: CylinderAir, p: Rig, options: Options) -> tuple[float, float]:
+    """Openings of a cylinder's valves for dF/dt and dK/dt."""
+    if options.one_valve > 0.0:
+        return one_valve_openings(rate, air, p)
+    if options.force_first > 0.0:
+        return force_first_openings(rate, stiffness_rate, air, p)
+    return two_valve_openings(rate, stiffness_rate, air, p)
+
+
+@helper
 def openings_for(seen: Seen, joints: Joints, intent: Intent, p: Rig, options: Options, openings: Openings, n: int) -> None:
     """Writes the ``openings`` of n lanes for what the law wants."""
-    opening, one_valve, force_first = openings.opening, options.one_valve > 0.0, options.force_first > 0.0
+    opening, pressure, rate, stiffness_rate = openings.opening, seen.pressure, intent.force_rate, intent.stiffness_rate
     for i in range(n):
-        y1, y2 = joints.position[0, i], joints.position[1, i]
-        v1, v2 = joints.speed[0, i], joints.speed[1, i]
-        first = air_at(0, seen.pressure[0, i], seen.pressure[1, i], y1, v1, p)
-        second = air_at(1, seen.pressure[2, i], seen.pressure[3, i], y2, v2, p)
-        rate1, rate2 = intent.force_rate[0, i], intent.force_rate[1, i]
-        stiff1, stiff2 = intent.stiffness_rate[0, i], intent.stiffness_rate[1, i]
-        if one_valve:
-            (p1, n1), (p2, n2) = one_valve_openings(rate1, first, p), one_valve_openings(rate2, second, p)
-        elif force_first:
-            (p1, n1), (p2, n2) = force_first_openings(rate1, stiff1, first, p), force_first_openings(rate2, stiff2, second, p)
-        else:
-            (p1, n1), (p2, n2) = two_valve_openings(rate1, stiff1, first, p), two_valve_openings(rate2, stiff2, second, p)
-        opening[0, i], opening[1, i] = p1, n1
-        opening[2, i], opening[3, i] = p2, n2
+        first = air_at(0, pressure[0, i], pressure[1, i], joints.position[0, i], joints.speed[0, i], p)
+        second = air_at(1, pressure[2, i], pressure[3, i], joints.position[1, i], joints.speed[1, i], p)
+        opening[0, i], opening[1, i] = openings_of(rate[0, i], stiffness_rate[0, i], first, p, options)
+        opening[2, i], opening[3, i] = openings_of(rate[1, i], stiffness_rate[1, i], second, p, options)
 
 
 @helper
