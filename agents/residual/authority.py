@@ -77,5 +77,7 @@ def limit_authority(joints: Joints, target: Reference, p: Rig, period: float, le
         error1 = -kappa * joints.speed[0, i] - across(vx, vy, sine, cosine)
         error2 = joints.speed[1, i] - along(vx, vy, sine, cosine)
         limiter.softness[i] *= kept
-        _yield(limiter, 0, i, sustained(limiter.wave1, i, error1, period, level, level), level)
-        _yield(limiter, 1, i, sustained(limiter.wave2, i, error2, period, level, level), level)
+        peak1 = sustained(limiter.wave1, i, error1, period, level, level)
+        peak2 = sustained(limiter.wave2, i, error2, period, level, level)
+        for cylinder in range(2):
+            _yield(limiter, cylinder, i, peak1 if cylinder == 0 else peak2, level)

@@ -142,33 +142,35 @@ def needs_of_gains(joints: Joints, target: Reference, p: Rig, needs: Needs, n: i
 @helper
 def equal_gains(needs: Needs, p: Rig, gains: Gains, n: int) -> int:
     """Writes ``gains`` with c1 = c2 = c3; returns the number of lanes without any."""
-    m, misses = p.mass, 0
+    misses = 0
     for i in range(n):
-        k1, k2, mass1 = needs.stiffness[0, i], needs.stiffness[1, i], needs.mass[i]
-        missed = equal_gain_misses(k1, mass1, p.fv1) + equal_gain_misses(k2, m, p.fv2)
+        missed = equal_gain_misses(needs.stiffness[0, i], needs.mass[i], p.fv1)
+        missed += equal_gain_misses(needs.stiffness[1, i], p.mass, p.fv2)
         misses += 1 if missed > 0.0 else 0
-    for i in range(n):
-        first = equal_gain(needs.stiffness[0, i], needs.mass[i], p.fv1)
-        second = equal_gain(needs.stiffness[1, i], m, p.fv2)
-        gains.c1[0, i], gains.c2[0, i], gains.c3[0, i] = first, first, first
-        gains.c1[1, i], gains.c2[1, i], gains.c3[1, i] = second, second, second
+    for cylinder in range(2):
+        viscous = p.fv1 if cylinder == 0 else p.fv2
+        for i in range(n):
+            mass = needs.mass[i] if cylinder == 0 else p.mass
+            gain = equal_gain(needs.stiffness[cylinder, i], mass, viscous)
+            gains.c1[cylinder, i], gains.c2[cylinder, i], gains.c3[cylinder, i] = gain, gain, gain
     return misses
 
 
 @helper
 def damped_gains(needs: Needs, p: Rig, ratio: float, gains: Gains, n: int) -> int:
     """As ``equal_gains``, with c1 = c3 for the damping B = 2 ``ratio`` sqrt(K m_e)."""
-    m, misses = p.mass, 0
+    misses = 0
     for i in range(n):
-        k1, k2, mass1 = needs.stiffness[0, i], needs.stiffness[1, i], needs.mass[i]
-        b1, b2 = 2.0 * ratio * math.sqrt(k1 * mass1), 2.0 * ratio * math.sqrt(k2 * m)
-        outer1, outer2 = outer_gain(k1, b1, mass1, p.fv1), outer_gain(k2, b2, m, p.fv2)
-        inner1, inner2 = inner_gain(outer1, k1, mass1, p.fv1), inner_gain(outer2, k2, m, p.fv2)
-        missed = damped_gains_miss(outer1, inner1, k1, b1, mass1, p.fv1)
-        missed += damped_gains_miss(outer2, inner2, k2, b2, m, p.fv2)
+        missed = 0.0
+        for cylinder in range(2):
+            mass, viscous = (needs.mass[i], p.fv1) if cylinder == 0 else (p.mass, p.fv2)
+            k = needs.stiffness[cylinder, i]
+            damping = 2.0 * ratio * math.sqrt(k * mass)
+            outer = outer_gain(k, damping, mass, viscous)
+            inner = inner_gain(outer, k, mass, viscous)
+            missed += damped_gains_miss(outer, inner, k, damping, mass, viscous)
+            gains.c1[cylinder, i], gains.c2[cylinder, i], gains.c3[cylinder, i] = outer, inner, outer
         misses += 1 if missed > 0.0 else 0
-        gains.c1[0, i], gains.c2[0, i], gains.c3[0, i] = outer1, inner1, outer1
-        gains.c1[1, i], gains.c2[1, i], gains.c3[1, i] = outer2, inner2, outer2
     return misses
 
 
