@@ -45,7 +45,7 @@ STUDIES = {
 }
 
 OWN = {
-    "status": "which results/*.json are fresh, and what has changed",
+    "status": "list which results/*.json are fresh, and what has changed",
     "render": "write the tables of docs, README and scores from results/*.json",
     "draw": "draw the pictures of docs from results/*.json",
     "renew": "run every study whose result is stale",

@@ -35,7 +35,8 @@ def main() -> None:
         declared(name).main(name, STUDIES[name].measures)
         return
     action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
-    run(argparse.ArgumentParser(prog=f"birthsim study {name}", description=f"Says {OWN[name]}."), lambda _: action())
+    does = f"{OWN[name][0].upper()}{OWN[name][1:]}."
+    run(argparse.ArgumentParser(prog=f"birthsim study {name}", description=does), lambda _: action())
 
 
 def declared(name: str) -> Study:

@@ -12,7 +12,6 @@ TABLE = [
     ("haptics", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, "),
     ("haptics", ("--subject", "moon"), "invalid choice: 'moon'"),
     ("haptics", ("--rigs", "0"), "'0'; allowed: a whole number >= 1"),
-    ("haptics", ("--page", "nowhere.md"), "nowhere.md"),
     ("speed", ("--beside", "docs"), "error: --beside 'docs' has no birthsim_env; allowed: a checkout of the project\n"),
     ("stability", ("--controller", "nobody"), "controller = 'nobody'; allowed: backstepping, "),
     ("stability", ("--points", "0"), "'0'; allowed: a whole number >= 1"),
