@@ -32,6 +32,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher
 
+import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))

@@ -42,7 +42,7 @@ def package(tmp_path):
     for name in (
         "loop/signals",
         *(f"physics/{part}" for part in ("electronics", "valves")),
-        *(f"physics/compiled/{part}" for part in ("compilation", "lanes", "exact", "records", "record_types")),
+        *(f"physics/compiled/{part}" for part in ("compilation", "lanes", "exact", "records", "record_types", "resolution")),
         *(f"physics/rig/{part}" for part in ("parameters", "quantities", "reading", "sections", "values")),
     ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
