@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.policy.controller import ResidualController
 from agents.policy.files import load_policy
 from agents.policy.seeds import SHIPPED, best_policy
-from birthsim_build.residual import residual_parts
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page, write_page
+from birthsim_live.rig.pack import controller_parts
 from tests.console import call
 from tests.live.rig.worker import run
 
@@ -48,7 +49,7 @@ def test_a_page_has_a_policy_of_ones_own_and_another_rig(mine: str, tmp_path: Pa
 
 def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
     name = "circle_honest_student"
-    policy, _ = residual_parts(RIG, True, name)
+    policy = controller_parts(ResidualController(RIG, name))["sampled"]["policy"]
     cells = load_policy(best_policy(name)).network.cells
     assert cells > 0
     memory = policy.stages[-1].memory
