@@ -30,12 +30,12 @@ from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, Parts
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics import options
 from birthsim_env.physics.compiled.lanes import (
     DEADBAND,
     PRESSURES,
     STATE_NAMES,
     TEMPERATURES,
+    TUBE_RATE,
     Array,
     parameter_array,
     parameter_column,
@@ -80,11 +80,9 @@ def pack(
     controllers that are listed, those that are compiled; for code that has ``functions``, without them for code that is to be
     built.
 
-    Raises ``ValueError`` for a rig with options of ``physics.options``, and for one that cannot do what the page opens with.
+    Raises ``ValueError`` for a rig that cannot do what the page opens with.
     """
     column = parameter_array(rig, 1)
-    if not options.are_off(column):
-        raise ValueError("the rig has tubes, a weak supply or a soft structure; allowed in the page: none")
 
     def plant_part(rigs: Array) -> Part:
         return _part(plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period))
@@ -102,7 +100,7 @@ def pack(
     tree = {
         "rig": {
             "plant": plant_part(column), "clock": CLOCK, "inputs": INPUTS,
-            "start": _part(Stage(stages.begin, column[:, 0])),
+            "start": _part(Stage(stages.begin, column[:, 0], np.zeros((FurtherStates.size, 1)))),
             "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
         },
         "valves": {"two_valves": {}, "one_valve": {"valves": PAIRED_VALVES}},
@@ -110,10 +108,10 @@ def pack(
         "sensors": {name: sensors(name, rig) for name in SENSORS},
         "controllers": parts,
     }  # fmt: skip
-    if functions is None:  # those of valves that open imperfectly too
-        worn = column.copy()
-        worn[DEADBAND] = 0.01
-        functions = sorted(_needed([tree, plant_part(worn)]))
+    if functions is None:  # those of worn valves and of tubes too
+        worn, tubes = column.copy(), column.copy()
+        worn[DEADBAND], tubes[TUBE_RATE] = 0.01, 100.0
+        functions = sorted(_needed([tree, plant_part(worn), plant_part(tubes)]))
     store, hello = Store(functions), greeting(rig, controllers)
     for one in hello["choices"]["scenario"]:
         if problem := _problem(one["name"], rig):

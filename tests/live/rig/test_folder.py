@@ -68,19 +68,12 @@ def test_what_is_no_policy_is_refused_in_one_line(
     assert not (tmp_path / "page").exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[chambers]\ntube_length = 1.0\n", "tubes"),
-        ("[mechanics]\nmass = 90.0\n", "mass"),
-    ],
-)
-def test_a_rig_that_the_page_cannot_show_is_refused(text, said, tmp_path, monkeypatch, capsys):
-    (tmp_path / "rig.toml").write_text(text)
+def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 90.0\n")
     options = ("--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
     status, _, complained = call("live", monkeypatch, capsys, *options)
     assert status == 2
-    assert said in complained.splitlines()[-1]
+    assert "mass" in complained.splitlines()[-1]
     assert not (tmp_path / "page").exists()
 
 
