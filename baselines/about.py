@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+RESIDUAL = "residual"
+"""The controller with a trained policy, which stands above this package; ``residual:circle`` names its policy."""
+
 CONTROLLERS = {
     "backstepping": "The paper's law: position and stiffness from pressures, without a force sensor.",
     "backstepping-weight": "The paper's law, which also carries the weight of what moves.",

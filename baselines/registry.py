@@ -11,6 +11,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
+from baselines.about import RESIDUAL
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
@@ -104,6 +105,8 @@ def split_options(name: str) -> tuple[str, dict[str, Any]]:
 def resolved(name: str) -> tuple[str, dict[str, Any]]:
     """The registered name of a controller, or its file, without limits, and its options, also those of a short name."""
     plain, options = split_options(name.removeprefix(LIMITED))
+    if plain.startswith(f"{RESIDUAL}:"):
+        return RESIDUAL, {"policy": plain.removeprefix(f"{RESIDUAL}:"), **options}
     registered, own = split_options(SHORT_NAMES.get(plain, plain))
     return registered, {**own, **options}
 
@@ -119,7 +122,11 @@ def _factory(name: str) -> Factory:
         return (CONTROLLERS | UNCONTROLLED)[name]
     for point in entry_points(group=ENTRY_POINTS):
         if point.name == name:
-            factory: Factory = point.load()
+            try:
+                factory: Factory = point.load()
+            except ImportError as error:
+                needs = "; a policy needs the extra: pip install 'birthsim[agents]'" if name == RESIDUAL else ""
+                raise ValueError(f"{error}{needs}") from error
             return factory
     if name.rpartition(":")[0].endswith(".py"):
         return partial(_own, name, from_file("controller", name))
@@ -144,17 +151,11 @@ def known_options(name: str) -> list[str] | None:
 def make_controller(name: str, parameters: Parameters, **options: Any) -> Controller:
     """The controller ``name``, or the class of a user's own file given as ``path/to/file.py:Class``.
 
-    A name may be short (``SHORT_NAMES``) and carry options, ``pid[bandwidth=60]``. ``limited:`` before it puts the law behind
-    the limits of ``PortLimiter``.
+    A name may be short (``SHORT_NAMES``) and carry options, ``pid[bandwidth=60]``, or a policy, ``residual:circle``.
+    ``limited:`` before it puts the law behind the limits of ``PortLimiter``.
     Raises ``ValueError`` naming what is unknown and what there is.
     """
-    if name.startswith(LIMITED):
-        try:
-            return PortLimiter(make_controller(name.removeprefix(LIMITED), parameters, **options), parameters)
-        except ValueError as error:
-            raise ValueError(str(error).replace("controller = '", f"controller = '{LIMITED}")) from error
     plain, named = resolved(name)
-    factory = _factory(plain)
     known = known_options(name)
     for option, value in named.items():
         if known is not None and option not in known:
@@ -162,7 +163,8 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             raise ValueError(
                 f"controller = {shown(name)}: {option} = {shown(value)} is unknown; allowed for {plain}: {allowed}"
             )
-    return factory(parameters, **{**named, **options})
+    law = _factory(plain)(parameters, **{**named, **options})
+    return PortLimiter(law, parameters) if name.startswith(LIMITED) else law
 
 
 def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Controller:

@@ -81,10 +81,15 @@ class StagedController:
             self._lanes, self._sampled, self._made, self._loop = lanes, sampled, list(self.law_stages(sampled)), None
             self._memories = [np.repeat(one.fresh[:, None], lanes, axis=1) for one in self._made]
 
+    def policy_stages(self) -> list[Stage]:
+        """What runs before the law, once prepared: a policy where it has one."""
+        return []
+
     def stages(self) -> list[Stage]:
-        """The law as stages of a closed loop, with what it remembers."""
+        """Policy and law as stages of a closed loop, with what they remember."""
         pairs = zip(self._made, self._memories, strict=True)
-        return [Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs]
+        own = (Stage(one.function, one.constants, memory, sees_world=False) for one, memory in pairs)
+        return [*self.policy_stages(), *([] if self.asks else [Stage(ask, sees_world=False)]), *own]
 
     def require_acceleration(self, measurement: Measurement) -> None:
         """Raise ``ValueError`` without an acceleration where the law, once prepared, needs one."""
@@ -141,7 +146,7 @@ class StagedController:
             self._loop = Loop(lanes, [], placed, self.stages())
         self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
-        self._seen[REFERENCE:] = self._asked[:REFERENCES] = reference.rows
+        self._seen[REFERENCE:] = reference.rows
         return self._loop.run()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
@@ -192,7 +197,7 @@ class CompiledDriving(Driving):
     def stages(self, lanes: int, sampled: bool) -> list[Stage]:
         """The law, compiled into the closed loop."""
         self.controller.prepare(lanes, sampled)
-        return [*([] if self.controller.asks else [Stage(ask, sees_world=False)]), *self.controller.stages()]
+        return self.controller.stages()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
         """Arrays that the loop places in rows of what is seen."""

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from baselines.about import RESIDUAL
 from birthsim_build.image import Part, Words, function_name
-from birthsim_build.loops import PAIRED_VALVES, RESIDUAL, World, image_of, law_part, plant_world, scenario_world
+from birthsim_build.loops import PAIRED_VALVES, World, image_of, law_part, plant_world, scenario_world
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
@@ -76,6 +77,6 @@ def make_bundle(
     pairs = [] if alone else [(scenario, kind) for scenario in scenarios for kind in sensors]
     worlds = {(scenario, kind): scenario_world(environment_id(scenario), kind, rig, seed) for scenario, kind in pairs}
     kinds = sorted({SENSORS[kind].sampled for kind in sensors})
-    laws = {(name, kind): law_part(name, rig, kind) for name in controllers for kind in kinds}
-    laws |= {(f"{RESIDUAL}:{name}", kind): law_part(RESIDUAL, rig, kind, name) for name in policies for kind in kinds}
+    names = [*controllers, *(f"{RESIDUAL}:{name}" for name in policies)]
+    laws = {(name, kind): law_part(name, rig, kind) for name in names for kind in kinds}
     return Bundle(rig, worlds, laws, None if alone else plant_world(rig))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import gymnasium
 import numpy as np
 
+from baselines.about import RESIDUAL
 from baselines.registry import controller_names, make_controller
-from baselines.staged import StagedController, ask
+from baselines.staged import StagedController
 from birthsim_build.image import INPUT_MEMORY, Part, Words, packed_image, packed_part, packed_rows
 from birthsim_build.stages import enter_scenario, outside, pair_valves
 from birthsim_env.loop.rows import DAMPING, FEEDFORWARD, MOTION, SEEN, STATE, WORLD
@@ -19,8 +20,6 @@ from birthsim_env.loop.world import plant_stage
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-
-RESIDUAL = "residual"
 
 ORDER = (
     "policy", "law", "valves", "board", "plant", "clock", "target", "setpoints", "hand", "inputs", "start", "jumps", "sensors",
@@ -56,28 +55,26 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
     return World(np.concatenate(simulation.rows())[:, 0], parts, simulation.sensors.sampled)
 
 
-def law_part(controller: str, rig: Parameters, sampled: bool, policy: str | None = None) -> Part:
-    """A controller as a part, from what is measured to openings; with ``policy``, that of the residual.
-
-    Raises ``ValueError`` for a controller that is not compiled, and for a policy where what policies need is missing.
-    """
-    if controller == RESIDUAL:
-        try:
-            from birthsim_build.residual import residual_part
-        except ImportError as error:
-            raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-        return residual_part(rig, sampled, policy or "circle")
+def law_part(controller: str, rig: Parameters, sampled: bool) -> Part:
+    """A controller as a part, from what is measured to openings. Raises ``ValueError`` for one that is not compiled."""
     law = make_controller(controller, rig)
-    if not isinstance(law, StagedController):
-        compiled = [name for name in controller_names() if name == RESIDUAL or isinstance(_made(name, rig), StagedController)]
+    if not is_compiled(law):
+        compiled = [name for name in controller_names() if name == RESIDUAL or is_compiled(_made(name, rig))]
         raise ValueError(f"controller = {controller!r}; allowed: a compiled one: {', '.join(compiled)}")
     return staged_part(law, sampled)
+
+
+def is_compiled(law: object) -> TypeGuard[StagedController]:
+    """Whether a controller is nothing but stages."""
+    return isinstance(law, StagedController) and law.is_compiled()
 
 
 def staged_part(law: StagedController, sampled: bool) -> Part:
     """A compiled law as a part."""
     law.prepare(1, sampled)
-    return Part((Stage(ask, sees_world=False), *law.stages()), {WORLD + row: 0.0 for row in range(FEEDFORWARD, DAMPING)})
+    placed = law.more_rows(1) if law.asks else [(np.zeros((DAMPING - FEEDFORWARD, 1)), FEEDFORWARD)]
+    rows = {WORLD + first + k: value for array, first in placed for k, value in enumerate(array[:, 0].tolist())}
+    return Part(tuple(law.stages()), rows)
 
 
 def _made(name: str, rig: Parameters) -> Any:
@@ -89,11 +86,11 @@ def _made(name: str, rig: Parameters) -> Any:
 
 def plant_world(rig: Parameters) -> World:
     """The plant alone: at mid stroke, at rest, with pressures that balance the weight; from openings and the hand's force."""
-    plant = Plant(rig)
+    plant, period = Plant(rig), rig.electronics.control_period
     rows = np.zeros(WORLD + SEEN)
     rows[:PARAMETERS], rows[STATE : STATE + STATES] = plant.lane_parameters[:, 0], plant.state[:, 0]
     rows[MOTION : MOTION + 4] = plant.end_effector()[:, 0]
-    return World(rows, {"plant": Part((plant_stage(plant, rig.electronics.control_period),), {})}, False)
+    return World(rows, {"plant": Part((plant_stage(plant.lane_parameters, plant.memory, period),), {})}, False)
 
 
 def image_of(rows: Array | None, parts: Mapping[str, Part], functions: Sequence[str]) -> Words:

@@ -291,7 +291,7 @@ class Simulation:
         return {
             "actuation": self._acts(),
             "board": self._board(),
-            "plant": [plant_stage(self.plant, self.period)],
+            "plant": [plant_stage(self.plant.lane_parameters, self.plant.memory, self.period)],
             "target": [self._compiled(self.trajectory, "sample", self._follow)],
             "setpoints": [self._compiled(self.stiffness, "sample", self._set)],
             "hand": [self._compiled(self.user_force, "force", self._push)],
@@ -318,10 +318,8 @@ class Simulation:
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
         """The plant by itself, and the actuation by itself: to be timed, on a copy."""
-        lanes, places = self.plant.num_envs, self._places()
-        return MixedLoop(lanes, *places, [plant_stage(self.plant, self.period)]), MixedLoop(
-            lanes, *places, [*self._acts(), *self._board()]
-        )
+        lanes, places, parts = self.plant.num_envs, self._places(), self.parts()
+        return MixedLoop(lanes, *places, parts["plant"]), MixedLoop(lanes, *places, [*parts["actuation"], *parts["board"]])
 
     @staticmethod
     def _compiled(part: Any, method: str, instead: Part) -> Part:

@@ -25,13 +25,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 PolicyFunction = Callable[[NDArray[np.float32]], NDArray[np.floating]]
-"""Actions (N, ``settings.size``) in [-1, 1] for observations (N, ``observation_size(settings)``). One that remembers also has
-``reset(lanes)``, which forgets the past of all lanes (None) or of those where the mask (N,) is True."""
-
-
-def observation_size(settings: ResidualSettings) -> int:
-    """Length of what a policy with these settings sees."""
-    return len(observation_names(settings))
+"""Actions (N, ``settings.size``) in [-1, 1] for observations (N, D), which ``observation_names(settings)`` describes.
+One that remembers also has ``reset(lanes)``, which forgets the past of all lanes (None) or of those where the mask (N,) is
+True."""
 
 
 class ResidualController(ResidualLaw):
@@ -92,12 +88,8 @@ class ResidualController(ResidualLaw):
         super().prepare(lanes, sampled)
 
     def policy_stages(self) -> list[Stage]:
-        """The policy as stages of a closed loop, once prepared."""
-        return list(self._before)
-
-    def stages(self) -> list[Stage]:
-        """Policy and law as stages of a closed loop, with what they remember."""
-        return [*self._before, *super().stages()]
+        """The policy, and before it what it must not see."""
+        return self._before
 
     def command(self, measurement: Measurement, reference: Reference, *told: Any) -> Array:
         """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
@@ -121,7 +113,7 @@ class ResidualController(ResidualLaw):
 def _stored(place: str | Path) -> tuple[PolicyNetwork, ResidualSettings]:
     """The network of a folder and its settings."""
     stored = load_policy(best_policy(place))
-    network, seen, said = stored.network, observation_size(stored.settings), stored.settings.size
+    network, seen, said = stored.network, len(observation_names(stored.settings)), stored.settings.size
     if (network.inputs, network.outputs) != (seen, said):
         raise ValueError(
             f"policy = {str(place)!r} maps {network.inputs} to {network.outputs} numbers; allowed: {seen} to {said}"

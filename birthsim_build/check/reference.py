@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from baselines.controller import Controller
 from baselines.registry import make_controller
 from baselines.staged import Driving, driving
 from birthsim_build.layout import LAYOUT
@@ -23,12 +22,6 @@ SHARED = [*range(IMPACT), *range(IMPACT + 2, WORLD + ASKED), *range(WORLD + OPEN
 """Rows that are compared: all of the world and of what is measured, asked for and commanded. Impacts begin anew in Python."""
 
 CHAMBERS = ("P1", "N1", "P2", "N2")
-
-
-def make_law(controller: str, rig: Parameters | None = None) -> Controller:
-    """A controller by the name that it has in a bundle, which believes in ``rig`` (default: the paper's)."""
-    kind, _, policy = controller.partition(":")
-    return make_controller(kind, rig or Parameters(), **({"policy": policy} if policy else {}))
 
 
 class OneValve(Driving):
@@ -51,7 +44,7 @@ def whole_rows(
     """
 
     def drives(name: str) -> Driving:
-        law = make_law(name, rig)
+        law = make_controller(name, rig or Parameters())
         return OneValve(law, name, {}) if valves == "one_valve" else driving(law, name)
 
     period = Parameters().electronics.control_period

@@ -8,12 +8,13 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, Configured, Env, RigFile, Seed, Sensors
 from birthsim_build.bundle import identifier, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.fmu.archive import BINARIES, VERSIONS, write_fmu
 from birthsim_build.fmu.model import fmu_model
-from birthsim_build.loops import RESIDUAL, law_part, scenario_world
+from birthsim_build.loops import law_part, scenario_world
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
@@ -56,7 +57,7 @@ def main(settings: Settings) -> None:
     rig = load_parameters(settings.parameters)
     world = scenario_world(settings.env, settings.sensors, rig, settings.seed)
     name = RESIDUAL if settings.policy else settings.controller
-    law = law_part(name, rig, world.sampled, settings.policy) if name else None
+    law = law_part(f"{name}:{settings.policy}" if settings.policy else name, rig, world.sampled) if name else None
     moved = "setpoints" if law else "spool openings"
     about = f"BirthSIM ({name or 'the plant'}, {settings.sensors} sensors), moved by {moved} and the force of a hand"
     model = fmu_model(f"BirthSIM_{identifier(name or 'plant')}", about, world, law, rig)

@@ -10,7 +10,6 @@ from birthsim_env.physics.compiled.lanes import STATES, Array
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, row, rows
 from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.options import SCRATCH
-from birthsim_env.physics.plant import Plant
 
 
 class Clock(Numbers):
@@ -77,13 +76,15 @@ def _optional_plant(world: World, seen: Seen, memory: FurtherStates, clock: Cloc
     return 0
 
 
-def plant_stage(plant: Plant, period: float) -> Stage:
-    """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand."""
+def plant_stage(rigs: Array, memory: Array, period: float) -> Stage:
+    """The plant over one control ``period``, s, under the openings that are commanded and the force of the hand.
+
+    ``rigs`` (PARAMETERS, N) and ``memory`` are ``lane_parameters`` and ``memory`` of a ``Plant``.
+    """
     clock = Clock.numbers(period=period, steps=dynamics.steps_in(period))
-    if not options.are_off(plant.lane_parameters):
-        return Stage(_optional_plant, clock, plant.memory)
-    perfect = spools.are_perfect(plant.lane_parameters)
-    return Stage(_plant, clock) if perfect else Stage(_worn_plant, clock, plant.inner_commands)
+    if not options.are_off(rigs):
+        return Stage(_optional_plant, clock, memory)
+    return Stage(_plant, clock) if spools.are_perfect(rigs) else Stage(_worn_plant, clock, memory[: InnerCommands.size])
 
 
 class Before(Rows):

@@ -176,7 +176,7 @@ def derivatives(state: Array, command: Array, force: Array, parameters: Array, r
         store(dx, first, n, rates)
 
 
-@kernel
+@helper
 def mass_flows(state: Array, parameters: Array, flows: Array) -> None:
     """Writes the flows of chambers P1, N1, P2, N2: rows 0-3 from the supply, rows 4-7 to the atmosphere, kg/s, (8, N)."""
     for i in range(state.shape[1]):

@@ -180,13 +180,13 @@ def port_motion(state: Array, further: Array, p: Array, motion: Array) -> None:
                 motion[row, i] = further[HANDLE + row, i]
 
 
-def at_rest(state: Array, parameters: Array) -> Array:
-    """Further rows (FURTHER, N) with which a state (18, N) begins, its supply that of the source.
+@helper
+def rest(state: Array, parameters: Array, further: Array) -> None:
+    """Writes the ``further`` rows (FURTHER, N) with which a state (18, N) begins, its supply that of the source.
 
     The handle moves with the linkage, unbent, and what passes the valves passes the tubes.
     """
-    further = np.empty((FURTHER, state.shape[1]))
-    further[RESERVOIR] = parameters[at.SOURCE]
+    for i in range(state.shape[1]):
+        further[RESERVOIR, i] = parameters[at.SOURCE, i]
     end_effector_motion(state, parameters, further[HANDLE:FLOWS])
     dynamics.mass_flows(state, parameters, further[FLOWS:])
-    return further

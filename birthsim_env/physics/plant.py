@@ -64,7 +64,9 @@ class Plant:
             own = self.lane_parameters.take(lanes, axis=1)
             own[at.SUPPLY], own[at.INVERSE_SUPPLY] = own[at.SOURCE], 1.0 / own[at.SOURCE]
             self.lane_parameters[:, lanes] = own
-            self.memory[4:, lanes] = options.at_rest(self._state.take(lanes, axis=1), own)
+            further = np.empty((options.FURTHER, len(lanes)))
+            options.rest(self._state.take(lanes, axis=1), own, further)
+            self.memory[4:, lanes] = further
 
     @property
     def inner_commands(self) -> Array:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from baselines.about import RESIDUAL
 from baselines.commands.shared import run
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import add_address, need_server, serve
 from birthsim_live.logs.recording import load_recording
 from birthsim_live.rig.folder import Packed, packed_page, write_page
-from birthsim_live.rig.settings import RESIDUAL
 from birthsim_live.server.addresses import listen
 
 

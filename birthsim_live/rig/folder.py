@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from baselines.about import RESIDUAL
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.settings import RESIDUAL
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 """HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the

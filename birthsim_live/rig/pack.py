@@ -11,26 +11,35 @@ from typing import Any
 import numpy as np
 
 import birthsim_env
+from baselines.about import RESIDUAL
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.controller import BacksteppingController
+from baselines.controller import Controller
 from baselines.registry import LISTED, UNCONTROLLED, make_controller
 from baselines.rivals.tracking import TrackingController
 from baselines.staged import StagedController
 from birthsim_build.faces.module import Store
 from birthsim_build.image import INPUT_MEMORY, Part, function_name
-from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, staged_part
+from birthsim_build.loops import CLOCK, INPUTS, ORDER, PAIRED_VALVES, is_compiled, staged_part
 from birthsim_build.stages import Period, enter_sensors, leave_sensors
 from birthsim_env.info import Info
 from birthsim_env.loop.rows import ASKED, WORLD
 from birthsim_env.loop.stage import Stage
-from birthsim_env.loop.world import plant_stage
+from birthsim_env.loop.world import FurtherStates, plant_stage
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, Parts
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics import options
-from birthsim_env.physics.compiled.lanes import PRESSURES, STATE_NAMES, TEMPERATURES, parameter_array, parameter_column
-from birthsim_env.physics.plant import Plant
+from birthsim_env.physics.compiled.lanes import (
+    DEADBAND,
+    PRESSURES,
+    STATE_NAMES,
+    TEMPERATURES,
+    TUBE_RATE,
+    Array,
+    parameter_array,
+    parameter_column,
+)
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
@@ -38,7 +47,7 @@ from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
 from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.settings import OPENS, RESIDUAL, controller_choice
+from birthsim_live.rig.settings import OPENS, controller_choice
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""
@@ -71,31 +80,38 @@ def pack(
     controllers that are listed, those that are compiled; for code that has ``functions``, without them for code that is to be
     built.
 
-    Raises ``ValueError`` for a rig with options of ``physics.options``, and for one that cannot do what the page opens with.
+    Raises ``ValueError`` for a rig that cannot do what the page opens with.
     """
-    if not options.are_off(parameter_array(rig, 1)):
-        raise ValueError("the rig has tubes, a weak supply or a soft structure; allowed in the page: none")
+    column = parameter_array(rig, 1)
+
+    def plant_part(rigs: Array) -> Part:
+        return _part(plant_stage(rigs, np.zeros((FurtherStates.size, 1)), period))
+
     names = [*LISTED, *UNCONTROLLED, *(f"{RESIDUAL}:{one}" for one in policies), *others]
     period = rig.electronics.control_period
-    laws = {name: parts for name in names if (parts := controller(name, rig, functions)) is not None}
-    controllers = [controller_choice(name) for name in names if name in laws or name not in others]
+    laws = {name: law for name in names if is_compiled(law := _made(name, rig))}
+    parts = {name: controller_parts(law) for name, law in laws.items()}
+    if functions is not None:
+        parts = {name: own for name, own in parts.items() if _needed(own) <= set(functions)}
+    controllers = [controller_choice(name) for name in names if name in parts or name not in others]
     for one in controllers:
-        if one["name"] not in laws:
+        if one["name"] not in parts:
             one["missing"] = WITHOUT
     tree = {
         "rig": {
-            "plant": _part(plant_stage(Plant(rig), period)), "clock": CLOCK, "inputs": INPUTS,
-            "start": _part(Stage(stages.begin, parameter_column(rig))),
+            "plant": plant_part(column), "clock": CLOCK, "inputs": INPUTS,
+            "start": _part(Stage(stages.begin, column[:, 0], np.zeros((FurtherStates.size, 1)))),
             "show": _part(Stage(stages.show, memory=np.zeros((stages.SHOWN, 1)))),
         },
         "valves": {"two_valves": {}, "one_valve": {"valves": PAIRED_VALVES}},
         "scenarios": {name: scenario(name) for name in SCENARIOS},
         "sensors": {name: sensors(name, rig) for name in SENSORS},
-        "controllers": {name: own for name, (own, _) in laws.items()},
+        "controllers": parts,
     }  # fmt: skip
-    if functions is None:  # those of valves that open imperfectly too
-        worn = plant_stage(Plant(rig.replace({"valves.deadband": 0.01})), period)
-        functions = sorted({function_name(stage) for part in (*_all(tree), _part(worn)) for stage in part.stages})
+    if functions is None:  # those of worn valves and of tubes too
+        worn, tubes = column.copy(), column.copy()
+        worn[DEADBAND], tubes[TUBE_RATE] = 0.01, 100.0
+        functions = sorted(_needed([tree, plant_part(worn), plant_part(tubes)]))
     store, hello = Store(functions), greeting(rig, controllers)
     for one in hello["choices"]["scenario"]:
         if problem := _problem(one["name"], rig):
@@ -122,7 +138,7 @@ def pack(
             name: {"duration": one.duration, "path": path_of(begun(name), one.duration)} for name, one in SCENARIOS.items()
         },
         "sampled": {name: kind.sampled for name, kind in SENSORS.items()},
-        "damped": {name: damped for name, (_, damped) in laws.items()},
+        "damped": {name: isinstance(laws[name], DAMPED) for name in parts},
         "numbers": NUMBERS,
         "header": {
             "format": FORMAT, "birthsim": birthsim_env.__version__, "rig": rig.to_dict(), "columns": list(FIELDS),
@@ -192,32 +208,34 @@ def sensors(name: str, rig: Parameters) -> list[dict[str, Part]]:
     return episodes
 
 
-def controller(
-    name: str, rig: Parameters, functions: Sequence[str] | None
-) -> tuple[dict[str, dict[str, Part]], bool] | None:  # fmt: skip
-    """The parts of a controller whose law is compiled, for exact and for sampled positions, and whether it can be told to damp
-    more; None where it is not compiled, or needs others than the ``functions`` of the code."""
-    kinds = {"exact": False, "sampled": True}
-    if name.startswith(f"{RESIDUAL}:"):
-        try:
-            from birthsim_build.residual import residual_parts
-        except ImportError as error:
-            raise ValueError(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-        both = {kind: residual_parts(rig, flag, name.partition(":")[2]) for kind, flag in kinds.items()}
-        return {kind: dict(zip(("policy", "law"), own, strict=True)) for kind, own in both.items()}, False
+def _made(name: str, rig: Parameters) -> Controller | None:
+    """The controller ``name``; None where it cannot be made. ``ValueError`` for a policy that is none."""
     try:
-        law = make_controller(name, rig)
+        return make_controller(name, rig)
     except (ImportError, ValueError):
+        if name.startswith(RESIDUAL):
+            raise
         return None
-    if not isinstance(law, StagedController) or not law.is_compiled():
-        return None
-    parts = {kind: {"law": staged_part(law, flag)} for kind, flag in kinds.items()}
-    needed = {function_name(stage) for part in _all(parts) for stage in part.stages}
-    return (parts, isinstance(law, DAMPED)) if functions is None or needed <= set(functions) else None
+
+
+def controller_parts(law: StagedController) -> dict[str, dict[str, Part]]:
+    """The parts of a compiled controller, for exact and for sampled positions."""
+    parts = {}
+    for kind, sampled in (("exact", False), ("sampled", True)):
+        whole = staged_part(law, sampled)
+        count = len(law.policy_stages())
+        policy = {"policy": Part(whole.stages[:count], whole.rows)} if count else {}
+        parts[kind] = {**policy, "law": Part(whole.stages[count:], {} if count else whole.rows)}
+    return parts
 
 
 def _part(*own: Stage) -> Part:
     return Part(own, {})
+
+
+def _needed(tree: Any) -> set[str]:
+    """Names of the functions that parts need."""
+    return {function_name(stage) for part in _all(tree) for stage in part.stages}
 
 
 def _all(tree: Any) -> Iterator[Part]:

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines import about
+from baselines.about import CONTROLLERS, RESIDUAL
 from birthsim_env.physics.rig.parameters import Parameters
-
-RESIDUAL = "residual"
-"""Controller whose policies are choices of their own: ``residual:circle``."""
 
 NOTHING = "nothing"
 """What a rig is compared with where no second one is beside it."""
@@ -69,5 +66,5 @@ def controller_choice(name: str) -> dict[str, str]:
     return {
         "name": name,
         "title": Path(name).name.replace("-", " "),
-        "about": about.CONTROLLERS.get(name, "A controller of your own."),
+        "about": CONTROLLERS.get(name, "A controller of your own."),
     }

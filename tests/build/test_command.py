@@ -58,7 +58,7 @@ import birthsim_build.commands.build, birthsim_build.commands.fmu
 from birthsim_build.loops import law_part
 from birthsim_env import Parameters
 print(len(law_part("pid", Parameters(), False).stages))
-law_part("residual", Parameters(), False)
+law_part("residual:circle", Parameters(), False)
 """
 
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.policy.controller import observation_size
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
+from agents.residual.law import observation_names
 from agents.residual.settings import ResidualSettings
 
 ENVIRONMENT = "BirthSIM/CircleResidual-v1"
 SETTINGS = ResidualSettings("backstepping-weight", authority=33.0, time_constant=0.04, policy_period=0.02)
-INPUTS = observation_size(SETTINGS)
+INPUTS = len(observation_names(SETTINGS))
 
 
 def network(inputs=INPUTS, outputs=2, hidden=(16, 8), seed=0, squashed=False, cells=0) -> PolicyNetwork:

@@ -15,11 +15,10 @@ import torch
 
 import agents
 from agents.policy import onnx_export
-from agents.policy.controller import observation_size
 from agents.policy.files import Policy
 from agents.policy.network import PolicyNetwork
-from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx, observation_names
-from agents.residual.law import action_names
+from agents.policy.onnx_export import FORMAT, TOLERANCE, PolicyModule, export_onnx
+from agents.residual.law import action_names, observation_names
 from agents.residual.settings import ResidualSettings
 
 ROOT = Path(__file__).parent.parent.parent
@@ -30,7 +29,7 @@ assert agents  # importing it registers the residual environments
 
 def network(settings=SETTINGS, squashed=False, hidden=(64, 64), seed=0, cells=0) -> PolicyNetwork:
     rng = np.random.default_rng(seed)
-    inputs = observation_size(settings)
+    inputs = len(observation_names(settings))
 
     def layer(m, n):
         return (rng.normal(size=(n, m)) / np.sqrt(m)).astype(np.float32), rng.normal(size=n, scale=0.1).astype(np.float32)

@@ -13,8 +13,9 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import load
 
-from agents.policy.controller import ResidualController, observation_size
+from agents.policy.controller import ResidualController
 from agents.policy.files import FORMAT, WEIGHTS, Policy, load_policy, save_policy
+from agents.residual.law import observation_names
 from agents.residual.settings import ResidualSettings
 from tests.residual.policies import ENVIRONMENT, INPUTS, POLICY, REMEMBERS, SETTINGS, network
 
@@ -66,7 +67,7 @@ def test_a_squashed_network_comes_back_squashed(tmp_path):
     ],
 )
 def test_whatever_a_residual_may_do_comes_back(tmp_path, settings):
-    inputs = observation_size(settings)
+    inputs = len(observation_names(settings))
     save_policy(Policy(network(inputs, settings.size), ENVIRONMENT, settings, {}), tmp_path)
     assert load_policy(tmp_path).settings == settings
     ResidualController(policy=tmp_path)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import agents
-from agents.policy.controller import ResidualController, observation_size
+from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
+from agents.residual.law import observation_names
 from agents.residual.settings import ResidualSettings
 from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
@@ -47,7 +48,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
     # Valves that a policy drives at random soon slam the pistons into their stops: gently, then.
     reach = 0.05 if settings.law == "none" else 0.5
     squashed, cells = settings.impedance == "variable", 0 if settings.force_sensor else 7
-    network = random_network(observation_size(settings), settings.size, reach, squashed, cells)
+    network = random_network(len(observation_names(settings)), settings.size, reach, squashed, cells)
     save_policy(Policy(network, CIRCLE, settings, {}), tmp_path)
     controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5
     arguments = {"sensors": sensors, "randomize": True, "num_envs": lanes}
@@ -78,7 +79,7 @@ def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_pa
 def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
     rig = Parameters().replace({"mechanics.mass": 4.0, "geometry.d3": 0.36})
     settings = ResidualSettings()
-    network = random_network(observation_size(settings), 2)
+    network = random_network(len(observation_names(settings)), 2)
     save_policy(Policy(network, PROBE, settings, {}), tmp_path)
     inside = gymnasium.make_vec(PROBE, num_envs=2, parameters=rig)
     observation, _ = inside.reset(seed=1)
@@ -98,7 +99,7 @@ def test_the_controller_believes_in_the_rig_that_it_is_given(tmp_path):
 
 def network(bias) -> PolicyNetwork:
     """A policy whose actions follow the tracking error, plus a constant."""
-    inputs = observation_size(ResidualSettings())
+    inputs = len(observation_names(ResidualSettings()))
     weight = np.zeros((2, inputs), np.float32)
     weight[0, 1], weight[1, 0] = 0.5, -0.5
     return PolicyNetwork(np.zeros(inputs), np.ones(inputs), ((weight, np.array(bias, np.float32)),))

@@ -12,12 +12,12 @@ import pytest
 from scipy import stats
 
 from agents.commands import evaluate as command
-from agents.policy.controller import observation_size
 from agents.policy.files import load_policy, save_policy
 from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
 from agents.reports import inspection
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
 from agents.reports.learning_curves import learning_curves, over_seeds
+from agents.residual.law import observation_names
 from baselines.bench.evaluation import Evaluation, merged
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import crossed_interval, interquartile_mean
@@ -119,7 +119,7 @@ def test_shipped_policies_load_fit_and_are_small(name):
     assert [place.name for place in places] == [f"seed_{k}" for k in range(len(places))]
     for place in places:
         policy = load_policy(place)
-        assert policy.network.inputs == observation_size(policy.settings)
+        assert policy.network.inputs == len(observation_names(policy.settings))
         assert sum(path.stat().st_size for path in place.iterdir()) < 60_000
         training = json.loads((place / "training.json").read_text(encoding="utf-8"))
         assert training["policy"]["pooled_mm"] == policy.training["reached"]["pooled_mm"]

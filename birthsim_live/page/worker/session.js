@@ -112,8 +112,7 @@ export class Session {
     const { loop, settings } = this;
     this.episode = 0;
     this.lost = null;
-    this.put(["plant"], this.pack.parts.rig); // worn valves remember
-    this.putScenario();
+        this.putScenario();
     this.putSensors();
     this.describeRig();
     for (const name of ["tick", "time", "begins", "sensors_begin"]) loop.set(name, 0);
@@ -123,7 +122,9 @@ export class Session {
     loop.set("pointer_stiffness", settings.drag_stiffness);
     this.choose(chosen(settings));
     this.hands.act(this);
-    for (const parts of [START, ASK, MEASURE]) loop.advance(1, parts);
+    loop.advance(1, START);
+    loop.memory("plant").set(loop.memory("start").subarray(0, loop.memory("plant").length));
+    for (const parts of [ASK, MEASURE]) loop.advance(1, parts);
     this.measured();
     this.putLaw();
     this.paths += 1;

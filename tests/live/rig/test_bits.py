@@ -27,6 +27,7 @@ OFFERED = [
     if "missing" not in one and not one["name"].startswith("limited")
 ]
 DEFAULT, WORN = Parameters(), Parameters().replace({"valves.deadband": 0.02, "valves.hysteresis": 0.01, "mechanics.mass": 2.7})
+SOFT = Parameters().replace({"chambers.tube_length": 1.0, "air.supply_conductance": 2e-8, "mechanics.mode_frequency": 30.0})
 FEW = {"backstepping", "admittance-backstepping", "residual:circle", "lqr"}
 
 
@@ -147,6 +148,7 @@ def test_both_rigs_are_what_each_would_be_alone(page, one, other):
 
 
 @pytest.mark.slow
-def test_a_rig_of_ones_own_with_worn_valves(tmp_path):
-    write_page(tmp_path / "page", packed_page(WORN))
-    check(tmp_path / "page", (on_the_circle("admittance-backstepping", "lab"), PULL), rig=WORN)
+@pytest.mark.parametrize("rig", [WORN, SOFT], ids=["worn valves", "tubes, a weak supply and a soft structure"])
+def test_a_rig_of_ones_own(tmp_path, rig):
+    write_page(tmp_path / "page", packed_page(rig))
+    check(tmp_path / "page", (on_the_circle("admittance-backstepping", "lab"), PULL), rig=rig)
