@@ -71,7 +71,7 @@ COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
 
 
 def feedforward_rows(
-    lanes: int, force: Array | None, rate: Array | None, factor: Array | None = None, taken: Sequence[str] = COMMAND_OPTIONS
+    lanes: int, force: Array | None = None, rate: Array | None = None, factor: Array | None = None, *, taken: Sequence[str]
 ) -> Array:
     """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
     rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""

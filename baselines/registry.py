@@ -117,28 +117,29 @@ def bare_name(name: str) -> str:
 
 
 def _factory(name: str) -> Factory:
-    """What makes the controller ``name``, which has no options; ``ValueError`` names what is unknown and what there is."""
-    if name in CONTROLLERS or name in UNCONTROLLED:
-        return (CONTROLLERS | UNCONTROLLED)[name]
+    """What makes the controller ``name`` without its options; ``ValueError`` names what is unknown and what there is."""
+    plain = bare_name(name)
+    if plain in CONTROLLERS or plain in UNCONTROLLED:
+        return (CONTROLLERS | UNCONTROLLED)[plain]
     for point in entry_points(group=ENTRY_POINTS):
-        if point.name == name:
+        if point.name == plain:
             try:
                 factory: Factory = point.load()
             except ImportError as error:
-                needs = "; a policy needs the extra: pip install 'birthsim[agents]'" if name == RESIDUAL else ""
+                needs = "; a policy needs the extra: pip install 'birthsim[agents]'" if plain == RESIDUAL else ""
                 raise ValueError(f"{error}{needs}") from error
             return factory
-    if name.rpartition(":")[0].endswith(".py"):
-        return partial(_own, name, from_file("controller", name))
+    if plain.rpartition(":")[0].endswith(".py"):
+        return partial(_own, plain, from_file("controller", plain))
     names = controller_names()
-    asked = near(name, names)
+    asked = near(plain, names)
     allowed = "a registered name" if asked else ", ".join(names)
     raise ValueError(f"controller = {shown(name)}{asked}; allowed: {allowed}, or path/to/file.py:Class")
 
 
 def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
-    factory: Any = _factory(bare_name(name))
+    factory: Any = _factory(name)
     kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
     parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
     named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
@@ -163,7 +164,7 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
             raise ValueError(
                 f"controller = {shown(name)}: {option} = {shown(value)} is unknown; allowed for {plain}: {allowed}"
             )
-    law = _factory(plain)(parameters, **{**named, **options})
+    law = _factory(name)(parameters, **{**named, **options})
     return PortLimiter(law, parameters) if name.startswith(LIMITED) else law
 
 

@@ -131,9 +131,12 @@ class StagedController:
         return self._openings.copy()
 
     def run_stages(
-        self, measurement: Measurement, reference: Reference, told: tuple[Array | None, Array | None, Array | None]
+        self, measurement: Measurement, reference: Reference, told: Sequence[Array | None] = (), commanded: Array | None = None
     ) -> int:
-        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve."""
+        """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve.
+
+        What is ``commanded`` (4, N) already, the stages find as openings.
+        """
         lanes = lanes_of(measurement, reference)
         self.prepare(lanes, measurement.sampled)
         self.require_acceleration(measurement)
@@ -144,9 +147,11 @@ class StagedController:
             unchanged.flags.writeable = False
             placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, self.COMMAND_OPTIONS)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, taken=self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = reference.rows
+        if commanded is not None:
+            self._openings[:] = commanded
         return self._loop.run()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
@@ -205,7 +210,7 @@ class CompiledDriving(Driving):
         if self.controller.asks:
             return own
         force, rate, factor = map(self._told.get, COMMAND_OPTIONS)
-        return [(feedforward_rows(lanes, force, rate, factor, self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
+        return [(feedforward_rows(lanes, force, rate, factor, taken=self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
         """Raise the error of the law."""

@@ -47,7 +47,7 @@ class Informed(StagedController):
 
     def update(self, measurement: Measurement, reference: Reference) -> None:
         """Take one control period's signals over N lanes. Raises ``ValueError`` as ``command`` does."""
-        if self.run_stages(measurement, reference, (None, None, None)):
+        if self.run_stages(measurement, reference):
             self.explain(measurement, reference)
 
     @property

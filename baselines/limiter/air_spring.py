@@ -13,16 +13,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from baselines.valve_inverse import openings_for_flows
-from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerPiston, Reference
-from birthsim_env.physics import geometry, mechanics
-from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import pistons_at
-from birthsim_env.physics.rig.parameters import Parameters
+from baselines.valve_inverse import driving_flows
+from birthsim_env.loop.rows import Signals
+from birthsim_env.loop.signals import Joints
+from birthsim_env.physics import geometry, mechanics, valves
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array, Rig
 
 RETURN = 0.02
 """s, time constant with which the air comes back; assumed, some times the valves' own."""
@@ -30,50 +26,38 @@ RETURN = 0.02
 MEMORY = 1.0
 """s, assumed: longer than a period of the softest oscillation, shorter than a rig's load changes."""
 
-_OUTWARD = np.array([[1.0], [-1.0], [1.0], [-1.0]])
-"""Sign of a chamber's force, and of its length's growth with the piston's position, of P1, N1, P2, N2."""
 
+@helper
+def passive_openings(
+    forces: Array, rate: float, pressures: Array, hand: Array, here: Joints, there: Joints, seen: Signals, p: Rig,
+    opening: Array, i: int,
+) -> None:  # fmt: skip
+    """Writes the spool openings (4, N) of lane ``i`` at the signals of now.
 
-@kernel
-def _along(force: InPlane, joints: Joints, p: Rig, along: PerPiston) -> None:
-    for i in range(force.x.shape[0]):
-        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
-            joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
-            p.sin_gamma3, p.cos_gamma3,
-        )  # fmt: skip
-        along.first[i] = mechanics.user_force1(force.x[i], force.y[i], kappa, sine, cosine)
-        along.second[i] = mechanics.user_force2(force.x[i], force.y[i], sine, cosine)
-
-
-class AirSpring:
-    """N lanes of a rig with ``parameters``; ``openings`` is called once per control period."""
-
-    def __init__(self, parameters: Parameters, lanes: int) -> None:
-        p = self._p = parameter_column(parameters)
-        self._rate = -math.expm1(-parameters.electronics.control_period / MEMORY)
-        self._areas = p[[at.AREA_P1, at.AREA_N1, at.AREA_P2, at.AREA_N2], None]
-        self._middle = p[[at.HALF_L1, at.HALF_L1, at.HALF_L2, at.HALF_L2], None] + p[at.DEAD_VOLUME] / self._areas
-        self._forces: Array = np.full((4, lanes), np.nan)
-
-    def reset(self, lanes: Mask) -> None:
-        """Forget the balance of the lanes of a mask (N,): what comes next counts as one."""
-        self._forces[:, lanes] = np.nan
-
-    def openings(self, position: Array, pressures: Array, hand: Array, measurement: Measurement, reference: Reference) -> Array:
-        """Spool openings (4, N) at the signals of now; ``position`` (2, N), m, was taken when the ``pressures`` were (4, N),
-        Pa, and the ``hand``'s force (2, N), N."""
-        (joints, here), (_, there) = self._lengths(position), self._lengths(reference.position)
-        forces, along = pressures * self._areas, np.empty_like(hand)
-        _along(InPlane(np.ascontiguousarray(hand)), joints, Rig(self._p), PerPiston(along))
-        stroke = np.repeat(here[::2] + here[1::2], 2, axis=0)
-        balanced = forces + _OUTWARD * np.repeat(along, 2, axis=0) * here / stroke
-        self._forces = np.where(np.isnan(self._forces), balanced, self._forces)
-        self._forces += self._rate * (balanced - self._forces)
-        flows = (self._forces * there - forces * here) / (RETURN * self._p[at.GAS] * self._p[at.TEMPERATURE])
-        return openings_for_flows(flows, measurement.pressures, self._p)
-
-    def _lengths(self, position: Array) -> tuple[Joints, Array]:
-        """Pistons, which stand still, and lengths of the chambers, dead volumes included, m, (4, N)."""
-        joints = Joints(np.empty((Joints.size, position.shape[1])))
-        pistons_at(np.concatenate([position, np.zeros_like(position)]), Rig(self._p), joints.rows)
-        return joints, self._middle + _OUTWARD * np.repeat(joints.position, 2, axis=0)
+    ``forces`` (4, N), N, of the chambers that balance the weight, NaN before the first, go on by the fraction ``rate``. The
+    ``pressures`` (4, N), Pa, and the ``hand``'s force (2, N), N, are those when the position was taken; the pistons are
+    ``here``, and belong ``there``.
+    """
+    y1, y2 = here.position[0, i], here.position[1, i]
+    _, _, _, _, _, kappa, sine, cosine = geometry.pose(y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)
+    gas_t = RETURN * p.gas * p.temperature
+    for chamber in range(4):
+        first, outward = chamber < 2, 1.0 if chamber % 2 == 0 else -1.0
+        half = p.half_l1 if first else p.half_l2
+        y, wanted = here.position[chamber // 2, i], there.position[chamber // 2, i]
+        area_p, area_n = (p.area_p1, p.area_n1) if first else (p.area_p2, p.area_n2)
+        area, other = (area_p, area_n) if outward > 0.0 else (area_n, area_p)
+        along = (
+            mechanics.user_force1(hand[0, i], hand[1, i], kappa, sine, cosine)
+            if first
+            else mechanics.user_force2(hand[0, i], hand[1, i], sine, cosine)
+        )
+        length, stroke = half + p.dead_volume / area + outward * y, 2.0 * half + p.dead_volume / area + p.dead_volume / other
+        force = pressures[chamber, i] * area
+        balanced = force + outward * along * length / stroke
+        if math.isnan(forces[chamber, i]):
+            forces[chamber, i] = balanced
+        forces[chamber, i] += rate * (balanced - forces[chamber, i])
+        flow = (forces[chamber, i] * (half + p.dead_volume / area + outward * wanted) - force * length) / gas_t
+        fill, drain = driving_flows(seen.pressure[chamber, i], p)
+        opening[chamber, i] = valves.opening_for_flow(flow, fill, drain, p.conductance, p.leakage)

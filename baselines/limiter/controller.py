@@ -28,12 +28,18 @@ import numpy as np
 
 from baselines.controller import Controller, checked_command, lanes_of
 from baselines.impedance import Impedance, declared_by
-from baselines.limiter.air_spring import AirSpring
-from baselines.limiter.past import Past
-from baselines.limiter.port_energy import PortEnergy
-from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
-from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
-from birthsim_env.physics.inverse_kinematics import pistons_at
+from baselines.limiter import air_spring
+from baselines.limiter.past import recall, slots_of
+from baselines.limiter.port_energy import Energy, Work, count_work
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Joints, Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.stage import Stage, block, scratch
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import Array, Rig
+from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows
+from birthsim_env.physics.inverse_kinematics import piston_motion
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.rig.values import checked_number
 
@@ -50,104 +56,217 @@ FULL = 2.0
 """The brake is on in full at so many times the speed limit."""
 
 
-class PortLimiter:
-    """A law of N lanes with an energy tank and a speed limit at the port.
+SIGNALS = 6
+"""Pressures and the hand's force, which are kept for late positions."""
+
+
+class Limits(Numbers):
+    """Constants of the stage."""
+
+    capacity = number("J", "what the law may give beyond what a spring would; infinite: no tank")
+    speed = number("m/s", "of the end effector relative to its target")
+    period = number("s", "control period")
+    slots = number("1", "control periods that are kept")
+    lasting = number("1", "fraction of a low authority that lowers its ceiling in a period")
+    recovery = number("1", "fraction of the ceiling that comes back")
+    back = number("1", "fraction of the authority that comes back")
+    balance = number("1", "fraction of the air spring's balance that is renewed")
+    rig = part(Rig, "the rig as described")
+
+
+class Tank(Rows):
+    """What the stage remembers."""
+
+    authority = row("1", "fraction of the law's openings that is left")
+    ceiling = row("1", "what it comes back to")
+    level = rows(2, "J", "of both tanks")
+    stiffness = rows("Kclx Kcly Kclxy", "N/m", "setpoint a period ago; NaN before the first")
+    energy = part(Energy, "between two positions")
+    forces = rows(4, "N", "of chambers that balance the weight, averaged; NaN before the first")
+    newest = row("1", "the last of the periods that are kept")
+    past = rows(0, "SI", "pressures and the hand's force of the last periods; NaN before the first")
+
+
+@helper
+def _spring_energy(kx: float, ky: float, kxy: float, x: float, y: float) -> float:
+    """J, of a spring [[kx, kxy], [kxy, ky]], N/m, at (x, y), m."""
+    return 0.5 * (kx * x * x + ky * y * y) + kxy * x * y
+
+
+@helper
+def _fill(tank: Tank, work: Work, asked: Reference, about: Limits, i: int) -> None:
+    """Carries tanks and authority of lane ``i`` on by one period, in which the hand did ``work``."""
+    last, (x, y) = tank.stiffness, (tank.energy.offset[0, i], tank.energy.offset[1, i])
+    kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
+    stored = _spring_energy(kx, ky, kxy, x, y)
+    before = stored if math.isnan(last[0, i]) else _spring_energy(last[0, i], last[1, i], last[2, i], x, y)
+    last[0, i], last[1, i], last[2, i] = kx, ky, kxy
+    least = math.inf
+    for count in range(2):
+        # A rig that only stays behind its target gives nothing.
+        done = work.done[count, i]
+        done = max(done, min(done + work.asked[count, i], 0.0)) + ALLOWANCE * work.path[count, i]
+        # Whoever asks for a stiffer spring while it is stretched pays for it.
+        level = min(tank.level[count, i] + done + max(stored - before, 0.0), MARGIN * stored + about.capacity)
+        least, tank.level[count, i] = min(least, level), max(level, 0.0)
+    authority = tank.authority[i]
+    tank.ceiling[i] += about.lasting * (authority - tank.ceiling[i]) + about.recovery * (1.0 - tank.ceiling[i])
+    returned = authority + about.back * max(tank.ceiling[i] - authority, 0.0)
+    tank.authority[i] = min(min(max(least / about.capacity, 0.0), 1.0), returned)
+
+
+@helper
+def _brake(seen: Seen, speed: float, moving: Array, i: int) -> None:
+    """Drives the valves of lane ``i`` against its pistons, which move at rows 2 and 3 of ``moving`` relative to the target."""
+    x, y = seen.velocity[0, i] - seen.reference.velocity[0, i], seen.velocity[1, i] - seen.reference.velocity[1, i]
+    brake = min(max((math.sqrt(x * x + y * y) / speed - 1.0) / (FULL - 1.0), 0.0), 1.0)
+    for chamber in range(4 if brake > 0.0 else 0):
+        rate = moving[2 + chamber // 2, i]
+        outwards = 1.0 if rate > 0.0 else -1.0 if rate < 0.0 else 0.0
+        against = outwards if chamber % 2 else -outwards
+        seen.opening[chamber, i] = (1.0 - brake) * seen.opening[chamber, i] + brake * against
+
+
+@helper
+def _joints(seen: Seen, about: Limits, still: bool, asked: bool, joints: Array, n: int) -> None:
+    """Writes the pistons (4, n) where the end effector is, or is ``asked`` to be; ``still``, or relative to the target."""
+    motion, target = scratch(4), seen.reference
+    for k in range(2):
+        for i in range(n):
+            motion[k, i] = target.position[k, i] if asked else seen.position[k, i]
+            motion[2 + k, i] = 0.0 if still else seen.velocity[k, i] - target.velocity[k, i]
+    piston_motion(motion, about.rig, joints, n)
+
+
+@kernel
+def limit(world: int, seen: Seen, memory: int, about: Limits, tables: int, lane: int, n: int) -> int:
+    """Bounds the openings of the law before."""
+    slots = int(about.slots)
+    tank = Tank(block(memory, Tank.size + SIGNALS * slots))
+    here, there, signals, told, passive = scratch(4), scratch(4), scratch(SIGNALS), scratch(SIGNALS), scratch(4)
+    work = Work(scratch(Work.size))
+    if about.capacity < math.inf:
+        _joints(seen, about, True, False, here, n)
+        _joints(seen, about, True, True, there, n)
+        for i in range(n):
+            for k in range(SIGNALS):
+                signals[k, i] = seen.pressure[k, i] if k < 4 else seen.user_force[k - 4, i]
+            late = (seen.time[i] - seen.position_time[i]) / about.period
+            recall(tank.past, tank.newest, slots, late, signals, told, i)
+            count_work(tank.energy, seen, told[4:], work, i)
+            _fill(tank, work, seen.reference, about, i)
+            air_spring.passive_openings(
+                tank.forces, about.balance, told, told[4:], Joints(here), Joints(there), seen, about.rig, passive, i
+            )
+            for valve in range(4):
+                own = tank.authority[i]
+                seen.opening[valve, i] = own * seen.opening[valve, i] + (1.0 - own) * passive[valve, i]
+    _joints(seen, about, False, False, here, n)
+    for i in range(n):
+        _brake(seen, about.speed, here, i)
+    return 0
+
+
+class PortLimiter(StagedController):
+    """A law of N lanes with an energy tank and a speed limit at the port: a stage behind those of the law, if it is compiled.
 
     Arguments: the ``law``; the rig ``parameters`` as it believes them; ``capacity``, J, what it may give to a hand beyond what
     a spring would; ``speed``, m/s, of the end effector relative to its target. Infinity switches a limit off. Raises
-    ``ValueError`` for numbers that are not positive. ``authority`` (N,) is the fraction of its openings that a law has now.
+    ``ValueError`` for numbers that are not positive.
     """
 
     def __init__(self, law: Controller, parameters: Parameters, capacity: float = 0.015, speed: float = 0.5) -> None:
         for name, value, unit in (("capacity", capacity, "J"), ("speed", speed, "m/s")):
             if value != math.inf:
                 checked_number(name, value, unit, above=0.0)
-        self.law, self.parameters = law, parameters
-        self._capacity, self._speed = capacity, speed
-        self._p = parameter_column(parameters)
-        self._period = parameters.electronics.control_period
-        self._rates = tuple(-math.expm1(-self._period / lag) for lag in (LASTING, RECOVERY, BACK))
-        self.authority: Array = np.ones(0)
+        super().__init__(parameters)
+        self.law, self._capacity, self._speed = law, capacity, speed
+        self._stages = law if isinstance(law, StagedController) and law.is_compiled() else None
 
     @property
-    def COMMAND_OPTIONS(self) -> tuple[str, ...]:
+    def COMMAND_OPTIONS(self) -> tuple[str, ...]:  # type: ignore[override]
         """What the law's ``command`` takes besides the signals, and this one hands on."""
         return getattr(self.law, "COMMAND_OPTIONS", ())
+
+    @property
+    def asks(self) -> bool:  # type: ignore[override]
+        """As of the law."""
+        return self._stages is not None and self._stages.asks
+
+    @property
+    def authority(self) -> Array:
+        """The fraction of its openings that a law has now, (N,)."""
+        return Tank(self._memories[0]).authority
+
+    def is_compiled(self) -> bool:
+        """Whether the law is."""
+        return self._stages is not None
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """That of the law, which holds where neither limit acts."""
         return declared_by(self.law, reference)
 
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        period = self.parameters.electronics.control_period
+        lasting, recovery, back, balance = (
+            1.0 - exact.number("exp", -period / lag) for lag in (LASTING, RECOVERY, BACK, air_spring.MEMORY)
+        )
+        about = Limits.numbers(
+            capacity=self._capacity, speed=self._speed, period=period, slots=slots_of(period), lasting=lasting,
+            recovery=recovery, back=back, balance=balance, rig=self._p,
+        )  # fmt: skip
+        fresh = Tank.lane(
+            authority=1.0, ceiling=1.0, level=self._capacity, stiffness=np.nan, energy=Energy.lane(stamp=-np.inf),
+            forces=np.nan, past=np.full(SIGNALS * slots_of(period), np.nan),
+        )  # fmt: skip
+        return [LawStage(limit, about, fresh)]
+
+    def prepare(self, lanes: int, sampled: bool) -> None:
+        """Make room for ``lanes`` lanes and one kind of sensors, where that is new; for the law too."""
+        if self._stages is not None:
+            self._stages.prepare(lanes, sampled)
+        super().prepare(lanes, sampled)
+
+    def policy_stages(self) -> list[Stage]:
+        """Those of the law."""
+        return [] if self._stages is None else self._stages.policy_stages()
+
+    def stages(self) -> list[Stage]:
+        """The law's, and the limits."""
+        own = Stage(self._made[0].function, self._made[0].constants, self._memories[0], sees_world=False)
+        return [*([] if self._stages is None else self._stages.stages()), own]
+
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        """Those of the law."""
+        return [] if self._stages is None else self._stages.more_rows(lanes)
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        """Raise the error of the law."""
+        if self._stages is not None:
+            self._stages.explain(measurement, reference)
+
+    def require_acceleration(self, measurement: Measurement) -> None:
+        """Raise that of the law."""
+        if self._stages is not None:
+            self._stages.require_acceleration(measurement)
+
     def reset(self, lanes: Mask | None = None) -> None:
         """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         self.law.reset(lanes)
-        if lanes is None:
-            self.authority = np.ones(0)
-        elif self.authority.size:
-            for part in (self._past, self._energy, self._air):
-                part.reset(lanes)
-            self.authority[lanes], self._ceiling[lanes], self._level[:, lanes] = 1.0, 1.0, self._capacity
+        super().reset(lanes)
 
-    def command(self, measurement: Measurement, reference: Reference, **options: Any) -> Array:
+    def command(self, measurement: Measurement, reference: Reference, *told: Any, **options: Any) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
         ``options`` are those of the law, see ``COMMAND_OPTIONS``. Raises what the law raises; ``ValueError`` for openings
         that are none.
         """
+        if self._stages is not None:
+            return super().command(measurement, reference, *told, **options)
         if measurement.position.ndim == 1:
-            told: dict[str, Any] = {name: np.asarray(given)[..., None] for name, given in options.items()}
-            return self.command(*one_lane(measurement, reference), **told)[:, 0]
-        lanes = lanes_of(measurement, reference)
-        if self.authority.size != lanes:
-            self._past, self._energy, self._air = (
-                Past(self._period, 6, lanes),
-                PortEnergy(lanes),
-                AirSpring(self.parameters, lanes),
-            )
-            self.authority, self._level, self._ceiling = np.ones(lanes), np.full((2, lanes), self._capacity), np.ones(lanes)
-            self._stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
-        openings = checked_command(type(self.law).__name__, self.law.command(measurement, reference, **options), lanes)
-        if not math.isinf(self._capacity):
-            openings = self._bounded(openings, measurement, reference)
-        return self._slowed(openings, measurement, reference)
-
-    def _bounded(self, openings: Array, measurement: Measurement, reference: Reference) -> Array:
-        late, signals = measurement.time - measurement.position_time, [measurement.pressures, measurement.user_force]
-        pressures, force = np.split(self._past.at(late, np.concatenate(signals)), [4])
-        self._count(measurement, reference, force)
-        passive = self._air.openings(measurement.position, pressures, force, measurement, reference)
-        return np.asarray(self.authority * openings + (1.0 - self.authority) * passive)
-
-    def _count(self, measurement: Measurement, reference: Reference, force: Array) -> None:
-        """Carries the tanks and the authority on by one period; ``force`` (2, N), N, is that when the position was taken."""
-        work, asked, path, offset = self._energy.update(measurement, reference, force)
-        # A rig that only stays behind its target gives nothing.
-        work = np.maximum(work, np.minimum(work + asked, 0.0)) + ALLOWANCE * path
-        stiffness = np.stack([*reference.stiffness, reference.stiffness_coupling])
-        stored = _spring_energy(stiffness, offset)
-        # Whoever asks for a stiffer spring while it is stretched pays for it.
-        credit = np.maximum(stored - _spring_energy(self._stiffness, offset), 0.0)
-        self._stiffness = stiffness
-        self._level = np.minimum(self._level + work + credit, MARGIN * stored + self._capacity)
-        least = np.clip(self._level.min(axis=0) / self._capacity, 0.0, 1.0)
-        lasting, returning, back = self._rates
-        self._ceiling += lasting * (self.authority - self._ceiling) + returning * (1.0 - self._ceiling)
-        self.authority = np.minimum(least, self.authority + back * np.maximum(self._ceiling - self.authority, 0.0))
-        self._level = np.maximum(self._level, 0.0)
-
-    def _slowed(self, openings: Array, measurement: Measurement, reference: Reference) -> Array:
-        relative = measurement.velocity - reference.velocity
-        speed = np.sqrt((relative**2).sum(axis=0))
-        brake = np.clip((speed / self._speed - 1.0) / (FULL - 1.0), 0.0, 1.0)
-        if not brake.any():
-            return openings
-        joints = np.empty_like(openings)
-        pistons_at(np.concatenate([measurement.position, relative]), Rig(self._p), joints)
-        against = np.repeat(np.sign(joints[2:]), 2, axis=0) * np.array([-1.0, 1.0, -1.0, 1.0])[:, None]
-        return np.asarray((1.0 - brake) * openings + brake * against)
-
-
-def _spring_energy(stiffness: Array, offset: Array) -> Array:
-    """J, (N,), of springs Kx, Ky, Kxy (3, N), N/m, at ``offset`` (2, N), m."""
-    (kx, ky, kxy), (x, y) = stiffness, offset
-    return np.asarray(0.5 * (kx * x * x + ky * y * y) + kxy * x * y)
+            options = {name: np.asarray(given)[..., None] for name, given in options.items()}
+            return self.command(*one_lane(measurement, reference), **options)[:, 0]
+        openings = self.law.command(measurement, reference, **options)
+        openings = checked_command(type(self.law).__name__, openings, lanes_of(measurement, reference))
+        self.run_stages(measurement, reference, commanded=openings)
+        return self._openings.copy()

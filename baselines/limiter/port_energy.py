@@ -8,44 +8,61 @@ amplitude X; with late forces, a hand that is a mass does. A rig whose oscillati
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from birthsim_env.loop.signals import Mask, Measurement, Reference
+from birthsim_env.loop.rows import Signals
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
 
 LAG = 0.008
 """s, time constant of a low-pass, assumed: two samples of the tracker, whose noise it halves."""
 
 
-class PortEnergy:
-    """N lanes; ``update`` is called once per control period."""
+class Energy(Rows):
+    """What is remembered between two positions."""
 
-    def __init__(self, lanes: int) -> None:
-        self._stamp = np.full(lanes, -np.inf)
-        self._forces: Array = np.zeros((2, 2, lanes))
-        self._offset, self._target = (np.zeros((2, lanes)) for _ in range(2))
+    stamp = row("s", "when the last position was taken; minus infinity before the first")
+    force = rows("x y", "N", "of the hand then")
+    slow = rows("x y", "N", "that force, late by two ``LAG``")
+    offset = rows("x y", "m", "of the position from the target, late by ``LAG``")
+    target = rows("x y", "m", "of the target then")
 
-    def reset(self, lanes: Mask) -> None:
-        """Forget the past of the lanes of a mask (N,)."""
-        self._stamp[lanes] = -np.inf
 
-    def update(self, measurement: Measurement, reference: Reference, force: Array) -> tuple[Array, Array, Array, Array]:
-        """Takes the hand's ``force``, N, (2, N), when the position was taken. Returns what the hand has done since the last
-        call, J, (2, N), in both counts: work about the moving target, and that of a motion as the target's; the target's path
-        times the force, J, (2, N); and x - xt, m, (2, N), late by ``LAG``."""
-        starts = np.isneginf(self._stamp)
-        since = measurement.position_time - self._stamp
-        target = reference.position - (measurement.time - measurement.position_time) * reference.velocity
-        away = measurement.position - target
-        offset = np.where(starts, away, self._offset - np.expm1(-since / LAG) * (away - self._offset))
+class Work(Rows):
+    """What the hand has done since the last period, in both counts."""
+
+    done = rows(2, "J", "about the moving target")
+    asked = rows(2, "J", "in a motion as the target's")
+    path = rows(2, "J", "the force times the target's path")
+
+
+@helper
+def count_work(own: Energy, seen: Signals, force: Array, work: Work, i: int) -> None:
+    """Brings lane ``i`` up to a position at which the hand's ``force`` was (2, N), N."""
+    late, starts = seen.time[i] - seen.position_time[i], own.stamp[i] == -math.inf
+    since, asked = seen.position_time[i] - own.stamp[i], seen.reference
+    new = since > 0.0
+    gate = 1.0 if new and not starts else 0.0
+    offset_gain, force_gain = 1.0 - exact.exp(-since / LAG), 1.0 - exact.exp(-since / (2.0 * LAG))
+    for count in range(2):
+        work.done[count, i] = work.asked[count, i] = work.path[count, i] = 0.0
+    squares = slow_squares = moved_squares = 0.0
+    for k in range(2):
+        target = asked.position[k, i] - late * asked.velocity[k, i]
+        away, moved = seen.position[k, i] - target, target - own.target[k, i]
+        offset = away if starts else own.offset[k, i] + offset_gain * (away - own.offset[k, i])
         # Late by one lag more than the offset.
-        slow = self._forces[1] - np.expm1(-since / (2.0 * LAG)) * (force - self._forces[1])
-        forces = np.stack([force, np.where(starts, force, slow)])
-        new = since > 0.0
-        mean, moved = 0.5 * (forces + self._forces) * (new & ~starts), target - self._target
-        work, asked = (mean * (offset - self._offset)).sum(axis=1), (mean * moved).sum(axis=1)
-        path = np.sqrt((mean**2).sum(axis=1) * (moved**2).sum(axis=0))
-        self._stamp = np.where(new, measurement.position_time, self._stamp)
-        self._forces = np.where(new, forces, self._forces)
-        self._offset, self._target = np.where(new, offset, self._offset), np.where(new, target, self._target)
-        return work, asked, path, self._offset
+        slow = force[k, i] if starts else own.slow[k, i] + force_gain * (force[k, i] - own.slow[k, i])
+        mean, slow_mean = 0.5 * (force[k, i] + own.force[k, i]) * gate, 0.5 * (slow + own.slow[k, i]) * gate
+        work.done[0, i] += mean * (offset - own.offset[k, i])
+        work.done[1, i] += slow_mean * (offset - own.offset[k, i])
+        work.asked[0, i] += mean * moved
+        work.asked[1, i] += slow_mean * moved
+        squares, slow_squares, moved_squares = squares + mean**2, slow_squares + slow_mean**2, moved_squares + moved**2
+        if new:
+            own.force[k, i], own.slow[k, i], own.offset[k, i], own.target[k, i] = force[k, i], slow, offset, target
+    work.path[0, i], work.path[1, i] = math.sqrt(squares * moved_squares), math.sqrt(slow_squares * moved_squares)
+    if new:
+        own.stamp[i] = seen.position_time[i]

@@ -179,11 +179,15 @@ class Rig:
         xs, ys = zip(*points, strict=True)
         return (min(xs), min(ys)), (max(xs), max(ys))
 
+    def workspace(self) -> list[Point]:
+        """Outline of where the end effector can be, m: out along cylinder 2's shortest length, back along its longest."""
+        k2, axes = self.parameters.geometry.k2, [pose.axis2 for pose in self._poses(33)]
+        return [a.at(k2 - self._half2) for a in axes] + [a.at(k2 + self._half2) for a in reversed(axes)]
+
     def draw_ground(self, pen: Pen) -> None:
         """Workspace of the end effector and the column that carries both pivots."""
-        g, axes = self.parameters.geometry, [pose.axis2 for pose in self._poses(33)]
-        edge = [a.at(g.k2 - self._half2) for a in axes] + [a.at(g.k2 + self._half2) for a in reversed(axes)]
-        pen.polygon(edge, (241, 244, 240), (214, 221, 212))
+        g = self.parameters.geometry
+        pen.polygon(self.workspace(), (241, 244, 240), (214, 221, 212))
         column, half = Axis((0.0, 0.0), (math.cos(g.gamma3), math.sin(g.gamma3))), 0.8 * self.barrels[1].half_bore
         pen.polygon(column.box(-2 * half, g.d3 + 2 * half, half), FAINT, (200, 205, 211))
 

@@ -8,19 +8,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from birthsim_build.layout import DRAG_LIMIT
 from birthsim_env.parts.actuation import VALVE_LAYOUTS
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.settings import NOTHING, default_settings, sliders
 from birthsim_live.rig.words import CHOICES, described, words
-
-EDGE = 33
-"""Points along each long edge of the workspace."""
 
 
 def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str, Any]:
@@ -41,7 +35,6 @@ def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str
             **{name: getattr(g, name) for name in ("d3", "d6", "k1", "k2", "gamma3")},
             "half_stroke1": rig.cylinder1.stroke / 2,
             "half_stroke2": rig.cylinder2.stroke / 2,
-            "workspace": workspace(rig),
             **shapes(rig),
         },
         "air": {"supply": air.supply_pressure, "atmosphere": air.atmospheric_pressure},
@@ -51,20 +44,12 @@ def greeting(rig: Parameters, controllers: Sequence[dict[str, str]]) -> dict[str
     }
 
 
-def workspace(rig: Parameters) -> list[list[float]]:
-    """Outline of where the end effector can be, m: out along cylinder 2's shortest length, back along its longest."""
-    y1 = np.linspace(-rig.cylinder1.stroke / 2, rig.cylinder1.stroke / 2, EDGE)
-    half2 = np.full(EDGE, rig.cylinder2.stroke / 2)
-    near, far = end_effector(np.stack([y1, -half2]), rig), end_effector(np.stack([y1, half2]), rig)
-    return [[round(float(x), 6), round(float(y), 6)] for x, y in np.concatenate([near, far[:, ::-1]], axis=1).T]
-
-
 def shapes(rig: Parameters) -> dict[str, Any]:
     """Shapes and dimensions of the frames' drawing, so that the two cannot drift apart.
 
-    ``bounds`` (xmin, ymin, xmax, ymax, m) of all that is drawn in any pose, the ``barrels`` of cylinders 1 and 2 (m), and
-    the fetal ``head``: ``profile`` and ``features`` in units of its ``radius`` (m), first towards the crown, second towards
-    the face.
+    The outline of the ``workspace`` (x, y, m), ``bounds`` (xmin, ymin, xmax, ymax, m) of all that is drawn in any pose, the
+    ``barrels`` of cylinders 1 and 2 (m), and the fetal ``head``: ``profile`` and ``features`` in units of its ``radius`` (m),
+    first towards the crown, second towards the face.
     """
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     from birthsim_env.drawing import rig as drawn
@@ -73,6 +58,7 @@ def shapes(rig: Parameters) -> dict[str, Any]:
     low, high = picture.extent()
     features = [drawn.EYE, drawn.MOUTH, [*drawn.EAR, drawn.EAR[0]]]
     return {
+        "workspace": [[round(x, 6), round(y, 6)] for x, y in picture.workspace()],
         "bounds": [*map(float, low), *map(float, high)],
         "barrels": [asdict(barrel) for barrel in picture.barrels],
         "head": {"radius": picture.head_radius, "profile": drawn.PROFILE, "features": features},

@@ -47,7 +47,8 @@ from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
 from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.settings import OPENS, controller_choice
+from birthsim_live.rig.settings import OPENS
+from birthsim_live.rig.words import controller_choice
 
 EPISODES = 16
 """So many episodes have sensors of their own; then those of the first come again."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from baselines.about import CONTROLLERS, RESIDUAL
 from birthsim_env.physics.rig.parameters import Parameters
 
 NOTHING = "nothing"
@@ -55,16 +53,3 @@ def default_settings(rig: Parameters) -> dict[str, Any]:
         "scenario_force": False, "stiffness_source": "scenario",
     }  # fmt: skip
     return {**words, **{name: slider.default for name, slider in sliders(rig).items()}}
-
-
-def controller_choice(name: str) -> dict[str, str]:
-    """A controller: name, title, and what it is (``about``)."""
-    policy = name.removeprefix(f"{RESIDUAL}:")
-    if policy != name:
-        title = f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})"
-        return {"name": name, "title": title, "about": f"A law and a trained policy that corrects it: {policy}."}
-    return {
-        "name": name,
-        "title": Path(name).name.replace("-", " "),
-        "about": CONTROLLERS.get(name, "A controller of your own."),
-    }

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import birthsim_env
+from baselines.about import CONTROLLERS, RESIDUAL
 from birthsim_env.parts.scenarios import SCENARIOS
 
 FIGURES = {
@@ -50,6 +52,19 @@ PAPER = {
     "pneumatic actuated haptic interface: the BirthSIM. IROS 2015, pp. 1612-1618.",
     "address": "https://doi.org/10.1109/IROS.2015.7353583",
 }
+
+
+def controller_choice(name: str) -> dict[str, str]:
+    """A controller: name, title, and what it is (``about``)."""
+    policy = name.removeprefix(f"{RESIDUAL}:")
+    if policy != name:
+        title = f"{RESIDUAL} ({' '.join(Path(policy).parts[-2:])})"
+        return {"name": name, "title": title, "about": f"A law and a trained policy that corrects it: {policy}."}
+    return {
+        "name": name,
+        "title": Path(name).name.replace("-", " "),
+        "about": CONTROLLERS.get(name, "A controller of your own."),
+    }
 
 
 def described(choices: Iterable[str], about: Mapping[str, str]) -> list[dict[str, str]]:

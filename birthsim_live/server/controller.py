@@ -22,7 +22,7 @@ from baselines.controller import Controller, checked_command
 from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.settings import controller_choice
+from birthsim_live.rig.words import controller_choice
 
 QUICK = 0.002
 """s: a controller that answered in less is called beside all else that is served; a thread of its own costs 0.13 ms more."""

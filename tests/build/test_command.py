@@ -11,7 +11,7 @@ CASES = [
     (("riscv",), "--to 'riscv'; allowed: onnx, wasm, c, x86-64, aarch64, cortex-m7"),
     (("wasm", "--env", "CartPole-v1"), "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1"),
     (("wasm", "--controller", "nonlinear-mpc"), "controller = 'nonlinear-mpc'; allowed: a compiled one: backstepping"),
-    (("wasm", "--controller", "limited:pid"), "controller = 'limited:pid'; allowed: a compiled one: backstepping"),
+    (("wasm", "--controller", "shut-valves"), "controller = 'shut-valves'; allowed: a compiled one: backstepping"),
     (("wasm", "--controller", "nothing"), "controller = 'nothing'; allowed: backstepping"),
     (("wasm", "--controller", "pid[gain=1]"), "gain = 1.0 is unknown; allowed for pid: "),
     (("wasm", "--controller", "residual"), "--controller residual; allowed: --policy NAME"),

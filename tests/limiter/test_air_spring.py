@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.limiter.air_spring import AirSpring
+from baselines.limiter.air_spring import MEMORY
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Measurement
 from studies.haptics.worlds import resting
 from studies.stability.rig_port import RigPort
+from tests.limiter.parts import AirSpring
 
 RIG = Parameters()
 PLACE = (0.5, 0.0)
@@ -26,9 +27,8 @@ class Passive:
         self.air = None
 
     def command(self, measurement: Measurement, reference):
-        self.air = self.air or AirSpring(RIG, measurement.position.shape[1])
-        signals = measurement.position, measurement.pressures, measurement.user_force
-        openings = self.air.openings(*signals, measurement, reference)
+        self.air = self.air or AirSpring(RIG, measurement.position.shape[1], 0.001 / MEMORY)
+        openings = self.air.openings(measurement, reference)
         kicked = (measurement.time >= 0.5) & (measurement.time < 0.53)
         return np.where(kicked, np.reshape(self.kick, (4, 1)), openings)
 

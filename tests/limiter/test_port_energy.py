@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from baselines.limiter.port_energy import LAG, PortEnergy
+from baselines.limiter.port_energy import LAG
+from tests.limiter.parts import PortEnergy
 from tests.limiter.test_port_limiter import T, seen, targets
 
 CYCLES, W, SIZE, FORCE = 20, 2 * math.pi * 5.0, 0.004, 20.0
@@ -19,13 +20,11 @@ def counted(phase, size=SIZE):
     for k in range(begin + round(CYCLES * 2 * math.pi / W / T) + 1):
         now = k * T
         force = np.array([[FORCE * math.cos(W * now)], [0.0]])
-        work, asked, path, _ = energy.update(
-            seen(now, np.array([size * math.sin(W * now + phase)]), 0.0, force[0]), targets(), force
-        )
-        assert (asked == 0.0).all()
-        assert (path == 0.0).all()
+        work = energy.update(seen(now, np.array([size * math.sin(W * now + phase)]), 0.0, force[0]), targets(), force)
+        assert (work.asked == 0.0).all()
+        assert (work.path == 0.0).all()
         if k > begin:
-            done += work[:, 0]
+            done += work.done[:, 0]
     return done
 
 
@@ -54,6 +53,6 @@ def test_an_oscillation_that_goes_on_is_given_in_one_of_the_counts(phase, loser)
 def test_a_position_that_is_not_new_does_no_work():
     energy, force = PortEnergy(1), np.full((2, 1), 10.0)
     energy.update(seen(0.0, np.array([0.0]), 0.0, 10.0), targets(), force)
-    work, _, _, offset = energy.update(seen(T, np.array([0.1]), 0.0, 10.0, late=T), targets(), force)
-    assert (work == 0.0).all()
-    assert offset[0, 0] == 0.0
+    work = energy.update(seen(T, np.array([0.1]), 0.0, 10.0, late=T), targets(), force)
+    assert (work.done == 0.0).all()
+    assert energy.own.offset[0, 0] == 0.0

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import gymnasium
 import numpy as np
 import pytest
 
 from baselines.limiter.controller import PortLimiter
 from baselines.registry import bare_name, known_options, make_controller
+from baselines.staged import CompiledDriving, Driving, driving
 from birthsim_env import Parameters
 from birthsim_env.loop.signals import Measurement
 from studies.haptics.worlds import resting
@@ -98,6 +100,22 @@ def test_without_limits_a_law_is_itself_to_the_last_bit():
     for k in range(50):
         now, target = seen(k * T, np.array([0.001, -0.002]) * k / 50, 0.6, np.array([20.0, -20.0])), targets(2)
         np.testing.assert_array_equal(free.command(now, target), law.command(now, target))
+
+
+@pytest.mark.parametrize("law", ["backstepping", "pid"])
+def test_a_compiled_loop_and_calls_once_a_period_give_the_same_bits(law):
+    ends = []
+    for called in (False, True):
+        limiter = PortLimiter(make_controller(law, RIG), RIG)
+        drives = Driving(limiter, law, {}) if called else driving(limiter, law)
+        assert type(drives) is (Driving if called else CompiledDriving)
+        env = gymnasium.make_vec("BirthSIM/Forceps-v1", num_envs=3, sensors="lab", policy_period=T, actuation=drives)
+        env.reset(seed=1)
+        for _ in range(4000):
+            env.unwrapped.simulation.step(env.unwrapped.simulation.action)
+        assert limiter.authority.min() < 1.0
+        ends.append(np.concatenate(env.unwrapped.simulation.rows()))
+    np.testing.assert_array_equal(*ends)
 
 
 def test_a_lane_starts_anew():
