@@ -8,7 +8,7 @@ all periods of a policy step are one call; the loop stops only for what a user h
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,12 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
 
 Part = Stage | Callable[[int], None]
+
+
+class Runs(Protocol):
+    """What runs control periods, on some threads; returns how many lanes and periods a stage could not serve."""
+
+    def run(self, periods: int, threads: int) -> int: ...
 
 
 class Simulation:
@@ -117,13 +123,15 @@ class Simulation:
         self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
         self._begun = False
         self._sampled, self._opens = self.sensors.sampled, actuation
-        self._made: tuple[Any, ...] = ()
+        self.made: tuple[Any, ...] = ()
         self._loop: MixedLoop | None = None
         self._look: MixedLoop | None = None
+        self.recorder: Runs | None = None
+        """Runs policy steps in place of the loop, see ``birthsim_env.gradients``."""
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the loops, which know addresses."""
-        return {**self.__dict__, "_loop": None, "_look": None, "_made": ()}
+        return {**self.__dict__, "_loop": None, "_look": None, "made": (), "recorder": None}
 
     def forget_loops(self) -> None:
         """Build the loops anew at the next step: arrays may be others."""
@@ -235,19 +243,19 @@ class Simulation:
         has opened the valves, ``moved`` when target, hand and rig are at the new instant, before the sensors look.
 
         Returns whether the loop stops in every period for something that a user has written in Python."""
-        self._watching, self.closing, self._made = (commanded, moved), [], ()
+        self._watching, self.closing, self.made = (commanded, moved), [], ()
         self._assemble()
         return self._loop is not None and self._loop.stops
 
     def run(self, periods: int) -> None:
         """Go on by some control periods under the action that was accepted last."""
-        self._run(self._loop, periods)
+        self._run(self.recorder or self._loop, periods)
 
-    def _run(self, loop: MixedLoop | None, periods: int) -> None:
+    def _run(self, loop: Runs | None, periods: int) -> None:
         if loop is not None and loop.run(periods, self.threads):
             self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
 
-    def _places(self) -> tuple[list[Place], list[Place]]:
+    def places(self) -> tuple[list[Place], list[Place]]:
         """Where the arrays of this class stand in a block: in the world, and in what is seen."""
         plant, lanes, actuation = self.plant, self.plant.num_envs, self.actuation
         self._opens, self._sampled = actuation, self.sensors.sampled
@@ -278,7 +286,7 @@ class Simulation:
     def rows(self) -> tuple[Array, Array]:
         """Copies of the rows of the world and of what is seen now, (WORLD, N) and (SEEN, N)."""
         world, seen = (np.zeros((count, self.plant.num_envs)) for count in (WORLD, SEEN))
-        for rows, places in zip((world, seen), self._places(), strict=True):
+        for rows, places in zip((world, seen), self.places(), strict=True):
             for array, row in places:
                 rows[row : row + len(array)] = array
         return world, seen
@@ -301,24 +309,24 @@ class Simulation:
 
     def _assemble(self) -> None:
         """Bring the loops up to the parts; what is compiled and stands side by side runs in one call."""
-        lanes, parts, places = self.plant.num_envs, self.parts(), self._places()
+        lanes, parts, places = self.plant.num_envs, self.parts(), self.places()
         commanded, moved = self._watching
         order = {**parts, "actuation": [*parts["actuation"], *commanded], "sensors": [*moved, *parts["sensors"]]}
         every = [part for group in order.values() for part in group]
         # A part may have made room anew, or be another one.
         arrays = tuple(array.__array_interface__["data"][0] for place in places for array, _ in place)
         made = (arrays, *(part.key() if isinstance(part, Stage) else part for part in every))
-        if self._loop is not None and made == self._made:
+        if self._loop is not None and made == self.made:
             return
         begins = jump_stage(self.period, self.user_force.jump_rate, self._jumps, True)
         looks = [*parts["target"], *parts["setpoints"], *parts["hand"]]
         self._loop = MixedLoop(lanes, *places, every, self.closing)
         self._look = MixedLoop(lanes, *places, [*looks, begins, *parts["sensors"]], self.beginning)
-        self._made = made
+        self.made = made
 
     def loops_of_parts(self) -> tuple[MixedLoop, MixedLoop]:
         """The plant by itself, and the actuation by itself: to be timed, on a copy."""
-        lanes, places, parts = self.plant.num_envs, self._places(), self.parts()
+        lanes, places, parts = self.plant.num_envs, self.places(), self.parts()
         return MixedLoop(lanes, *places, parts["plant"]), MixedLoop(lanes, *places, [*parts["actuation"], *parts["board"]])
 
     @staticmethod

@@ -55,7 +55,7 @@ class RestingRigs(Simulation):
         """Close the loop: ``hand``, sensors, controller, ``commanded``, board, and the plant, or what ``carry`` makes of it."""
         parts = self.parts()
         order = [*hand, *parts["sensors"], *parts["actuation"], *commanded, *parts["board"], *(carry or parts["plant"])]
-        self._loop = MixedLoop(self.plant.num_envs, *self._places(), order)
+        self._loop = MixedLoop(self.plant.num_envs, *self.places(), order)
         if hasattr(self.actuation, "check"):
             self.actuation.check(self.measurement)
 

@@ -138,7 +138,9 @@ class _DiskCache(NullCache):
         path = Path(function.__code__.co_filename).resolve()
         # The module of a user's file has its whole path for a name.
         self._name = f"{Path(function.__module__).name}.{function.__qualname__}"
-        self._stamp = source_stamp(path)[:16]
+        # A module that runs generated source holds it under this name.
+        text = source_stamp(path) + function.__globals__.get("GENERATED", "")
+        self._stamp = hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)

@@ -1,0 +1,69 @@
+"""The plant's stage differentiated: Runge-Kutta steps by their generated adjoints, and the end effector's motion.
+
+The tape has the state at the beginning of a control period; its steps are computed again, with the same bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from birthsim_env.loop.gradients.traced import Adjoint, Traced
+from birthsim_env.loop.rows import FORCE, MOTION, OPENING, STATE, WORLD
+from birthsim_env.loop.stage import Stage, address_of, block, scratch
+from birthsim_env.loop.world import Clock
+from birthsim_env.physics import dynamics
+from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES
+from birthsim_env.physics.geometry import end_effector_motion
+from birthsim_env.physics.gradients import tracing
+from birthsim_env.physics.gradients.graph import Graph
+from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
+from birthsim_env.physics.gradients.right_hand_side import INPUTS
+from birthsim_env.physics.gradients.steps import STAGES, back_over, lay_out
+
+ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
+"""Of the space, in the order of gradients: state, openings, force."""
+
+
+@kernel
+def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: int) -> int:
+    steps = int(clock.steps)
+    step = clock.period / steps
+    given, weighs, result, p = block(tape, INPUTS), block(bars, INPUTS), block(out, INPUTS), scratch(PARAMETERS)
+    points, g, late = np.empty((STAGES * steps, STATES, BLOCK)), scratch(STATES), scratch(STATES)
+    x, dx, sums, trial = scratch(STATES), scratch(STATES), scratch(STATES), scratch(STATES)
+    u, f, by, total = scratch(4), scratch(2), scratch(INPUTS), scratch(INPUTS)
+    dynamics.load(block(rig, PARAMETERS), 0, n, p)
+    for row in range(INPUTS):
+        for i in range(n):
+            total[row, i], by[row, i] = 0.0 if row < STATES else weighs[row, i], 0.0
+    for row in range(STATES):
+        for i in range(n):
+            points[0, row, i], late[row, i] = given[row, i], weighs[row, i]
+    for row in range(4):
+        for i in range(n):
+            u[row, i] = given[STATES + row, i]
+    for row in range(2):
+        for i in range(n):
+            f[row, i] = given[STATES + 4 + row, i]
+    lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
+    back_over(points, u, f, p, steps, step, late, x, g, by, total, n)
+    dynamics.settle(late, n)
+    dynamics.copy(late, total, n)
+    dynamics.store(total, 0, n, result)
+    return 0
+
+
+def plant_adjoint(stage: Stage) -> Adjoint:
+    """Of ``loop.world.plant_stage``, but for the motion of the end effector."""
+    return Adjoint(address_of(_back), ROWS, ROWS, stage.constants)
+
+
+def motion_traced() -> Traced:
+    """What ``World.motion`` says of the state after a period."""
+    graph = Graph()
+    rig, state = tracing.inputs(graph, "p", PARAMETERS), tracing.inputs(graph, "x", STATES)
+    motion = tracing.empty(4)
+    tracing.call(end_effector_motion, state, rig, motion)
+    inputs = {row: rig[row, 0] for row in range(PARAMETERS)} | {STATE + row: state[row, 0] for row in range(STATES)}
+    return Traced("motion", graph, inputs, {MOTION + row: motion[row, 0] for row in range(4)})

@@ -1,0 +1,159 @@
+"""A loop that keeps on a tape what the adjoints of its stages read, and walks it back.
+
+Forward it runs the stages themselves, so that every bit is that of ``loop.Loop``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from birthsim_env.loop.gradients.traced import Adjoint
+from birthsim_env.loop.loop import Loop, Place
+from birthsim_env.loop.stage import Stage, carray, pointer
+from birthsim_env.loop.stage import call as call_stage
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.lanes import Array
+
+Whole = NDArray[np.int64]
+
+
+@kernel
+def _keep(space: Array, reads: Whole, first: int, count: int, tape: Array, n: int) -> None:
+    for k in range(count):
+        for i in range(n):
+            tape[k, i] = space[reads[first + k], i]
+
+
+@kernel
+def _forward(
+    moves: Whole, stages: Whole, kept: Whole, reads: Whole, rows: int, lanes: int, periods: int, first: int, last: int, tape: Array
+) -> int:  # fmt: skip
+    """``moves`` and ``stages`` as in ``loop._run``. ``kept`` (K, 4): the stage, 1 where it is after it, and where its rows stand in
+    ``reads`` and how many they are. ``tape`` (blocks, rows, BLOCK)."""
+    space, missed = np.empty((rows, BLOCK)), 0
+    base = np.int64(space.ctypes.data)
+    for start in range(first, last, BLOCK):
+        n, place = min(BLOCK, last - start), 0
+        for m in range(moves.shape[0]):
+            count, row = moves[m, 1], moves[m, 2]
+            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+            for k in range(count):
+                for i in range(n):
+                    space[row + k, i] = array[k, start + i]
+        for period in range(periods):
+            for s in range(stages.shape[0]):
+                if stages[s, 6] == 0 or period == periods - 1:
+                    for after in range(2):
+                        for e in range(kept.shape[0]):
+                            if kept[e, 0] == s and kept[e, 1] == after:
+                                _keep(space, reads, kept[e, 2], kept[e, 3], tape[start // BLOCK, place:], n)
+                                place += kept[e, 3]
+                        if after == 0:
+                            places = (
+                                base + stages[s, 1] * BLOCK * 8 if stages[s, 1] >= 0 else 0,
+                                base + stages[s, 2] * BLOCK * 8,
+                                base + stages[s, 3] * BLOCK * 8,
+                            )
+                            missed += call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
+        for m in range(moves.shape[0]):
+            count, row = moves[m, 1], moves[m, 2]
+            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+            if moves[m, 3]:
+                for k in range(count):
+                    for i in range(n):
+                        array[k, start + i] = space[row + k, i]
+    return missed
+
+
+@kernel
+def _backward(
+    entries: Whole, touched: Whole, periods: int, first: int, last: int, rig: Array, tape: Array, bars: Array, most: int
+) -> None:
+    """``entries`` (E, 6): address of an adjoint, of its constants, rows that it reads from the tape, where its rows stand in
+    ``touched`` and how many they are, 1 for a closing one. ``bars`` (rows, N) go back."""
+    space, p = np.empty((bars.shape[0], BLOCK)), np.empty((at.PARAMETERS, BLOCK))
+    given, result = np.zeros((most, BLOCK)), np.zeros((most, BLOCK))
+    for start in range(first, last, BLOCK):
+        n, place = min(BLOCK, last - start), tape.shape[1]
+        for row in range(bars.shape[0]):
+            for i in range(n):
+                space[row, i] = bars[row, start + i]
+        for row in range(at.PARAMETERS):
+            for i in range(n):
+                p[row, i] = rig[row, start + i]
+        for period in range(periods - 1, -1, -1):
+            for e in range(entries.shape[0] - 1, -1, -1):
+                if entries[e, 5] == 0 or period == periods - 1:
+                    place -= entries[e, 2]
+                    for k in range(entries[e, 4]):
+                        for i in range(n):
+                            given[k, i] = space[touched[entries[e, 3] + k], i]
+                    call_stage(
+                        entries[e, 0], np.int64(tape[start // BLOCK, place:].ctypes.data), np.int64(given.ctypes.data),
+                        np.int64(result.ctypes.data), np.int64(p.ctypes.data), entries[e, 1], start, n,
+                    )  # fmt: skip
+                    for k in range(entries[e, 4]):
+                        for i in range(n):
+                            space[touched[entries[e, 3] + k], i] = result[k, i]
+        for row in range(bars.shape[0]):
+            for i in range(n):
+                bars[row, start + i] = space[row, i]
+
+
+class TapedLoop(Loop):
+    """A ``Loop`` with adjoints, by the index of their stage among ``stages`` and then ``closing``, in the order in which they
+    happen. ``extras`` rows follow those of the space in what ``back`` is given."""
+
+    def __init__(
+        self, lanes: int, world: Sequence[Place], seen: Sequence[Place], stages: Sequence[Stage], closing: Sequence[Stage]
+    ) -> None:
+        super().__init__(lanes, world, seen, stages, closing)
+        self._open = len(stages)
+        self._tape: Array = np.zeros((0, 0, 0))
+
+    @property
+    def memories(self) -> list[int]:
+        """Rows of the space at which the memory of each stage begins."""
+        return [int(row) for row in self._stages[:, 3]]
+
+    @property
+    def rows(self) -> int:
+        """Rows of the space."""
+        return self._rows
+
+    def differentiate(self, adjoints: Sequence[tuple[int, Adjoint]]) -> None:
+        """Go back by these from now on."""
+        reads, touched, kept, entries = list[int](), list[int](), [], []
+        self._constants = [one.constants for _, one in adjoints]
+        for s, one in adjoints:
+            kept.append((s, int(one.after), len(reads), len(one.reads)))
+            address = 0 if one.constants is None else one.constants.ctypes.data
+            entries.append((one.address, address, len(one.reads), len(touched), len(one.rows), int(s >= self._open)))
+            reads += one.reads
+            touched += one.rows
+        self._keeps, self._entries = np.array(kept, dtype=np.int64), np.array(entries, dtype=np.int64)
+        self._reads, self._touched = np.array(reads, dtype=np.int64), np.array(touched, dtype=np.int64)
+        self._most = max(len(one.rows) for _, one in adjoints)
+
+    def new_tape(self, periods: int) -> Array:
+        """Room for ``periods`` control periods, the last one with what closes it."""
+        closing = self._entries[:, 5] == 1
+        size = periods * self._entries[~closing, 2].sum() + self._entries[closing, 2].sum()
+        return np.zeros((-(-self._lanes // BLOCK), max(1, size), BLOCK))
+
+    def run_taped(self, periods: int, tape: Array, threads: int = 1) -> int:
+        """``run``, which writes ``tape``."""
+        self._tape = tape
+        return self.run(periods, threads)
+
+    def _between(self, periods: int, first: int, last: int) -> int:
+        how = self._moves, self._stages, self._keeps, self._reads, self._rows, self._lanes
+        return int(_forward(*how, periods, first, last, self._tape))
+
+    def back(self, periods: int, tape: Array, rig: Array, bars: Array) -> None:
+        """Take ``bars``, gradients to the rows of the space at the end (rows, N), to its beginning."""
+        _backward(self._entries, self._touched, periods, 0, self._lanes, rig, tape, bars, self._most)

@@ -1,0 +1,111 @@
+"""Derivatives of the plant over some time: vector-Jacobian and Jacobian-vector products, in the words of JAX.
+
+They are one-sided at kinks: a spool at zero, an orifice that begins to choke, a piston at its stop, a bristle whose piston
+turns.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from birthsim_env.physics import dynamics, options, spools
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.gradients import steps
+from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, RIG
+from birthsim_env.physics.plant import Plant, checked
+from birthsim_env.physics.rig.parameters import Parameters, field_of
+from birthsim_env.physics.rig.values import shown
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Gradients, or a tangent, of what a plant's new state depends on, SI units over N lanes.
+
+    ``state`` (18, N) before, ``opening`` (4, N), ``force`` (K, 2, N) of every sample, and ``rig`` (PARAMETERS, N), rows of
+    ``Plant.lane_parameters``: None where it was not asked for.
+    """
+
+    state: Array
+    opening: Array
+    force: Array
+    rig: Array | None = None
+
+
+def require_plain(plant: Plant) -> None:
+    """Raise ``ValueError`` for a rig whose derivatives are not known, by name."""
+    p, names = plant.lane_parameters, []
+    if not options.are_off(p):
+        names += ["air.supply_conductance", "chambers.tube_length", "mechanics.mode_frequency"]
+    if not spools.are_perfect(p):
+        names += ["valves.deadband", "valves.hysteresis", "valves.opening_limit"]
+    if names:
+        raise ValueError(f"gradients of a rig with one of {', '.join(names)}; allowed: these at their defaults")
+
+
+def vjp(plant: Plant, command: Array, forces: Array, duration: float) -> Callable[..., Derivatives]:
+    """``plant.advance_unchecked``, with its bits; returns the pullback ``f(gradient, rig=False)``.
+
+    It gives ``Derivatives`` of the sum of ``gradient`` (18, N) times the state that was reached, with ``rig`` also to the rig.
+    """
+    require_plain(plant)
+    held = duration / len(forces)
+    count = dynamics.steps_in(held)
+    step = held / count
+    tape, rig_rows = np.empty((len(forces) * count, at.STATES, plant.num_envs)), plant.lane_parameters.copy()
+    steps.advance(plant.state, command, forces, rig_rows, count, step, plant.impacts, tape)
+
+    def pullback(gradient: ArrayLike, rig: bool = False) -> Derivatives:
+        late = checked("gradient", gradient, plant.state.shape, "1/SI")
+        result, by_force = np.empty((EVERY, plant.num_envs)), np.empty_like(forces)
+        steps.backward(tape, command, forces, rig_rows, count, step, late, by_force, rig, result)
+        return Derivatives(result[: at.STATES], result[at.STATES : INPUTS - 2], by_force, _spread(result) if rig else None)
+
+    return pullback
+
+
+def jvp(plant: Plant, command: Array, forces: Array, duration: float, along: Derivatives) -> Array:
+    """``plant.advance_unchecked``, with its bits; returns the tangent of the new state (18, N) ``along`` that of the rest."""
+    require_plain(plant)
+    held = duration / len(forces)
+    count = dynamics.steps_in(held)
+    tangent = np.zeros((EVERY, plant.num_envs))
+    tangent[: at.STATES], tangent[at.STATES : INPUTS - 2] = along.state, along.opening
+    if along.rig is not None:
+        tangent[INPUTS:] = along.rig[list(RIG)]
+    by_force = np.ascontiguousarray(np.broadcast_to(along.force, forces.shape))
+    steps.advance_tangent(plant.state, command, forces, plant.lane_parameters, count, held / count, tangent, by_force)
+    return tangent[: at.STATES]
+
+
+def _spread(result: Array) -> Array:
+    """Gradients to the rows of a rig; those of options and laws of friction, which there are none to, are zero."""
+    rows = np.zeros((at.PARAMETERS, result.shape[1]))
+    rows[list(RIG)] = result[INPUTS:]
+    return rows
+
+
+FAR = 1e-40
+"""Of a parameter: the imaginary step of ``rig_jacobian``, whose square is nothing beside 1."""
+
+
+def rig_jacobian(parameters: Parameters, names: tuple[str, ...]) -> Array:
+    """d(row of ``Plant.lane_parameters``)/d(parameter), (PARAMETERS, len(names)), by complex steps, which are exact.
+
+    Dotted ``names`` of ``Parameters``. Raises ``ValueError`` for geometry, whose angles enter by sine and cosine, and choices.
+    """
+    columns = []
+    for name in names:
+        section, _, own = name.partition(".")
+        if section in ("geometry", "electronics") or field_of(name).metadata["choices"]:
+            raise ValueError(f"names has {shown(name)}; allowed: numbers of the rig other than geometry and electronics")
+        rig = copy.copy(parameters)
+        object.__setattr__(rig, section, copy.copy(getattr(rig, section)))
+        object.__setattr__(getattr(rig, section), own, getattr(getattr(rig, section), own) + 1j * FAR)
+        columns.append(np.array([np.imag(value) / FAR for value in at.rows_of(rig)], dtype=np.float64))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,1 @@
+"""Gradients against differences, forward against reverse mode, and primal bits."""
