@@ -110,4 +110,4 @@ def renew() -> None:
     """Run what is not fresh, each with its own defaults."""
     for name in names():
         if not state(name).startswith("fresh"):
-            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True)
+            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)
