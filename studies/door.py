@@ -19,7 +19,7 @@ class Entry(NamedTuple):
 
 STUDIES = {
     "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
-    "beside-law": Entry("residual.beside_law", "", "policies of several seeds beside their controller"),
+    "beside-law": Entry("residual.beside_law", "STUDY", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
     "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
@@ -30,18 +30,18 @@ STUDIES = {
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
     "mutation": Entry("mutation.command", "", "how many small changes of the code tests notice"),
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
-    "pools": Entry("pools", "", "what other processes and hosts cost"),
+    "pools": Entry("pools", "STUDY", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
     "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
     "soak": Entry("soak.command", "", "10^8 policy steps over all that there is"),
-    "speed": Entry("speed.command", "", "speeds, beside what they are to be compared with"),
+    "speed": Entry("speed.study", "STUDY", "speeds, beside what they are to be compared with"),
     "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),
     "stiffest": Entry("stability.stiffest", "STUDY", "the stiffest setpoints at which the paper's controller rests"),
     "stiffness": Entry("comparison.feel", "STUDY", "how the stiffness of every controller feels"),
     "sweep": Entry("sweeps.command", "", "grids, random draws and searches, from a TOML file"),
-    "targets": Entry("targets.command", "", "built code of every target, against Python"),
+    "targets": Entry("targets.study", "STUDY", "built code of every target, against Python"),
     "verification": Entry("verification.command", "", "balances, coverage and mutation scores, for docs/verification.md"),
-    "worst": Entry("honest.worst", "", "the worst worlds, and what each owes to its figures"),
+    "worst": Entry("honest.worst", "STUDY", "the worst worlds, and what each owes to its figures"),
 }
 
 OWN = {

@@ -1,12 +1,15 @@
-"""``birthsim study pools [--cluster ray:ADDRESS]``: what it costs to have pieces computed by other processes."""
+"""What it costs to have pieces computed by other processes, two workers, of joblib and of a cluster."""
 
 from __future__ import annotations
 
-import argparse
 import time
+from typing import Any
 
-from baselines.commands.shared import cluster_name, run
 from baselines.work.side_by_side import side_by_side
+from baselines.work.tasks import Result, Task
+from studies.comparison.tables import markdown
+from studies.results import Content
+from studies.study import Options, Study
 
 PIECES, LASTS = 200, 0.05
 """Pieces of a measurement, and s that each lasts."""
@@ -17,27 +20,34 @@ def wait(seconds: float) -> None:
     time.sleep(seconds)
 
 
-def seconds(jobs: int, cluster: str | None, lasts: float, pieces: int = PIECES) -> tuple[float, float]:
+def seconds(cluster: str | None, lasts: float) -> tuple[float, float]:
     """s until the first piece is complete, which is the pool's start, and s per piece after it."""
     ends: list[float] = []
     began = time.perf_counter()
-    side_by_side(wait, [(lasts,)] * pieces, jobs, lambda number, result: ends.append(time.perf_counter()), cluster)
-    return ends[0] - began, (ends[-1] - ends[0]) / (pieces - 1)
+    side_by_side(wait, [(lasts,)] * PIECES, 2, lambda number, result: ends.append(time.perf_counter()), cluster)
+    return ends[0] - began, (ends[-1] - ends[0]) / (PIECES - 1)
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim study pools", description=__doc__)
-    parser.add_argument("--cluster", type=cluster_name, metavar="ray[:ADDRESS]", help="measured beside joblib's processes")
-    run(parser, _measure)
+def overhead(cluster: str) -> Result:
+    """s: the start, an empty piece, and one of ``LASTS`` s."""
+    start, empty = seconds(cluster or None, 0.0)
+    return {"start": start, "empty": empty, "lasting": seconds(cluster or None, LASTS)[1]}
 
 
-def _measure(arguments: argparse.Namespace) -> None:
-    print(f"| two workers | start, s | an empty piece, ms | a piece of {1e3 * LASTS:g} ms, ms | of these over half of it |")
-    print("|---|---|---|---|---|")
-    for name, cluster in (("joblib", None), ("ray", arguments.cluster)):
-        if cluster is not None or name == "joblib":
-            start, empty = seconds(2, cluster, 0.0)
-            _, lasting = seconds(2, cluster, LASTS)
-            row = (f"{start:.2f}", f"{1e3 * empty:.2f}", f"{1e3 * lasting:.1f}", f"{1e3 * (lasting - LASTS / 2):.1f}")
-            print(f"| {name} | " + " | ".join(row) + " |")
+def _tasks(options: Options) -> dict[Any, Task]:
+    pools = {"joblib": "", **({"ray": options.beside} if options.beside else {})}
+    return {name: Task(name, "pools", overhead, {"cluster": cluster}) for name, cluster in pools.items()}
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [["two workers", "start, s", "an empty piece, ms", f"a piece of {1e3 * LASTS:g} ms, ms", "of these over half of it"]]
+    for name, found in content["figures"].items():
+        times = [f"{1e3 * found['lasting']:.1f}", f"{1e3 * (found['lasting'] - LASTS / 2):.1f}"]
+        rows.append([name, f"{found['start']:.2f}", f"{1e3 * found['empty']:.2f}", *times])
+    return {"pools.md": markdown(rows) + "\n"}
+
+
+STUDY = Study(
+    (__name__,), {"beside": ""}, _tasks, lambda _, found: dict(found), {"start": "s", "empty": "s", "lasting": "s"}, _shown,
+    timed=True, words={"beside": "ray or ray:ADDRESS, measured beside joblib's processes"},
+)  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import shutil
@@ -10,11 +9,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import cast
 
-from baselines.commands.shared import run
+from baselines.commands.command import perform_with
+from baselines.commands.settings import Configured
 from baselines.work.files import write_text
 from baselines.work.sources import ROOT
 from studies.door import OWN, STUDIES
@@ -30,13 +31,15 @@ _MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOT
 
 def main() -> None:
     """Entry point of ``birthsim study NAME`` for declared studies, and of ``OWN``."""
-    name = sys.argv[0].rpartition(" ")[2]
-    if name not in OWN:
-        declared(name).main(name, STUDIES[name].measures)
-        return
-    action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
-    does = f"{OWN[name][0].upper()}{OWN[name][1:]}."
-    run(argparse.ArgumentParser(prog=f"birthsim study {name}", description=does), lambda _: action())
+    command = sys.argv[0]
+    name = command.rpartition(" ")[2]
+    if name in OWN:
+        action = {"status": status, "render": render, "draw": draw, "renew": renew}[name]
+        does = f"{OWN[name][0].upper()}{OWN[name][1:]}."
+        perform_with(command, type("Settings", (Configured,), {"__doc__": does}), lambda _: action(), "")
+    else:
+        study = declared(name)
+        perform_with(command, study.settings(STUDIES[name].measures), partial(study.measure, name), "")
 
 
 def declared(name: str) -> Study:
@@ -107,4 +110,4 @@ def renew() -> None:
     """Run what is not fresh, each with its own defaults."""
     for name in names():
         if not state(name).startswith("fresh"):
-            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True)
+            subprocess.run([sys.executable, "-m", "birthsim", "study", name], check=True, cwd=ROOT)

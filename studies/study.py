@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
 import json
+import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import ExitStack
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Annotated, Any
 
-from baselines.commands.shared import EPISODES, JOBS, add_processes, finite_number, run, seed_number, whole_up_to
+from cyclopts import Parameter
+
+from baselines.commands.settings import EPISODES, MANY, Processes, number, whole
 from baselines.work.files import own_folder, whole_results, write_text
 from baselines.work.sources import ROOT
 from baselines.work.tasks import Result, Task, run_tasks
 from studies.results import RESULTS, Content, provenance, written
 
-Options = argparse.Namespace
+Options = SimpleNamespace
 Found = Mapping[Any, Result]
 
 
@@ -32,8 +36,9 @@ class Study:
     ``code`` names the modules that measure: a result is fresh while their sources are as they were. ``options`` has the default
     of each option; a tuple takes several values. ``tasks(options)`` are the pieces by key, ``keep(options, results by key)``
     the figures, as JSON takes them, whose ``units`` are given by column. ``show(result)`` are the texts that stand in
-    ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces may fail.
-    ``allowed`` has the values of options that take no others, ``words`` the help of what its name does not say.
+    ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces may fail; ``timed``
+    pieces are measured anew, one after another. ``allowed`` has the values of options that take no others, ``words`` the help
+    of what its name does not say.
     """
 
     code: tuple[str, ...]
@@ -44,32 +49,32 @@ class Study:
     show: Callable[[Content], dict[str, str]]
     draw: Callable[[Content, Path], list[Path]] = no_pictures
     partial: bool = False
+    timed: bool = False
     allowed: dict[str, Sequence[str]] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
 
-    def main(self, name: str, measures: str) -> None:
-        """Entry point of ``birthsim study NAME``, whose help says what it ``measures``."""
-        parser = argparse.ArgumentParser(
-            prog=f"birthsim study {name}", description=f"Measures {measures}.",
-            epilog="What there is of the same settings and code is kept, so that an interrupted run goes on. "
-            f"Without --out the folder is out/studies/{name}, and the result is results/{name}.json too.",
-        )  # fmt: skip
-        for option, default in self.options.items():
-            allowed = self.allowed.get(option, ())
-            parts = [self.words.get(option, ""), f"of {', '.join(allowed)}" if allowed else ""]
-            parts += ["(default: %(default)s)"] if default != "" else []
-            _add(parser, option, default, " ".join(filter(None, parts)), allowed or None)
-        add_processes(parser)
-        parser.add_argument("--out", type=Path, help="folder for the result, its tables and its pictures")
-        run(parser, lambda arguments: self._measure(name, arguments))
+    def settings(self, measures: str) -> type[Processes]:
+        """Its options as a command's settings, whose help says what it ``measures``."""
+        fields = [(name, *_option(name, default, self)) for name, default in self.options.items()]
+        out = Annotated[Path | None, Parameter(help="Folder for the result, its tables and its pictures.")]
+        made = make_dataclass("Settings", [*fields, ("out", out, None)], bases=(Processes,), kw_only=True)
+        made.__doc__ = (
+            f"Measures {measures}.\n\nWhat there is of the same settings and code is kept, so that an interrupted run goes on. "
+            "Without --out the folder is out/studies/NAME, and the result is results/NAME.json too."
+        )
+        return made
 
-    def _measure(self, name: str, arguments: argparse.Namespace) -> None:
-        options = Options(**{option: getattr(arguments, option) for option in self.options})
+    def measure(self, name: str, settings: Any) -> None:
+        """What ``birthsim study NAME`` does."""
+        options = Options(**{option: getattr(settings, option) for option in self.options})
         tasks, began = self.tasks(options), time.perf_counter()
-        with own_folder(arguments.out or ROOT / "out" / "studies" / name) as folder:
+        with ExitStack() as stack:
+            folder = stack.enter_context(own_folder(settings.out or ROOT / "out" / "studies" / name))
+            place = Path(stack.enter_context(tempfile.TemporaryDirectory())) if self.timed else folder
             made = provenance(self.code)
-            before = sum((folder / task.file()).is_file() for task in tasks.values())
-            done, failures = run_tasks(list(tasks.values()), folder, arguments.jobs or JOBS, name, arguments.cluster)
+            before = sum((place / task.file()).is_file() for task in tasks.values())
+            jobs = 1 if self.timed else settings.jobs
+            done, failures = run_tasks(list(tasks.values()), place, jobs, name, settings.cluster)
             problem = f"{len(failures)} of {len(tasks)} pieces failed, the first {': '.join(next(iter(failures.items()), ()))}"
             if failures and not (self.partial and done):
                 raise ValueError(problem)
@@ -80,11 +85,11 @@ class Study:
             }  # fmt: skip
             content = json.loads(written(content))
             texts = self.show(content)
-            with whole_results(folder) as place:
+            with whole_results(folder) as whole:
                 for file, text in {f"{name}.json": written(content), **texts}.items():
-                    write_text(place / file, text)
-                drawn = [path.name for path in self.draw(content, place) if path.suffix == ".png"]
-            if not arguments.out:
+                    write_text(whole / file, text)
+                drawn = [path.name for path in self.draw(content, whole) if path.suffix == ".png"]
+            if not settings.out:
                 write_text(RESULTS / f"{name}.json", written(content))
         print("\n\n".join(text for file, text in texts.items() if file.endswith(".md")))
         print(f"\nwritten to {folder}/: {', '.join([f'{name}.json', *texts, *drawn])}")
@@ -92,15 +97,14 @@ class Study:
             raise ValueError(problem)
 
 
-def _add(parser: argparse.ArgumentParser, option: str, default: Any, words: str, allowed: Sequence[str] | None) -> None:
-    """An option of the kind of its default."""
-    flag, several = f"--{option.replace('_', '-')}", isinstance(default, tuple)
-    if isinstance(default, bool):
-        parser.add_argument(flag, action="store_true", help=words.partition("(")[0])
-        return
-    kinds: dict[type, Any] = {float: finite_number, int: seed_number if option == "seed" else whole_up_to(EPISODES)}
-    kind = kinds.get(type(default[0] if several else default), str)
-    own: dict[str, Any] = (
-        {"nargs": "+", "help": words % {"default": " ".join(map(str, default))}} if several else {"help": words}
-    )
-    parser.add_argument(flag, type=kind, default=default, choices=allowed, metavar="NAME" if kind is str else "N", **own)
+def _option(name: str, default: Any, study: Study) -> tuple[Any, Any]:
+    """Annotation and default of an option of the kind of its default."""
+    several = isinstance(default, tuple)
+    kind: type = type(default[0] if several else default)
+    reads: dict[type, Any] = {float: number("N"), int: whole(0, 2**32 - 1) if name == "seed" else whole(1, EPISODES)}
+    own = [reads[kind]] if kind in reads else [Parameter(metavar="NAME...")] if several else []
+    choices = tuple(study.allowed.get(name, ())) or None
+    text = study.words.get(name, "")
+    own += [Parameter(choices=choices, help=f"{text[:1].upper()}{text[1:]}." if text else None), *([MANY] if several else [])]
+    annotation: Any = Annotated[(list[kind] if several else kind, *own)]  # type: ignore[valid-type]
+    return annotation, default

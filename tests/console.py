@@ -13,7 +13,19 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-STUDIES = {"comparison", "stiffness", "stability", "speed", "accuracy", "haptics", "sweep", "scores"}
+STUDIES = {
+    "comparison",
+    "stiffness",
+    "stability",
+    "speed",
+    "accuracy",
+    "haptics",
+    "sweep",
+    "scores",
+    "beside-law",
+    "worst",
+    "pools",
+}
 """Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long
 RESIDUAL = "BirthSIM/ProbeResidual-v2"

@@ -41,8 +41,8 @@ def program(name: str, settings: type[S], example: str = "") -> App:
 
 
 def _default(value: Any) -> str | None:
-    """A default as a user would type it; nothing of a flag and of an empty list."""
-    if value is None or value is False:
+    """A default as a user would type it; nothing of a flag, of no words and of an empty list."""
+    if value is None or value is False or value == "":
         return None
     return " ".join(map(str, value)) or None if isinstance(value, list | tuple) else str(value)
 

@@ -2,76 +2,69 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from baselines.about import RESIDUAL
-from baselines.commands.shared import run
+from baselines.commands.settings import CONTROL, MANY, Configured, RigFile, number, whole
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
-from birthsim_live.commands.serving import add_address, need_server, serve
+from birthsim_live.commands.serving import need_server, serve
 from birthsim_live.logs.recording import load_recording
 from birthsim_live.rig.folder import Packed, packed_page, write_page
 from birthsim_live.server.addresses import listen
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim live",
-        description="A rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, "
-        "valves and sensors while it moves, record it for --replay. Works without internet, for this machine alone.",
-    )
-    parser.add_argument(
-        "--replay", type=Path, metavar="FILE", help="play what the page recorded, .rec: pause, seek, slow motion"
-    )
-    add_address(parser)
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument(
-        "--controller",
-        metavar="NAME",
-        help="open with this controller, such as lqr or pid[bandwidth=60]; one of your own, path/to/file.py:Class, runs in "
-        "Python, and the rig waits for it",
-    )
-    parser.add_argument("--compare", metavar="NAME", help="open with a second rig under this controller beside the first")
-    parser.add_argument(
-        "--static",
-        type=Path,
-        metavar="FOLDER",
-        help="write the page with its rig into this new folder, for any web server, and end",
-    )
-    parser.add_argument(
-        "--policy",
-        nargs="+",
-        default=[],
-        metavar="DIR",
-        help="policies to choose from besides those that are shipped: folders that birthsim train wrote; the page opens with "
-        "the first, which may be a shipped name",
-    )
-    run(parser, _live)
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """A rig in real time in the browser: drag the end effector, change stiffness, scenario, controller, valves and sensors
+    while it moves, record it for --replay. Works without internet, for this machine alone.
+    """
+
+    replay: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    """Play what the page recorded, .rec: pause, seek, slow motion."""
+    port: Annotated[int | None, whole(0, 65535)] = None
+    """0 takes any that is free; else 8000, with --replay 8001."""
+    host: str = "127.0.0.1"
+    """Address or name to serve; other than the loopback it lets in everybody who can reach it."""
+    request_time: Annotated[float, number("S", above=0.0, most=3600.0)] = 10.0
+    """Seconds in which a request must arrive, assumed; then its connection is closed."""
+    parameters: RigFile = None
+    controller: Annotated[str | None, Parameter(group=CONTROL, metavar="NAME")] = None
+    """Open with it, as pid[bandwidth=60]; your own, path/to/file.py:Class, runs in Python, and the rig waits for it."""
+    compare: Annotated[str | None, Parameter(group=CONTROL, metavar="NAME")] = None
+    """Open with a second rig under this controller beside the first."""
+    policy: Annotated[list[str], MANY, Parameter(group=CONTROL, metavar="DIR...")] = field(default_factory=list)
+    """To choose from besides what is shipped: folders that birthsim train wrote; the page opens with the first."""
+    static: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
+    """Write the page with its rig into this new folder, for any web server, and end."""
 
 
-def _live(arguments: argparse.Namespace) -> None:
-    if arguments.replay is not None:
-        _replay(arguments)
-    elif arguments.static is not None:
-        size = write_page(arguments.static, _packed(arguments, load_parameters(arguments.parameters)))
-        shown = f"python -m http.server -d {arguments.static} shows it at http://127.0.0.1:8000"
-        print(f"written to {arguments.static}: {size / 1e6:.2f} MB; {shown}")
+def main(settings: Settings) -> None:
+    """Serve or write the page, or play a recording."""
+    if settings.replay is not None:
+        _replay(settings, settings.replay)
+    elif settings.static is not None:
+        size = write_page(settings.static, _packed(settings, load_parameters(settings.parameters)))
+        seen = f"python -m http.server -d {settings.static} shows it at http://127.0.0.1:8000"
+        print(f"written to {settings.static}: {size / 1e6:.2f} MB; {seen}")
     else:
         need_server()
-        with listen(arguments.host, 8000 if arguments.port is None else arguments.port) as listening:
-            rig = load_parameters(arguments.parameters)
-            serve(_packed(arguments, rig), rig, listening, arguments, "birthsim live")
+        with listen(settings.host, 8000 if settings.port is None else settings.port) as listening:
+            rig = load_parameters(settings.parameters)
+            serve(_packed(settings, rig), rig, listening, settings, "birthsim live")
 
 
-def _packed(arguments: argparse.Namespace, rig: Parameters) -> Packed:
+def _packed(settings: Settings, rig: Parameters) -> Packed:
     """What the page of a rig is made of, with what it opens with."""
-    opens = {"controller": f"{RESIDUAL}:{arguments.policy[0]}"} if arguments.policy else {}
-    opens |= {name: value for name in ("controller", "compare") if (value := getattr(arguments, name)) is not None}
-    packed = packed_page(rig, arguments.policy, opens.values())
+    opens = {"controller": f"{RESIDUAL}:{settings.policy[0]}"} if settings.policy else {}
+    opens |= {name: value for name in ("controller", "compare") if (value := getattr(settings, name)) is not None}
+    packed = packed_page(rig, settings.policy, opens.values())
     packed.content["opens"] |= opens
-    if arguments.static is None:
+    if settings.static is None:
         from birthsim_live.server.controller import offer  # needs the extra
 
         offer(packed.content, rig, opens.values())
@@ -82,18 +75,17 @@ def _packed(arguments: argparse.Namespace, rig: Parameters) -> Packed:
     return packed
 
 
-def _replay(arguments: argparse.Namespace) -> None:
+def _replay(settings: Settings, file: Path) -> None:
     for name in ("parameters", "controller", "compare", "static", "policy"):
-        if getattr(arguments, name):
+        if getattr(settings, name):
             raise ValueError(f"--{name} with --replay; allowed: without it, a recording has its own rig")
     need_server()
     from birthsim_live.rig.greeting import greeting  # which draws
 
-    file: Path = arguments.replay
-    with listen(arguments.host, 8001 if arguments.port is None else arguments.port) as listening:
+    with listen(settings.host, 8001 if settings.port is None else settings.port) as listening:
         recording = load_recording(file)
         packed = packed_page(Parameters())
         # It draws the recording's rig; the one that it could run stands still and is not seen.
         hello = packed.content["hello"]
         hello |= {**greeting(recording.rig, hello["choices"]["controller"]), "replay": file.name}
-        serve(packed, recording.rig, listening, arguments, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")
+        serve(packed, recording.rig, listening, settings, f"birthsim live --replay {file.name}, {recording.duration:.1f} s")

@@ -1,11 +1,7 @@
-"""The worst of many drawn worlds, and which of its figures makes it so.
-
-birthsim study worst --controller admittance-adaptive --sensors honest --episodes 800 --seed 90000
-"""
+"""The worst of many drawn worlds, and which of its figures makes it so."""
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import gymnasium
@@ -13,10 +9,10 @@ import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import number, penalize_lost, quantile
-from baselines.commands.shared import EPISODES, finite_number, run, seed_number, whole_up_to
+from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
 from baselines.identification.quantities import value_of
 from baselines.registry import make_controller
+from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.hands.user_forces import Ramp
@@ -26,6 +22,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
 from studies.comparison.grid import as_described
+from studies.comparison.tables import markdown
+from studies.results import Content
+from studies.study import Options, Study
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = SCENARIOS["probe"].duration - PROBE_REST
@@ -36,80 +35,94 @@ NAMED, CAUSES = 5, 8
 """Worst worlds that a row names; changes of one figure that are shown, of those that help most."""
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim study worst", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--controller", nargs="+", required=True, metavar="NAME", help="laws of the registry")
-    parser.add_argument("--sensors", action="append", choices=tuple(SENSORS), help="may be repeated (default: honest)")
-    parser.add_argument("--drawn", action="store_true", help="draw the figures of honest sensors too")
-    parser.add_argument(
-        "--metric", choices=tuple(UNITS), default="stiffness_error", metavar="NAME", help="default: %(default)s"
-    )
-    parser.add_argument("--limit", type=finite_number, default=15.0, help="worlds above it are counted (default: %(default)s)")
-    parser.add_argument("--rest", type=finite_number, default=PROBE_REST, help="s before the push (default: %(default)s)")
-    parser.add_argument(
-        "--worlds", type=whole_up_to(EPISODES), default=1, help="worst worlds that are explained (default: %(default)s)"
-    )
-    parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=800, help="default: %(default)s")
-    parser.add_argument("--seed", type=seed_number, default=90000, help="of the first world (default: %(default)s)")
-    parser.add_argument("--parameters", help="TOML file of the rig as the laws believe it (default: the paper's)")
-    run(parser, _worst)
+def _tasks(options: Options) -> dict[Any, Task]:
+    checked_number("--rest", options.rest, "s", least=0.0, most=LONGEST_REST)
+    believed = load_parameters(options.parameters or None)
+    rig = (believed if options.drawn else as_described(believed)).to_dict()
+    own = {name: getattr(options, name) for name in ("metric", "limit", "rest", "worlds", "episodes", "seed")}
+    pairs = [(name, sensors) for name in options.controller for sensors in options.sensors]
+    for name in options.controller:
+        make_controller(name, believed)
+    return {
+        pair: Task("-".join(pair), pair[0], worst, {"controller": pair[0], "sensors": pair[1], "rig": rig, **own})
+        for pair in pairs
+    }  # fmt: skip
 
 
-def _worst(arguments: argparse.Namespace) -> None:
-    checked_number("--rest", arguments.rest, "s", least=0.0, most=LONGEST_REST)
-    believed = load_parameters(arguments.parameters)
-    rest = f"{arguments.rest:g} s of rest before the push"
-    print(f"{arguments.episodes} worlds of {ENVIRONMENT} from seed {arguments.seed}, rigs and scenarios drawn, {rest}.")
-    print("Median, 95 % and worst.\n")
-    above = f"{arguments.metric}, {UNITS[arguments.metric]} | above {arguments.limit:g}"
-    print(f"| law | sensors | {above} | unrest, mm | lost | worst worlds |")
-    print("|---|---|---|---|---|---|---|")
-    found = []
-    for name in arguments.controller:
-        for sensors in arguments.sensors or ["honest"]:
-            rig = believed if arguments.drawn else as_described(believed)
-            done = _evaluated(name, arguments.rest, rig, sensors, arguments.seed, arguments.episodes)
-            sizes = sizes_of(done, arguments.metric)
-            order = np.argsort(-sizes, kind="stable")
-            signed = penalize_lost(done.metrics[arguments.metric], done.lost, applies=True)
-            listed = ", ".join(f"{done.seeds[k]} ({number(signed[k])})" for k in order[:NAMED])
-            cells = (
-                three(sizes),
-                str((sizes > arguments.limit).sum()),
-                three(sizes_of(done, "unrest")),
-                str(sum(done.lost)),
-                listed,
-            )
-            print(f"| {name} | {sensors} | {' | '.join(cells)} |", flush=True)
-            found += [(name, sensors, rig, done.seeds[k]) for k in order[: arguments.worlds]]
-    for name, sensors, rig, seed in found:
-        _explain(name, arguments, rig, sensors, seed)
+def worst(
+    controller: str, sensors: str, rig: dict[str, Any], metric: str, limit: float, rest: float, worlds: int, episodes: int,
+    seed: int,
+) -> Result:  # fmt: skip
+    """Median, 95 % and worst of a metric's sizes and of unrest, the worst worlds, and the causes of the first ``worlds``."""
+    own = Parameters.from_dict(rig)
+    done = _evaluated(controller, rest, own, sensors, seed, episodes)
+    sizes, signed = sizes_of(done, metric), penalize_lost(done.metrics[metric], done.lost, applies=True)
+    order = np.argsort(-sizes, kind="stable")
+    return {
+        "controller": controller, "sensors": sensors,
+        **{name: jsonable([quantile(sizes_of(done, name), part) for part in (0.5, 0.95, 1.0)]) for name in (metric, "unrest")},
+        "above": int((sizes > limit).sum()), "lost": int(sum(done.lost)),
+        "named": jsonable([[done.seeds[k], float(signed[k])] for k in order[:NAMED]]),
+        "worlds": [causes(controller, sensors, own, metric, rest, done.seeds[k]) for k in order[:worlds]],
+    }  # fmt: skip
 
 
-def _explain(name: str, arguments: argparse.Namespace, rig: Parameters, sensors: str, seed: int) -> None:
-    """Print the metric in world ``seed`` where one figure is as the law believes, and where one error of the sensors is 0."""
+def causes(controller: str, sensors: str, rig: Parameters, metric: str, rest: float, seed: int) -> dict[str, Any]:
+    """The metric in world ``seed``, and where one figure is as the law believes, or one error of the sensors is 0."""
 
-    def size(fixed: dict[str, float], rest: float = arguments.rest) -> float:
+    def size(fixed: dict[str, float], seconds: float = rest) -> float:
         own = {figure: [low, high] for figure, low, high in rig.ranges}
         changed = Parameters.from_dict({**rig.to_dict(), "randomize": {**own, **{k: [v, v] for k, v in fixed.items()}}})
-        return float(sizes_of(_evaluated(name, rest, changed, sensors, seed, 1), arguments.metric)[0])
+        return float(sizes_of(_evaluated(controller, seconds, changed, sensors, seed, 1), metric)[0])
 
     world, push, way = _world(rig, sensors, seed)
     ranges = documented_ranges(rig, sensors)
     drawn = {figure: value_of(rig, figure) for figure, (low, high) in ranges.items() if low < high}
-    rows = [(size({figure: value}), figure, f"{world[figure]:.4g}", f"{value:.4g}") for figure, value in drawn.items()]
     errors = [figure for figure in ranges if figure in drawn_by(sensors) and field_of(figure).metadata["least"] == 0.0]
-    rows += [(size({figure: 0.0}), figure, f"{world[figure]:.4g}", "0") for figure in errors]
-    here = _evaluated(name, arguments.rest, rig, sensors, seed, 1)
-    told = f"{arguments.metric} {number(sizes_of(here, arguments.metric)[0])} {UNITS[arguments.metric]}, a push of {push:.3g} N"
-    told += f" over {way:.3g} mm, {100 * here.required_strength_ratio[0]:.0f} % of the rig's strength"
-    print(f"\n{name}, {sensors} sensors, world {seed}: {told}\n")
-    print(f"| figure | of this world | put to | {arguments.metric}, {UNITS[arguments.metric]} |\n|---|---|---|---|")
-    print(f"| s of rest | {arguments.rest:g} | {2 * arguments.rest:g} | {number(size({}, 2 * arguments.rest))} |")
-    for value, *cells in sorted(rows)[:CAUSES]:
-        print(f"| {' | '.join(cells)} | {number(value)} |")
-    print(f"| all that are drawn | | as believed | {number(size(drawn))} |", flush=True)
+    put = [*drawn.items(), *((figure, 0.0) for figure in errors)]
+    rows = sorted((size({figure: value}), figure, world[figure], value) for figure, value in put)[:CAUSES]
+    here = _evaluated(controller, rest, rig, sensors, seed, 1)
+    return {
+        "seed": seed, "push_n": push, "way_mm": way, "strength": float(here.required_strength_ratio[0]),
+        **jsonable({
+            "size": float(sizes_of(here, metric)[0]), "as_believed": size(drawn),
+            "changes": [["s of rest", rest, 2 * rest, size({}, 2 * rest)], *([*cells, value] for value, *cells in rows)],
+        }),
+    }  # fmt: skip
+
+
+def _shown(content: Content) -> dict[str, str]:
+    settings, metric = content["settings"], content["settings"]["metric"]
+    named = f"{metric}, {UNITS[metric]}"
+    rows = [["controller", "sensors", named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds"]]
+    parts = []
+    for found in content["figures"]:
+        sizes = [", ".join(map(_number, found[name])) for name in (metric, "unrest")]
+        listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in found["named"])
+        rows.append([
+            found["controller"], found["sensors"], sizes[0], str(found["above"]), sizes[1], str(found["lost"]), listed,
+        ])  # fmt: skip
+        parts += [_explained(found, world, named) for world in found["worlds"]]
+    text = (
+        f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
+        f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst."
+    )
+    return {"worst.md": "\n\n".join([text, markdown(rows), *parts]) + "\n"}
+
+
+def _explained(found: dict[str, Any], world: dict[str, Any], named: str) -> str:
+    text = (
+        f"{found['controller']}, {found['sensors']} sensors, world {world['seed']}: {named.replace(',', '')} "
+        f"{_number(world['size'])}, a push of {world['push_n']:.3g} N over {world['way_mm']:.3g} mm, "
+        f"{100 * world['strength']:.0f} % of the rig's strength."
+    )
+    rows = [["figure", "of this world", "put to", named]]
+    rows += [[figure, f"{own:.4g}", f"{put:.4g}", _number(size)] for figure, own, put, size in world["changes"]]
+    return f"{text}\n\n{markdown([*rows, ['all that are randomised', '', 'as believed', _number(world['as_believed'])]])}"
+
+
+def _number(value: float | str) -> str:
+    return value if isinstance(value, str) else number(value)
 
 
 def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:
@@ -136,12 +149,24 @@ def sizes_of(evaluation: Evaluation, metric: str) -> Array:
     return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost, applies=True))
 
 
-def three(values: Array) -> str:
-    """Median, 95 % and worst."""
-    return ", ".join(number(quantile(values, fraction)) for fraction in (0.5, 0.95, 1.0))
-
-
 def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:
     hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
     return evaluate(ENVIRONMENT, make_controller(name, rig), name, episodes, seed, False, randomize=True, **setting)
+
+
+STUDY = Study(
+    (__name__,),
+    {
+        "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"), "sensors": ("honest",), "drawn": False,
+        "metric": "stiffness_error", "limit": 15.0, "rest": PROBE_REST, "worlds": 1, "episodes": 800, "seed": 90000,
+        "parameters": "",
+    },
+    _tasks, lambda _, found: list(found.values()), {**UNITS, "push_n": "N", "way_mm": "mm"}, _shown,
+    allowed={"sensors": tuple(SENSORS), "metric": tuple(UNITS)},
+    words={
+        "controller": "registered names", "drawn": "randomise the figures of honest sensors too",
+        "limit": "worlds above it are counted", "rest": "s before the push", "worlds": "worst worlds that are explained",
+        "seed": "of the first world", "parameters": "TOML file of the rig as the controllers believe it",
+    },
+)  # fmt: skip

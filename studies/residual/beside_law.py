@@ -1,143 +1,98 @@
-"""Residual policies of several seeds beside the law that they sit on, in the same worlds.
-
-birthsim study beside-law --policy DIR --sensors honest --episodes 128 --seed 80000
-"""
+"""Residual policies of several seeds beside the controller that they sit on, in the same worlds."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
+from agents.policy.controller import ResidualController
+from agents.policy.files import WEIGHTS, load_policy
+from agents.policy.seeds import policy_folders
 from agents.residual.privileged import acting
-from agents.residual.settings import LAWS, ResidualSettings, is_one_of
-from baselines.bench.statistics import LOST_ERROR, crossed_interval, number, quantile
-from baselines.commands.shared import EPISODES, run, seed_number, whole_up_to
-from baselines.work.tasks import Result
+from agents.residual.settings import LAWS, is_one_of
+from agents.training.validation import validate
+from baselines.bench.pieces import file_hash
+from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, number, quantile
+from baselines.work.files import finite
+from baselines.work.tasks import Result, Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.comparison.tables import markdown
 from studies.haptics.rendering import rendering
 from studies.haptics.worlds import Condition
+from studies.results import Content
+from studies.study import Found, Options, Study
 
-try:
-    from agents.policy.controller import ResidualController
-    from agents.policy.files import Policy, load_policy
-    from agents.policy.seeds import policy_folders
-    from agents.training.validation import Score, validate
-except ImportError as error:
-    raise SystemExit(f"{error}; a policy needs the extra: pip install 'birthsim[agents]'") from error
-
-HEAD = (
-    "settled error, mm: median",
-    "95 %",
-    "less than the law: median of the pairs, mm",
-    "mean, mm",
-    "stiffness error, %: median",
-    "lost",
-)
-"""Columns of the table of errors."""
-
-FELT = (
-    "bandwidth, Hz: mean",
-    "JND at 1 Hz: median",
-    "own error, mm: median",
-    "more bandwidth than the law: mean, Hz",
-    "less JND than the law: mean",
-    "less own error than the law: mean, mm",
-    "lost",
-)
-"""Columns of the table of what a hand feels."""
-
-GAINED = ("bandwidth", "jnd", "error")
-"""Figures of what a hand feels that are compared with the law's."""
+ERRORS = {"error": "settled error, mm", "stiffness": "stiffness error, %"}
+FELT = {"bandwidth": "bandwidth, Hz: mean", "jnd": "JND at 1 Hz: median", "error": "own error, mm: median"}
+MORE = {"bandwidth": "more bandwidth: mean, Hz", "jnd": "less JND: mean", "error": "less own error: mean, mm"}
+"""Figures of what a hand feels, and how much better they are than the controller's."""
 
 SETPOINT, PUSH = 2000.0, 10.0
 """N/m and N, of the multisine hand."""
 
-
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim study beside-law", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument(
-        "--policy", required=True, metavar="NAME", help="a folder of birthsim train or distill, or a shipped policy"
-    )
-    parser.add_argument(
-        "--beside", nargs="+", default=[], metavar="NAME", help=f"what else runs: one or more of {', '.join(LAWS)}, or policies"
-    )
-    parser.add_argument("--sensors", choices=tuple(SENSORS), default="honest", help="default: %(default)s")
-    parser.add_argument("--parameters", help="TOML file of the rig (default: the paper's)")
-    parser.add_argument("--episodes", type=whole_up_to(EPISODES), default=128, help="default: %(default)s")
-    parser.add_argument("--seed", type=seed_number, default=80000, help="of the first episode (default: %(default)s)")
-    parser.add_argument("--rigs", type=whole_up_to(1000), default=16, help="under multisine hands (default: %(default)s)")
-    run(parser, _compare)
+Key = tuple[str, str, str]
+"""What is measured, "errors" or "felt"; the training, or the controller; and its seed, "" for a controller."""
 
 
-def _compare(arguments: argparse.Namespace) -> None:
-    folders, policies = _seeds_of(arguments.policy)
-    settings = policies[0].settings
-    law, scores = _law(settings, policies[0].environment, arguments), _scores(policies, arguments)
-    within, errors = law.feasible, np.stack([score.error for score in scores])
-    print(f"{int(within.sum())} of {arguments.episodes} episodes are within the rig's strength; 95 % intervals of pairs.\n")
-    print(f"| law | {' | '.join(HEAD)} |\n|{'---|' * (1 + len(HEAD))}")
-    print(_row(settings.law, law, within))
-    for folder, score in zip(folders, scores, strict=True):
-        print(_row(folder.name, score, within, (law.error - score.error)[None, within]))
-    print(_less("all seeds", (law.error - errors)[:, within]))
-    for name in arguments.beside:
-        if is_one_of(name, LAWS):
-            others = {name: _law(replace(settings, law=name), policies[0].environment, arguments)}
-        else:
-            places, its = _seeds_of(name)
-            others = {f"{name} {place.name}": score for place, score in zip(places, _scores(its, arguments), strict=True)}
-        for label, score in others.items():
-            print(_row(label, score, within))
-        mean = np.mean([score.error for score in others.values()], axis=0)
-        print(_less(f"all seeds, less than {name}", (mean - errors)[:, within]))
-    if not _privileged(policies[0]):
-        _feel(folders, settings, arguments)
+def _tasks(options: Options) -> dict[Any, Task]:
+    rig = load_parameters(options.parameters or None).to_dict()
+    where = {"sensors": options.sensors, "rig": rig, "seed": options.seed}
+    folders = _seeds_of(options.policy)
+    own = load_policy(folders[0])
+    runs: list[Key] = []
+    for name in (own.settings.law, options.policy, *options.beside):
+        runs += [("errors", name, seed) for seed in ([""] if is_one_of(name, LAWS) else [one.name for one in _seeds_of(name)])]
+    if not _privileged(folders[0]):
+        runs += [("felt", name, seed) for what, name, seed in runs if name in (own.settings.law, options.policy)]
+    tasks = {}
+    for what, name, seed in dict.fromkeys(runs):
+        place = next(one for one in _seeds_of(name) if one.name == seed) if seed else folders[0]
+        piece = {"policy": str(place), "law": "" if seed else name, "network": file_hash(str(place / WEIGHTS)), **where}
+        count = {"episodes": options.episodes} if what == "errors" else {"rigs": options.rigs}
+        stem = f"{what}-{Path(name).name}-{seed}"
+        tasks[what, name, seed] = Task(stem, what, errors if what == "errors" else felt, {**piece, **count})
+    return tasks
 
 
-def _seeds_of(name: str) -> tuple[list[Path], list[Policy]]:
-    """Folders and policies of the seeds of one training."""
+def _seeds_of(name: str) -> list[Path]:
+    """Folders of the seeds of one training."""
     folders = policy_folders(name)
     policies = [load_policy(folder) for folder in folders]
     if len({(policy.environment, policy.settings) for policy in policies}) > 1:
         raise ValueError(f"policy = {name!r} holds policies of several settings; allowed: seeds of one training")
-    return folders, policies
+    return folders
 
 
-def _law(settings: ResidualSettings, environment: str, arguments: argparse.Namespace) -> Score:
-    """The law of ``settings`` alone."""
-    env = _worlds(environment, settings, arguments)
-    score = validate(env, lambda seen: np.zeros((len(seen), settings.size), np.float32), arguments.seed)
-    env.close()
-    return score
+def _privileged(folder: Path) -> bool:
+    return bool(load_policy(folder).training.get("privileged", False))
 
 
-def _scores(policies: Sequence[Policy], arguments: argparse.Namespace) -> list[Score]:
-    """Those of policies of the same settings."""
-    env = _worlds(policies[0].environment, policies[0].settings, arguments)
-    scores = [validate(env, acting(one.network.acting(), env, _privileged(one)), arguments.seed) for one in policies]
-    env.close()
-    return scores
-
-
-def _privileged(policy: Policy) -> bool:
-    return bool(policy.training.get("privileged", False))
-
-
-def _worlds(environment: str, settings: ResidualSettings, arguments: argparse.Namespace) -> Any:
-    return gymnasium.make_vec(
-        environment, num_envs=arguments.episodes, sensors=arguments.sensors, parameters=arguments.parameters, randomize=True,
+def errors(
+    policy: str, law: str, network: str, sensors: str, rig: dict[str, Any], seed: int, episodes: int
+) -> Result:  # fmt: skip
+    """Per world, what ``validate`` finds of a policy, or without it of the ``law`` in its environment."""
+    one = load_policy(Path(policy))
+    settings = replace(one.settings, law=law) if law else one.settings
+    env: Any = gymnasium.make_vec(
+        one.environment, num_envs=episodes, sensors=sensors, parameters=Parameters.from_dict(rig), randomize=True,
         **settings.to_dict(),
     )  # fmt: skip
+    if law:
+        score = validate(env, lambda seen: np.zeros((len(seen), settings.size), np.float32), seed)
+    else:
+        score = validate(env, acting(one.network.acting(), env, _privileged(Path(policy))), seed)
+    env.close()
+    return {
+        "error": score.error.tolist(), "stiffness": score.stiffness.tolist(), "within": score.feasible.tolist(),
+        "lost": int(score.lost),
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -148,65 +103,80 @@ class _Learned(Condition):
         return ResidualController(self.rig, self.controller)
 
 
-def _feel(folders: Sequence[Path], settings: ResidualSettings, arguments: argparse.Namespace) -> None:
-    """What a hand feels of the law and of each policy on it."""
-    rig, rigs = load_parameters(arguments.parameters), arguments.rigs
-    where = (rig, arguments.sensors, arguments.seed, rigs, settings.force_sensor)
-    law, *policies = (
-        _felt(rendering(condition, SETPOINT), rigs)
-        for condition in (Condition(settings.law, *where), *(_Learned(str(folder), *where) for folder in folders))
-    )
-    print(f"\nMultisine hand of {PUSH:g} N at {SETPOINT:g} N/m, {rigs} rigs drawn from seed {arguments.seed}, at rest.\n")
-    print(f"| law | {' | '.join(FELT)} |\n|{'---|' * (1 + len(FELT))}")
-    for name, own in zip((settings.law, *(folder.name for folder in folders)), (law, *policies), strict=True):
-        figures = [np.mean(own["bandwidth"]), quantile(own["jnd"], 0.5), quantile(own["error"], 0.5)]
-        better = [""] * len(GAINED) if own is law else [_interval(_mean, _gained(law, own, key)[None]) for key in GAINED]
-        print(f"| {name} | {' | '.join([*map(number, figures), *better])} | {own['lost']:g} |")
-    better = [_interval(_mean, np.stack([_gained(law, own, key) for own in policies])) for key in GAINED]
-    print(f"| all seeds | | | | {' | '.join(better)} | |")
+def felt(policy: str, law: str, network: str, sensors: str, rig: dict[str, Any], seed: int, rigs: int) -> Result:
+    """Means over poses and directions, per rig, under hands of ``PUSH``, and the number of lost lanes.
 
-
-def _gained(law: dict[str, Any], own: dict[str, Any], key: str) -> Array:
-    """How much better than the law, per rig (rigs,)."""
-    better: Array = own[key] - law[key]
-    return better if key == "bandwidth" else -better
-
-
-def _felt(found: Result, rigs: int) -> dict[str, Any]:
-    """Means over poses and directions, per rig (rigs,), under hands of ``PUSH``, and the number of lost lanes.
-
-    A lane that is lost counts with ``LOST_ERROR`` mm, a just noticeable difference of infinity and no bandwidth.
+    A lane that is lost counts with ``LOST_ERROR`` mm, a just noticeable difference of infinity (null) and no bandwidth.
     """
+    condition = Condition if law else _Learned
+    where = Parameters.from_dict(rig), sensors, seed, rigs, load_policy(Path(policy)).settings.force_sensor
+    found = rendering(condition(law or policy, *where), SETPOINT)
     kept, lost = np.array(found["peak"]) == PUSH, np.array(found["lost"])
     line = int(np.argmin(np.abs(np.array(found["frequency"]) - 1.0)))
     values = {
         "bandwidth": np.where(lost, 0.0, found["bandwidth"]), "jnd": np.where(lost, np.inf, found["differences"][line]),
         "error": np.where(lost, LOST_ERROR, found["error_own_mm"]),
     }  # fmt: skip
-    return {**{name: own[kept].reshape(-1, rigs).mean(axis=0) for name, own in values.items()}, "lost": lost[kept].sum()}
+    means = {name: own[kept].reshape(-1, rigs).mean(axis=0).tolist() for name, own in values.items()}
+    return {**means, "lost": int(lost[kept].sum())}
 
 
-def _row(name: str, score: Score, within: NDArray[np.bool_], gained: Array | None = None) -> str:
-    """A row of the table; ``gained`` (1, N), mm, less than the law's error."""
-    error = [number(quantile(score.error[within], fraction)) for fraction in (0.5, 0.95)]
-    stiffness = number(quantile(score.stiffness[within], 0.5))
-    return (
-        f"| {name} | {' | '.join([*error, *(_gains(gained) if gained is not None else ['', '']), stiffness])} | {score.lost} |"
-    )
+def _kept(options: Options, found: Found) -> Any:
+    """Rows of both tables; a difference is "less than the controller", positive where the policies are better."""
+    law = next(name for what, name, seed in found if what == "errors" and not seed)
+    rows = {"within": int(sum(found["errors", law, ""]["within"])), "errors": [], "felt": []}
+    rows["errors"] = list(_error_rows(found, law, options))
+    if ("felt", law, "") in found:
+        rows["felt"] = list(_felt_rows(found, law, options))
+    return finite(jsonable(rows))
 
 
-def _less(name: str, gained: Array) -> str:
-    return f"| {name} | | | {' | '.join(_gains(gained))} | | |"
+def _error_rows(found: Found, law: str, options: Options) -> Iterator[dict[str, Any]]:
+    within = np.array(found["errors", law, ""]["within"])
+
+    def of(name: str) -> list[tuple[str, Result]]:
+        return [(seed, one) for (what, who, seed), one in found.items() if (what, who) == ("errors", name)]
+
+    def less(errors: list[Result], than: Array) -> dict[str, Any]:
+        gained = (than - np.stack([one["error"] for one in errors]))[:, within]
+        return {"median": _interval(_median, gained), "mean": _interval(_mean, gained)}
+
+    theirs = np.array(found["errors", law, ""]["error"])
+    for name in dict.fromkeys((law, options.policy, *options.beside)):
+        for seed, one in of(name):
+            error, stiffness = (np.array(one[key], float)[within] for key in ERRORS)
+            yield {
+                "who": f"{Path(name).name} {seed}".strip(), "error": [quantile(error, part) for part in (0.5, 0.95)],
+                "less": less([one], theirs) if name == options.policy else None, "stiffness": quantile(stiffness, 0.5),
+                "lost": one["lost"],
+            }  # fmt: skip
+        if name != law:
+            mine, others = [one for _, one in of(options.policy)], [one for _, one in of(name)]
+            than = theirs if name == options.policy else np.mean([one["error"] for one in others], axis=0)
+            label = "all seeds" if name == options.policy else f"all seeds, less than {Path(name).name}"
+            yield {"who": label, "error": None, "less": less(mine, than), "stiffness": None, "lost": None}
 
 
-def _gains(gained: Array) -> list[str]:
-    """Median and mean of ``gained`` (seeds, N), with intervals over seeds and episodes."""
-    return [_interval(statistic, gained) for statistic in (_median, _mean)]
+def _felt_rows(found: Found, law: str, options: Options) -> Iterator[dict[str, Any]]:
+    def array(one: Result, key: str) -> Array:
+        return np.array([np.inf if value is None else value for value in one[key]])
+
+    def better(ones: list[Result]) -> dict[str, Any]:
+        gained = {key: np.stack([array(one, key) - array(found["felt", law, ""], key) for one in ones]) for key in FELT}
+        return {key: _interval(_mean, own if key == "bandwidth" else -own) for key, own in gained.items()}
+
+    policies = {seed: one for (what, name, seed), one in found.items() if (what, name) == ("felt", options.policy)}
+    for seed, one in {"": found["felt", law, ""], **policies}.items():
+        middle = {
+            key: float(np.mean(array(one, key))) if key == "bandwidth" else quantile(array(one, key), 0.5) for key in FELT
+        }
+        yield {"who": seed or law, **middle, "better": better([one]) if seed else None, "lost": one["lost"]}
+    yield {"who": "all seeds", **dict.fromkeys(FELT), "better": better(list(policies.values())), "lost": None}
 
 
-def _interval(statistic: Callable[[Array], float], gained: Array) -> str:
-    low, high = crossed_interval(statistic, gained)
-    return f"{number(statistic(gained))} ({number(low)} to {number(high)})"
+def _interval(statistic: Callable[[Array], float], values: Array) -> list[float]:
+    """A statistic of ``values`` (seeds, N) with its interval over seeds and episodes."""
+    return [statistic(values), *crossed_interval(statistic, values)]
 
 
 def _median(values: Array) -> float:
@@ -215,3 +185,51 @@ def _median(values: Array) -> float:
 
 def _mean(values: Array) -> float:
     return float(np.mean(values))
+
+
+def _shown(content: Content) -> dict[str, str]:
+    figures, settings = content["figures"], content["settings"]
+    head = ["controller", f"{ERRORS['error']}: median", "95 %", "less: median of the pairs, mm", "mean, mm"]
+    rows = [[*head, f"{ERRORS['stiffness']}: median", "lost"]]
+    for row in figures["errors"]:
+        less = [_entry((row["less"] or {}).get(key)) for key in ("median", "mean")]
+        rows.append([row["who"], *map(_entry, row["error"] or ("", "")), *less, _entry(row["stiffness"]), _entry(row["lost"])])
+    parts = [
+        f"{figures['within']} of {settings['episodes']} episodes, seeds from {settings['seed']}, `{settings['sensors']}` "
+        "sensors, randomised rigs, are within the rig's strength. Differences compare the same worlds, with 95 % intervals.",
+        markdown(rows),
+    ]
+    if figures["felt"]:
+        rows = [["controller", *FELT.values(), *MORE.values(), "lost"]]
+        for row in figures["felt"]:
+            better = [_entry((row["better"] or {}).get(key)) for key in MORE]
+            rows.append([row["who"], *(_entry(row[key]) for key in FELT), *better, _entry(row["lost"])])
+        parts += [
+            f"What a hand feels: multisines of {PUSH:g} N at {SETPOINT:g} N/m on {settings['rigs']} randomised rigs, means "
+            "over three poses and two directions.",
+            markdown(rows),
+        ]
+    return {"beside-law.md": "\n\n".join(parts) + "\n"}
+
+
+def _entry(value: Any) -> str:
+    if isinstance(value, list):
+        middle, low, high = map(_entry, value)
+        return f"{middle} ({low} to {high})"
+    return str(value or "") if value is None or isinstance(value, str) else number(value)
+
+
+STUDY = Study(
+    (__name__,),
+    {
+        "policy": "circle_honest_student", "beside": ("admittance-sensorless",), "sensors": "honest",
+        "parameters": "examples/honest_sensors_rig.toml", "episodes": 128, "seed": 170000, "rigs": 16,
+    },
+    _tasks, _kept, {"error": "mm", "stiffness": "%", "bandwidth": "Hz", "jnd": ""}, _shown,
+    allowed={"sensors": tuple(SENSORS)},
+    words={
+        "policy": "a folder of birthsim train or distill, or a shipped policy", "parameters": "TOML file of the rig",
+        "beside": f"what else runs: one or more of {', '.join(LAWS)}, or policies", "rigs": "under multisine hands",
+        "seed": "of the first episode",
+    },
+)  # fmt: skip

@@ -9,9 +9,13 @@ import shutil
 import pytest
 
 from agents.residual.settings import LAWS
-from studies.speed import command as bench
 from studies.speed import speeds as speed
+from studies.speed import study as bench
 from tests.console import call
+
+
+def plant(seconds):
+    return {"rows": [("plant", 1.0, "policy steps/s")]}
 
 
 @pytest.mark.slow
@@ -21,17 +25,18 @@ def test_another_checkout_is_measured_in_turns_with_this_one(tmp_path, monkeypat
     monkeypatch.setattr(speed, "ROUNDS", 2)
     monkeypatch.setattr(speed, "SHARED", speed.SHARED[:1])
     monkeypatch.setattr(speed, "LANES", ())
-    monkeypatch.setattr(bench, "_rows", lambda budget: [("plant", 1.0, "policy steps/s")])
+    monkeypatch.setattr(bench, "here", plant)
     out = tmp_path / "out"
     status, printed, complained = call("speed", monkeypatch, capsys, "--seconds", "0.02", "--beside", tmp_path, "--out", out)
-    assert (status, complained) == (0, "")
-    plant, single, one, two, ratio = json.loads((out / "bench.json").read_text())
-    assert plant == {"what": "plant", "value": 1.0, "unit": "policy steps/s"}
-    assert single["times_as_fast"] == pytest.approx(single["value"] / single["beside"])
-    assert 0.2 < single["times_as_fast"] < 5.0
-    assert ratio["value"] == pytest.approx(one["value"] / two["value"])
-    assert "beside" not in one
-    assert f"{tmp_path.name:>14} times as fast" in printed
+    assert status == 0, complained
+    figures = json.loads((out / "speed.json").read_text())["figures"]
+    assert figures["here"]["rows"] == [["plant", 1.0, "policy steps/s"]]
+    single, one, two, ratio = figures["environments"]["rows"]
+    assert single[4] == pytest.approx(single[1] / single[3])
+    assert 0.2 < single[4] < 5.0
+    assert ratio[1] == pytest.approx(one[1] / two[1])
+    assert len(one) == 3
+    assert f"| {tmp_path.name} | times as fast | unit |" in printed
 
 
 def test_what_a_checkout_cannot_do_ends_the_measurement():

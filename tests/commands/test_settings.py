@@ -28,7 +28,7 @@ EXAMPLES = {
     **{form: (one[0], f"commands.{one[1]}", ["--to", form, *one[3].split()]) for form, one in FORMS.items()},
 }
 """Command, or form of an export -> package, module, arguments of its example."""
-TYPED = [name for name, (_, module, _) in EXAMPLES.items() if name not in ("export", "study") and module != "commands.live"]
+TYPED = [name for name in EXAMPLES if name not in ("export", "study")]
 
 
 @pytest.mark.parametrize("name", TYPED)

@@ -1,10 +1,8 @@
-"""birthsim study speed: how fast things are here, each figure beside what it is to be compared with, in one run."""
+"""How fast things are here, each figure beside what it is to be compared with, in one run."""
 
 from __future__ import annotations
 
-import argparse
 import os
-import platform
 import re
 import tempfile
 import time
@@ -18,41 +16,41 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import birthsim_env
-from baselines.commands.shared import finite_number, run
 from baselines.registry import make_controller
 from baselines.staged import driving
-from baselines.work.files import make_folder, write_json
+from baselines.work.tasks import Result, Task
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
 from studies.comparison.grid import default_controllers
+from studies.comparison.tables import markdown
+from studies.results import Content
 from studies.speed import speeds as speed
-from studies.speed.stopwatch import seconds_per_call
+from studies.speed.stopwatch import seconds_per_call, step, vector_step
 from studies.speed.twin import Twin, has_compiler
+from studies.study import Found, Options, Study
 
 POLICY_PERIOD = 0.01
 PERIODS = 50
 """Control periods from which a controller's signals are taken: twelve samples of the laboratory's tracker."""
 STEPS_PER_PERIOD = round(POLICY_PERIOD / dynamics.INTEGRATION_STEP)
 
-Row = tuple[str, float, str]
-"""A row of the table: what, how much (NaN where it cannot be had), and its unit or why it cannot be had."""
+Row = tuple[Any, ...]
+"""A row of a table: what, how much (NaN where it cannot be had), and its unit or why it cannot be had; of the environments,
+with another checkout, also its figure and how many times as fast this one is."""
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim study speed", description="Measure the speed of plant, environments and law."
-    )
-    parser.add_argument("--seconds", type=finite_number, default=1.0, help="time per measurement (default: %(default)s)")
-    parser.add_argument("--out", type=Path, help="folder for bench.json")
-    instead = parser.add_mutually_exclusive_group()
-    instead.add_argument(
-        "--beside", type=Path, metavar="TREE", help="a checkout of another commit to measure in turns with this one"
-    )
-    instead.add_argument(
-        "--compile", action="store_true", help="measure instead how long first steps take, compiled and cached"
-    )
-    run(parser, _bench)
+def _tasks(options: Options) -> dict[Any, Task]:
+    if not options.seconds > 0:
+        raise ValueError(f"--seconds {options.seconds!r}; allowed: a positive number")
+    if options.beside:
+        speed.Process(Path(options.beside)).close()  # says at once what is wrong with it
+    own = {"seconds": options.seconds}
+    if options.compile:
+        return {"first": Task("first", "speed", first, {})}
+    return {
+        "here": Task("here", "speed", here, own),
+        "environments": Task("environments", "speed", environments, {**own, "beside": options.beside}),
+    }  # fmt: skip
 
 
 def packed_fraction() -> tuple[int, int]:
@@ -100,19 +98,6 @@ def _against_c(lanes: int, budget: float) -> tuple[float, float]:
     return speeds[0], speeds[1] if has_compiler() else float("nan")
 
 
-def _single(budget: float) -> float:
-    env = gymnasium.make("BirthSIM/Circle-v1")
-    env.reset(seed=0)
-    actions = cycle(_random_openings().astype(np.float32))
-
-    def step() -> None:
-        _, _, terminated, truncated, _ = env.step(next(actions))
-        if terminated or truncated:
-            env.reset()
-
-    return 1 / seconds_per_call(step, budget)
-
-
 def _random_openings() -> Array:
     """Openings (100, 4) that keep the air moving and the pistons away from the end stops for a second."""
     return np.random.default_rng(0).uniform(-0.3, 0.3, (100, 4))
@@ -136,13 +121,6 @@ def _scipy(budget: float) -> float:
             plant.state[:] = start
 
     return 1 / seconds_per_call(policy_step, budget)
-
-
-def _vector(environment: str, lanes: int, budget: float) -> float:
-    env = gymnasium.make_vec(environment, num_envs=lanes, num_threads=1)
-    env.reset(seed=0)
-    actions = np.zeros(env.action_space.shape or (), dtype=np.float32)
-    return lanes / seconds_per_call(lambda: env.step(actions), budget)
 
 
 def _control(name: str, sensors: str, lanes: int, budget: float) -> float:
@@ -175,91 +153,43 @@ def _frames(environment: str, budget: float) -> float:
         _, _, terminated, truncated, _ = env.step(env.action_space.sample())
         if terminated or truncated:
             env.reset()
-        started = time.perf_counter()
+        started = time.process_time()
         env.render()
-        spent.append(time.perf_counter() - started)
+        spent.append(time.process_time() - started)
     env.close()
     return 1 / float(np.median(spent))
 
 
-def _bench(arguments: argparse.Namespace) -> None:
-    budget = arguments.seconds
-    if not budget > 0:
-        raise ValueError(f"--seconds {budget!r}; allowed: a positive number")
-    if arguments.beside:
-        speed.Process(arguments.beside).close()  # says at once what is wrong with it
-    machine = f"{platform.machine()}, Python {platform.python_version()}"
-    if arguments.compile:
-        print(f"{machine}; CPU time of new processes to the end of their first steps, one after another\n")
-        results = [_shown((name, seconds, "s")) for name, seconds in speed.first_steps()]
-    else:
-        rows = _rows(budget)
-        print(f"{machine}, one thread; medians over {budget:g} s each\n")
-        results = [_shown(row) for row in rows]
-        print(f"\nenvironments, CPU time, {speed.ROUNDS} processes\n")
-        results += _environments(arguments.beside, budget)
-    if arguments.out is not None:
-        write_json(make_folder(arguments.out) / "bench.json", results)
-
-
-def _shown(row: Row, **more: float) -> dict[str, Any]:
-    """Prints a row, the values ``more`` behind its own, and returns it as JSON takes it."""
-    name, value, unit = row
-    numbers = "".join(f"{n:>14,.0f}" if n >= 1000 else f"{n:>14,.4g}" for n in (value, *more.values()))
-    print(f"{name:56}{numbers}  {unit}", flush=True)
-    return {"what": name.strip(), "value": value, "unit": unit, **more}
-
-
-def _environments(beside: Path | None, budget: float) -> list[dict[str, Any]]:
-    """Rows of the environments, each with that of another checkout and how many times as fast this one is, if one is given."""
-    trees = (speed.HERE, *((beside,) if beside else ()))
-    seconds = speed.measured((*speed.SHARED, *speed.LANES, *speed.THREADS), trees, budget)
-    if beside:
-        versions = "".join(f"{speed.version_of(tree):>14}" for tree in trees)
-        print(f"{'':56}{versions}{'times as fast':>14}")
-    results = []
-    for job in speed.SHARED:
-        ours = seconds[speed.HERE, job.name]
-        value, unit = job.in_unit(ours)
-        more = {}
-        if beside:
-            theirs = seconds[beside, job.name]
-            more = {"beside": job.in_unit(theirs)[0], "times_as_fast": theirs / ours}
-        results.append(_shown((job.name, value, unit), **more))
-    alone = [(job.name, *job.in_unit(seconds[speed.HERE, job.name])) for job in (*speed.LANES, *speed.THREADS)]
-    one, two = (seconds[speed.HERE, job.name] for job in speed.THREADS)
-    return [*results, *map(_shown, [*alone, ("  ratio: two threads to one", one / two, "times")])]
-
-
-def _rows(budget: float) -> list[Row]:
-    """Rows of plant, environments, laws and frames, measured in this process."""
+def here(seconds: float) -> Result:
+    """Rows of plant, environments, controllers and frames, measured in this process, CPU time."""
+    budget = seconds
     kernel, lane = _kernel(1024, budget), _kernel(1, budget)
     packed, scalar = packed_fraction()
     numba_speed, c_speed = _against_c(256, budget)
-    single, reference = _single(budget), _scipy(budget)
+    single, reference = 1 / step(speed.CIRCLE, budget), _scipy(budget)
     ours, theirs = _frames("BirthSIM/Circle-v1", budget), _frames("CartPole-v1", budget)
-    return [
-        ("plant, 1024 lanes, one core", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
-        ("  per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
+    rows: list[Row] = [
+        ("plant, 1024 lanes", kernel, "policy steps/s (10 ms = 40 RK4 steps)"),
+        ("per right-hand side and lane", 1e9 / kernel / STEPS_PER_PERIOD / 4, "ns"),
         ("plant, 1 lane", lane, "policy steps/s"),
-        ("  ratio: a lane among 1024 to a lane alone", kernel / lane, "times"),
+        ("ratio: a lane among 1024 to a lane alone", kernel / lane, "times"),
         (
-            "  packed divisions and roots in the machine code",
+            "packed divisions and roots in the machine code",
             packed,
             f"instructions, beside {scalar} scalar ones for remainders",
         ),
-        ("plant, 256 lanes, CPU time", numba_speed, "policy steps/s"),
+        ("plant, 256 lanes", numba_speed, "policy steps/s"),
         (
-            "  the same equations in C by hand, gcc -O3 -ffast-math",
+            "the same equations in C by hand, gcc -O3 -ffast-math",
             c_speed,
             "policy steps/s" if has_compiler() else "no C compiler",
         ),
-        ("  ratio: kernel to C", numba_speed / c_speed, "times"),
+        ("ratio: kernel to C", numba_speed / c_speed, "times"),
         ("gym.make step, valve mode", single, "policy steps/s"),
-        ("  the same plant through solve_ivp (RK45, rtol 1e-6)", reference, "policy steps/s"),
-        ("  ratio", single / reference, "times"),
-        ("gym.make_vec step, 128 lanes", _vector("BirthSIM/Circle-v1", 128, budget), "policy steps/s"),
-        ("gym.make_vec step, 1024 lanes", _vector("BirthSIM/Circle-v1", 1024, budget), "policy steps/s"),
+        ("the same plant through solve_ivp (RK45, rtol 1e-6)", reference, "policy steps/s"),
+        ("ratio", single / reference, "times"),
+        ("gym.make_vec step, 128 lanes", 1 / vector_step(speed.CIRCLE, 128, budget, num_threads=1), "policy steps/s"),
+        ("gym.make_vec step, 1024 lanes", 1 / vector_step(speed.CIRCLE, 1024, budget, num_threads=1), "policy steps/s"),
         ("backstepping, 1 lane", _control("backstepping", "ideal", 1, budget), "us per call"),
         *(
             (f"{name}, {sensors} sensors, batch of 256", _control(name, sensors, 256, budget), "us per lane and call")
@@ -267,6 +197,65 @@ def _rows(budget: float) -> list[Row]:
             for sensors in ("ideal", "lab")
         ),
         ("rgb_array frame, 640 x 480", ours, "frames/s"),
-        ("  Gymnasium's CartPole-v1, 600 x 400", theirs, "frames/s"),
-        ("  ratio", ours / theirs, "times"),
+        ("Gymnasium's CartPole-v1, 600 x 400", theirs, "frames/s"),
+        ("ratio", ours / theirs, "times"),
     ]
+    return {"rows": rows}
+
+
+def environments(seconds: float, beside: str) -> Result:
+    """Rows of the environments, CPU time in processes of their own, each with that of another checkout if one is given."""
+    trees = (speed.HERE, *((Path(beside),) if beside else ()))
+    measured = speed.measured((*speed.SHARED, *speed.LANES, *speed.THREADS), trees, seconds)
+    ours = {name: value for (tree, name), value in measured.items() if tree == speed.HERE}
+    rows: list[Row] = [(job.name, *job.in_unit(ours[job.name])) for job in (*speed.SHARED, *speed.LANES, *speed.THREADS)]
+    if beside:
+        theirs = {job.name: measured[trees[1], job.name] for job in speed.SHARED}
+        other = {job.name: (job.in_unit(theirs[job.name])[0], theirs[job.name] / ours[job.name]) for job in speed.SHARED}
+        rows = [(*row, *other.get(row[0], ())) for row in rows]
+    one, two = (ours[job.name] for job in speed.THREADS)
+    return {
+        "rows": [*rows, ("ratio: two threads to one", one / two, "times")],
+        "trees": [speed.version_of(tree) for tree in trees],
+    }
+
+
+def first() -> Result:
+    """Rows of first steps, compiled and cached."""
+    return {"rows": [(name, seconds, "s") for name, seconds in speed.first_steps()]}
+
+
+def _kept(_: Options, found: Found) -> Any:
+    return dict(found)
+
+
+TITLES = {
+    "here": "CPU time of one thread, medians over {seconds:g} s each.",
+    "environments": "Environments, CPU time, medians of processes that take turns.",
+    "first": "CPU time of new processes to the end of their first steps, one after another.",
+}
+
+
+def _shown(content: Content) -> dict[str, str]:
+    parts = [content["processor"]]
+    for key, found in content["figures"].items():
+        head = ["what", "speed", "unit"]
+        if len(found.get("trees", ())) > 1:
+            head = ["what", *found["trees"], "times as fast", "unit"]
+        rows = [[row[0], *map(_number, (row[1], *row[3:])), *[""] * (len(head) - len(row)), row[2]] for row in found["rows"]]
+        parts += [TITLES[key].format(**content["settings"]), markdown([head, *rows])]
+    return {"speed.md": "\n\n".join(parts) + "\n"}
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:,.0f}" if value >= 1000 else f"{value:,.4g}"
+
+
+STUDY = Study(
+    (__name__, "studies.speed.stopwatch"), {"seconds": 1.0, "beside": "", "compile": False}, _tasks, _kept, {}, _shown,
+    timed=True,
+    words={
+        "seconds": "time per measurement", "beside": "a checkout of another commit to measure in turns with this one",
+        "compile": "measure instead how long first steps take, compiled and cached",
+    },
+)  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import gymnasium
 import numpy as np
 import pytest
@@ -16,25 +14,20 @@ from studies.honest import worst
 SEED = 300
 
 
-def rows_of(text):
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
-
-
 @pytest.mark.slow
-def test_the_worst_world_is_that_of_the_evaluation_and_no_figure_changes_it_where_it_is_put_to_itself(monkeypatch, capsys):
-    command = ["worst", "--controller", "admittance-adaptive", "--sensors", "ideal", "--episodes", "3", "--seed", str(SEED)]
-    monkeypatch.setattr(sys, "argv", command)
-    worst.main()
-    out = capsys.readouterr().out
-    rows = rows_of(out)
+def test_the_worst_world_is_that_of_the_evaluation_and_no_figure_changes_it_where_it_is_put_to_itself():
+    found = worst.worst(
+        "admittance-adaptive", "ideal", Parameters().to_dict(), "stiffness_error", limit=15.0, rest=3.0, worlds=1, episodes=3,
+        seed=SEED,
+    )  # fmt: skip
     law = make_controller("admittance-adaptive", Parameters())
     done = evaluate("BirthSIM/Probe-v2", law, "law", 3, SEED, False, randomize=True)
     sizes = np.abs(done.metrics["stiffness_error"])
-    first = SEED + int(np.argmax(sizes))
-    assert rows[2][-1].startswith(f"{first} (")
-    assert f"world {first}: stiffness_error {sizes.max():.3g} %" in out
-    figures = {row[0] for row in rows[5:]}
-    assert {"s of rest", "mechanics.mass"} <= figures
+    (world,) = found["worlds"]
+    assert found["named"][0][0] == world["seed"] == SEED + int(np.argmax(sizes))
+    assert world["size"] == pytest.approx(sizes.max(), rel=1e-9)
+    figures = {row[0] for row in world["changes"]}
+    assert "s of rest" in figures
     assert not any(name.startswith("electronics.") for name in figures), "ideal sensors have none"
 
 

@@ -1,0 +1,79 @@
+"""``birthsim study beside-law``: several seeds of a policy beside their controller, in the same worlds."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from agents.policy.seeds import SHIPPED
+from studies.residual import beside_law
+from tests.console import call
+
+LAW = "backstepping-force-first"
+
+
+@pytest.fixture
+def told(monkeypatch, capsys, tmp_path):
+    def figures(*arguments):
+        common = ("--seed", "86000", "--jobs", 1, "--out", tmp_path / "out")
+        status, _, complained = call("beside-law", monkeypatch, capsys, *arguments, *common)
+        assert status == 0, complained
+        return json.loads((tmp_path / "out" / "beside-law.json").read_text())["figures"]
+
+    return figures
+
+
+@pytest.mark.usefixtures("brief")
+def test_one_seed_stands_beside_its_controller_and_the_mean_of_one_is_itself(told, tmp_path, monkeypatch):
+    shutil.copytree(SHIPPED / "circle" / "seed_0", tmp_path / "own" / "seed_0")
+    monkeypatch.setattr(beside_law, "_privileged", lambda folder: True)
+    monkeypatch.setattr(beside_law, "acting", lambda policy, env, privileged: policy)
+    ideal = ("--sensors", "ideal", "--episodes", 3, "--beside", "backstepping", "--parameters", "")
+    law, own, every, other, less = told("--policy", tmp_path / "own", *ideal)["errors"]
+    assert [row["who"] for row in (law, own, every, other, less)] == [
+        LAW, "own seed_0", "all seeds", "backstepping", "all seeds, less than backstepping",
+    ]  # fmt: skip
+    assert own["error"][0] < law["error"][0], "a law of millimetres, a policy of half of one"
+    assert own["less"] == every["less"]
+    assert own["less"]["median"][0] > 0.0
+
+
+@pytest.mark.slow
+def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(told):
+    ideal = ("--sensors", "ideal", "--episodes", 16, "--rigs", 1, "--beside", "backstepping", "--parameters", "")
+    found = told("--policy", "circle", *ideal)
+    medians = {row["who"]: row["error"][0] for row in found["errors"] if row["error"]}
+    assert len(medians) >= 3
+    assert max(error for who, error in medians.items() if who.startswith("circle")) < medians[LAW]
+    law, *seeds, every = found["felt"]
+    assert max(row["error"] for row in seeds) < law["error"], "own error under a multisine hand"
+    for row in seeds:
+        assert row["better"]["bandwidth"][0] == pytest.approx(row["bandwidth"] - law["bandwidth"])
+        assert row["better"]["error"][0] == pytest.approx(law["error"] - row["error"]), "one rig: its mean is the median"
+    assert every["better"]["error"][0] > 0.0
+
+
+@pytest.mark.slow
+def test_other_laws_and_policies_run_in_the_same_worlds(told):
+    student = "circle_honest_student"
+    rows = told("--policy", student, "--beside", "backstepping", student, "--episodes", 8, "--rigs", 1)["errors"]
+    seeds = [f"{student} seed_{k}" for k in range(5)]
+    assert [row["who"] for row in rows] == [
+        LAW, *seeds, "all seeds", "backstepping", "all seeds, less than backstepping",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_without_a_force_sensor_no_law_that_reads_one_runs_beside(monkeypatch, capsys, tmp_path):
+    brief = ("--episodes", 1, "--rigs", 1, "--jobs", 1, "--out", tmp_path / "out")
+    status, _, complained = call("beside-law", monkeypatch, capsys, "--beside", "admittance-adaptive", *brief)
+    assert status == 2
+    assert "force_sensor = False with law = 'admittance-adaptive'" in complained
+
+
+def test_no_policy_is_one_line(monkeypatch, capsys, tmp_path):
+    status, _, complained = call("beside-law", monkeypatch, capsys, "--policy", tmp_path, "--out", tmp_path / "out")
+    assert status == 2
+    assert len(complained.strip().splitlines()) == 1
