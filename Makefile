@@ -138,7 +138,7 @@ verify-slow: $(READY)
 	$(MAKE) verify
 
 kills: $(READY)
-	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
+	nice $(BIN)/python -m studies.kills --out docs/kills.json --page
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci

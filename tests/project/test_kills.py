@@ -7,10 +7,10 @@ import shutil
 import numpy as np
 import pytest
 
-from tests.kills import checks
-from tests.kills.report import write_outcomes, write_page
-from tests.kills.targets import TARGETS, Target
-from tests.kills.tries import Course, Outcome
+from studies.kills import checks
+from studies.kills.report import write_outcomes, write_page
+from studies.kills.targets import TARGETS, Target
+from studies.kills.tries import Course, Outcome
 
 
 @pytest.mark.slow
