@@ -1,7 +1,5 @@
 """The backstepping law: its openings against ``derived_law``, and Lyapunov's proof on the paper's model."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gains for a damping beside the stiffness: their range, and what they render on the whole plant."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The backstepping law whose pneumatic stiffness gives way to the force: the paper's where no valve saturates, and never lost
 where the paper's empties both chambers."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

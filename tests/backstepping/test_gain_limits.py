@@ -1,7 +1,5 @@
 """Gains beside the limits of what can be rendered, and what is said beyond them."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

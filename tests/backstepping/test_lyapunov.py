@@ -1,7 +1,5 @@
 """The Lyapunov function: along the paper's state model with the law's virtual flows, and along a run on the plant."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

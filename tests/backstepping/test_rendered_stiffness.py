@@ -1,7 +1,5 @@
 """What the law renders on the whole plant: stiffness, weight compensation and setpoints that change, without dry friction."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The state model (13), (14) against (5) in SymPy and chambers (6) differentiated independently."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy as sp

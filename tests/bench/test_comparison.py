@@ -1,7 +1,5 @@
 """The bench: paired worlds, lost episodes and ratios in its figures, its tables and its pictures."""
 
-from __future__ import annotations
-
 import csv
 import math
 

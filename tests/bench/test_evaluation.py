@@ -1,7 +1,5 @@
 """Controllers over seeded episodes: the same worlds for each, lost lanes, interrupts, and tables."""
 
-from __future__ import annotations
-
 import json
 import math
 

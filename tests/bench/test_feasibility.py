@@ -1,7 +1,5 @@
 """How much of the rig's strength an episode asks for: by virtual work on the linkage made of points, and by trying it."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

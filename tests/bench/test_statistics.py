@@ -1,7 +1,5 @@
 """Statistics of episodes: lost ones, quantiles, bootstrap intervals against exact distributions, paired ratios."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import product

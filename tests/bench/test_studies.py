@@ -1,7 +1,5 @@
 """What a hand feels: each study against a spring of known stiffness and against the law on the frictionless rig."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 A lane is the environment alone; a reset of some lanes leaves the others alone; a state goes on. All of it to the last bit.
 """
 
-from __future__ import annotations
-
 import importlib
 import io
 import itertools

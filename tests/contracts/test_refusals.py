@@ -1,7 +1,5 @@
 """Every public entry refuses what cannot be in one line: the argument's name and value, and what is allowed."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import partial

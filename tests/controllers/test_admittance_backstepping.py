@@ -1,7 +1,5 @@
 """The law behind the admittance: the jerk that it gives, resting pistons, gains at rest, valve lead, and gains that yield."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a controller with a force sensor knows: motion, disturbance, friction ahead, pressures and spools, lane by lane."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 

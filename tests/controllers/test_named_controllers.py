@@ -1,7 +1,5 @@
 """Controllers by name: those of the package, and a user's own from a file."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Bad input is refused with a message that names argument, value and what is allowed, and leaves the environment as it was."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

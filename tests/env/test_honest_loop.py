@@ -1,7 +1,5 @@
 """``honest`` sensors in the closed loop: lanes, threads, stops for Python, the valves' converter, and what is drawn."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

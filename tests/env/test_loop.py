@@ -1,7 +1,5 @@
 """The closed loop: compiled stages, stops for a user's Python, lanes, threads, processes and copies, all to the last bit."""
 
-from __future__ import annotations
-
 import copy
 import multiprocessing
 import pickle

@@ -1,7 +1,5 @@
 """Rows with names: where they stand, what Python and kernels see of them, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

@@ -1,7 +1,5 @@
 """The native vector environment: every lane is the single environment of its seed, through all of its episodes."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Every estimator of what a hand feels, on ports whose answer is known: mass, damper and spring, and a spring that is late."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The proposed experiment stays within the workspace, reads back as written, and runs without touching an end stop."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

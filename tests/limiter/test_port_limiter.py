@@ -1,7 +1,5 @@
 """An energy tank and a speed limit around any law."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ prints a table; ``--controller NAME`` does so with a controller that runs in Pyt
 ``--picture FILE`` also writes the screenshot of docs/live.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import statistics

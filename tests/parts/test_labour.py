@@ -1,7 +1,5 @@
 """The labour model against closed forms, SciPy's integrators and a balance of work; its file; what is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

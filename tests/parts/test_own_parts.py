@@ -1,7 +1,5 @@
 """A user's own reference and hand: functions, files and classes; options of controllers; every mistake is one line."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

@@ -1,7 +1,5 @@
 """A rig of one's own is the one that runs: ranges lie about it, bores and strokes have consequences, the rest is refused."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Reference trajectories: derivatives that fit together, paths that end where geometry says, what is unreachable refused."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Random streams: each random part has its own, draws fill their documented ranges, and ranges that cannot be are refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

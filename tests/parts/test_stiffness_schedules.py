@@ -1,7 +1,5 @@
 """Stiffness setpoints: closed-loop steps at the very instant, smooth pneumatic transitions, and refusals by name."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

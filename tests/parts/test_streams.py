@@ -1,7 +1,5 @@
 """Many lanes begin at once with the same numbers, to the last bit, as one by one with NumPy's generators."""
 
-from __future__ import annotations
-
 import copy
 
 import gymnasium

@@ -1,7 +1,5 @@
 """The user's hand as the scenarios have it: the profiles against the design's figures, and refusals by name."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

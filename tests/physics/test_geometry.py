@@ -1,7 +1,5 @@
 """Geometry (1), (2), (16), (17): closed formulas against points in the plane, SymPy and numerical differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

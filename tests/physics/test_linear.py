@@ -1,7 +1,5 @@
 """The linear model against finite differences, the second model, formulas of stiffness, valve gains, and the plant's motion."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

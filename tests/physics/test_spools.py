@@ -1,7 +1,5 @@
 """Valves that do not open as they are told, against the stop operator, a drawn characteristic and the second model."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

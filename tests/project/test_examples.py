@@ -1,7 +1,5 @@
 """The examples of ``examples/`` on other libraries are short (``tests/weekly`` runs them)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

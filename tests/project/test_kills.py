@@ -1,7 +1,5 @@
 """The harness itself: it ends what it begins, and sees what is torn."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

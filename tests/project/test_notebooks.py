@@ -1,7 +1,5 @@
 """The tutorials as notebooks: what the site offers, and what Colab and Binder would install."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

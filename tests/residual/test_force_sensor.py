@@ -1,7 +1,5 @@
 """Without a force sensor nothing inside reads the hand's force: neither the observation, nor an observer, nor the law."""
 
-from __future__ import annotations
-
 import re
 
 import gymnasium

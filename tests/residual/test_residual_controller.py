@@ -1,7 +1,5 @@
 """The residual from measurements: bit for bit what the environments do inside, in one lane and many, and what it forgets."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

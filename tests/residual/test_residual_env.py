@@ -1,7 +1,5 @@
 """The residual environments: zero is exactly the law, and what an action may do is bounded, smooth and forgotten on reset."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

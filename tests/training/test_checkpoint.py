@@ -1,7 +1,5 @@
 """A checkpoint: what it brings back, what it refuses, and that nothing in it is unpickled."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pickle

@@ -1,7 +1,5 @@
 """A privileged training sees the true figures in every observation; its policy runs in no controller."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """A learner's shifted rewards are the same problem: however an episode ends, its discounted value is less by the same."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

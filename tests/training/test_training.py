@@ -1,7 +1,5 @@
 """Residual training: it starts as the law, repeats itself bit for bit, gets better than the law, and keeps what was best."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

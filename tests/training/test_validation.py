@@ -1,7 +1,5 @@
 """What a validation says of errors that are known: settled, lost, beyond the rig's strength."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import gymnasium

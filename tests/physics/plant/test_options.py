@@ -1,7 +1,5 @@
 """Options of the plant: against the second model with a reservoir and a second body, closed forms, the plain plant."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """``Plant`` as an interface: shapes, refusals, equality of lanes and samples, balance at the start, vectorised kernel."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform

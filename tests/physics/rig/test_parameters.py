@@ -1,7 +1,5 @@
 """Parameters: every figure has unit, basis and limits; impossible rigs are refused by name; TOML files come back equal."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
