@@ -113,7 +113,7 @@ quick: $(READY)
 
 # Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
 test-weekly:
-	python3 -m tests.weekly $(CLIENTS)
+	python3 -m studies.clients $(CLIENTS)
 
 portable: $(READY)
 	$(BIN)/python -m studies.processors
