@@ -1,7 +1,7 @@
 """Real clients, each in a virtual environment of its own, on the wheel that a release would publish.
 
-``python -m studies.clients [NAME ...] [--keep] [--out FOLDER]``. One client after another gets a fresh environment, the wheel and
-its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
+``python -m studies.clients [NAME ...] [--keep] [--out FOLDER]``. One client after another gets a fresh environment, the wheel
+and its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
 """
 
 from __future__ import annotations
