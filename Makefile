@@ -113,7 +113,7 @@ quick: $(READY)
 
 # Each client in a virtual environment of its own, with the wheel; one after another, none is left. CLIENTS="sb3 rllib" names some.
 test-weekly:
-	python3 -m tests.weekly $(CLIENTS)
+	python3 -m studies.clients $(CLIENTS)
 
 portable: $(READY)
 	$(BIN)/python -m studies.processors
@@ -138,7 +138,7 @@ verify-slow: $(READY)
 	$(MAKE) verify
 
 kills: $(READY)
-	nice $(BIN)/python -m tests.kills --out docs/kills.json --page
+	nice $(BIN)/python -m studies.kills --out docs/kills.json --page
 
 lint: $(READY)
 	$(BIN)/ruff check birthsim birthsim_env baselines agents birthsim_build birthsim_live studies tests .ci

@@ -23,9 +23,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("birthsim", deadline=None, derandomize=True, database=None)
 settings.load_profile("birthsim")
 
-# Clients' tests run in environments of their own: make test-weekly.
-collect_ignore = ["weekly"]
-
 SMALL = """[training]
 environment = "BirthSIM/ProbeResidual-v2"
 lanes = 32

@@ -1,7 +1,5 @@
 """The console commands as a user runs them, for their tests: in a shell, within this process, until Ctrl-C; what they leave."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import re

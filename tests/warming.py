@@ -4,8 +4,6 @@ Without it every worker of pytest compiles for itself what it meets first. Stage
 simulation; other kernels are left to whoever calls them.
 """
 
-from __future__ import annotations
-
 import os
 import pkgutil
 from concurrent.futures import ProcessPoolExecutor

@@ -1,7 +1,5 @@
 """The backstepping law: its openings against ``derived_law``, and Lyapunov's proof on the paper's model."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -232,16 +230,6 @@ def test_a_damping_factor_up_to_its_least_is_bit_for_bit_the_law() -> None:
         assert np.array_equal(raised, plain) == ("damping_ratio" in options)
         assert np.array_equal(
             law.inspect(measured, reference, None, None, factor).gains, law.inspect(measured, reference).gains
-        )
-
-
-def test_nothing_told_is_zero_told() -> None:
-    measured, reference, _ = many(40)
-    nothing = np.zeros((2, 40))
-    for options in OPTIONS.values():
-        law = BacksteppingController(**options)
-        assert np.array_equal(
-            law.command(measured, reference, nothing, nothing, np.zeros(40)), law.command(measured, reference)
         )
 
 

@@ -1,7 +1,5 @@
 """Backstepping in Cartesian coordinates: the jerk that it gives, its poles, and the stiffness matrices that it renders."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

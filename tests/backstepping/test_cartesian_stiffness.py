@@ -1,7 +1,5 @@
 """Joint stiffness from Cartesian setpoints (18) and the duality of forces (17), with a Jacobian that SymPy derives itself."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Openings that put the force before the pneumatic stiffness, against the valves' characteristic and linear programmes."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The law whose dF*/dt leaves the Coulomb friction out: what it renders where the plant has LuGre friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

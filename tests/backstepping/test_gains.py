@@ -1,7 +1,5 @@
 """Gains for a closed-loop stiffness and damping: formulas derived with SymPy, and the polynomials solved by other means."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The compiled law: how many lanes it could not serve, how short a chamber counts, what it remembers and believes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

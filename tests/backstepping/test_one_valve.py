@@ -1,7 +1,5 @@
 """One 5/3 valve per cylinder: the rendered stiffness is kept, and the pneumatic stiffness settles by itself."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

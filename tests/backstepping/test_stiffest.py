@@ -1,7 +1,5 @@
 """Setpoints at which the backstepping laws would swing are refused by name."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Accuracy of the plant: what is measured, the tables and the figure, and that the plant's step keeps its error small."""
 
-from __future__ import annotations
-
 import json
 import math
 

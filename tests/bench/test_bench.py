@@ -1,7 +1,5 @@
 """birthsim study speed: what it measures in processes of their own, and what it says where something is missing."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -1,7 +1,5 @@
 """The figures of an episode on made-up signals whose answers are known by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

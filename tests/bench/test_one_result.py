@@ -1,7 +1,5 @@
 """One episode has one result: however many episodes run beside it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The scores' tables: who is best is named, and the data file has everybody, the worst first."""
 
-from __future__ import annotations
-
 import csv
 
 from baselines.bench.measures import DISCOUNTS

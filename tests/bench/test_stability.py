@@ -1,7 +1,5 @@
 """Stability maps: the hand against SciPy, what counts as stable, known corners of the maps, figures and the command."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

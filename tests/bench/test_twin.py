@@ -1,7 +1,5 @@
 """The hand-written C of the plant computes what the kernel computes, but for rounding."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the tests of the built code share."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """FMUs: FMPy accepts them, and they compute the bits of the plant and of the closed loop in Python."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

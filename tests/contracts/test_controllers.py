@@ -1,7 +1,5 @@
 """Every registered controller: one rig is a lane of many, a reset starts that lane alone, what cannot be is refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import math

@@ -3,8 +3,6 @@
 Each is used by ``gymnasium.make`` and by evaluation, and acts.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

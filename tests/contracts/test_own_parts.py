@@ -1,7 +1,5 @@
 """A user's own reference, hand and stiffness: what they lack, and answers that are none, are refused by name in one line."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

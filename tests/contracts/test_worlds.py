@@ -1,7 +1,5 @@
 """The environments' contract in worlds and under actions drawn at random, here, in threads and in other processes."""
 
-from __future__ import annotations
-
 import multiprocessing
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

@@ -1,7 +1,5 @@
 """Pieces of the admittance law, with the figures that its constants stand for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Controllers by name: those of the package, and a user's own from a file."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from baselines.registry import SHORT_NAMES, controller_names, make_controller, r
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
 
-PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 

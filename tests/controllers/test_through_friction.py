@@ -1,7 +1,5 @@
 """What the admittance with stiff backstepping achieves on the whole plant with friction: outcomes, and how it serves lanes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

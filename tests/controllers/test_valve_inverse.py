@@ -1,7 +1,5 @@
 """Openings for wanted mass flows against the valves of the plant."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What happens to a lane that ends, in every mode that Gymnasium knows, and Gymnasium's own wrappers around it."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

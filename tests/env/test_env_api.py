@@ -1,7 +1,5 @@
 """The single environment keeps Gymnasium's contract: checkers, registration, spaces, ends of episodes, actions, frames."""
 
-from __future__ import annotations
-
 import itertools
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Random policies through the environments at the corners of the documented parameter ranges: a million steps, or 100,000."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import gymnasium

@@ -1,7 +1,5 @@
 """What an environment tells: observation and info agree with the docstring, with each other and with the plant."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """What a policy is paid: every term is its documented formula, worked out from ``info``; what a jump asks for; what ends it."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

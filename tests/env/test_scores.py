@@ -1,7 +1,5 @@
 """What an episode is worth: scores order policies as their errors do; success is what its definition says of errors."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

@@ -1,7 +1,5 @@
 """``get_state`` and ``set_state``: an environment goes on from arrays as the one that they were taken from, bit for bit."""
 
-from __future__ import annotations
-
 import threading
 
 import gymnasium

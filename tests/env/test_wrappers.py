@@ -1,7 +1,5 @@
 """Every wrapper of Gymnasium takes the environments: the single ones take the single, the vector ones the native lanes."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The reference motion: square roots of matrices and the mass, damper and spring, held against SciPy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The observer of spools and chamber pressures: against exact lags, closed forms, and (6) integrated by SciPy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

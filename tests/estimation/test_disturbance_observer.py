@@ -1,7 +1,5 @@
 """The disturbance observer from measured speeds: its double pole, and unknown forces on the model of points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The observer of piston speeds: poles, bias and delay on made-up samples, errors on a rig that a tracker watches."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """Friction along a reference motion: LuGre integrated by SciPy on the linkage made of points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

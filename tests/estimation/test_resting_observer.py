@@ -1,7 +1,5 @@
 """The observer of pistons that friction holds: less noise, slips noticed, loads taken up, lanes apart."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 

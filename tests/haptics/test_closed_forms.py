@@ -1,7 +1,5 @@
 """Every estimator of what a hand feels, on ports whose answer is known: mass, damper and spring, and a spring that is late."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -19,15 +17,7 @@ from studies.haptics.impedance import (
     port_damping,
     unnoticed_up_to,
 )
-from studies.haptics.multisine import (
-    FREQUENCIES,
-    FUNDAMENTAL,
-    SECONDS,
-    SETTLING,
-    impedance_felt,
-    measured_part,
-    multisine_hand,
-)
+from studies.haptics.multisine import FREQUENCIES, FUNDAMENTAL, SECONDS, SETTLING, impedance_felt, measured_part, multisine_hand
 from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
 from studies.haptics.recording import Recording, record
 from studies.haptics.release import PULL, flight, pulling_hand

@@ -1,7 +1,5 @@
 """birthsim study haptics: files, tables and figures, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

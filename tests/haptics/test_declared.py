@@ -1,7 +1,5 @@
 """What laws declare is what they render: series, slow pushes on a rig without dry friction, and the rigid part of (18)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Standard deviations of estimates against those of many estimates, for a linear model."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

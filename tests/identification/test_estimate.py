@@ -1,7 +1,5 @@
 """Estimates: exact without noise, with derivatives that are those of the cost, within their intervals with noise."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

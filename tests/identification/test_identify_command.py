@@ -1,7 +1,5 @@
 """birthsim identify as a user runs it: an experiment, its log, the rig; what is wrong in one line; Ctrl-C."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Logs come back to the last bit from every kind of file, and each thing that is wrong with one is named in one line."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re

@@ -1,7 +1,5 @@
 """Predictions are the plant's own motion: against one lane moved alone, and against SciPy's integrator."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Short trials for the tests of this folder: the proposed experiment on a rig that is not its owner's."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The passive rig: where it rests, and that its air does not depend on how it moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

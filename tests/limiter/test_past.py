@@ -1,7 +1,5 @@
 """Signals at the time of a late position."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

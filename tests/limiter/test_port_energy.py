@@ -1,7 +1,5 @@
 """The work of a hand, in both counts, against closed forms of harmonic force and motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

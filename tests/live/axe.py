@@ -1,7 +1,5 @@
 """axe-core in a page: what keeps people from using it, as far as a program can tell."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

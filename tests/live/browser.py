@@ -1,7 +1,5 @@
 """Headless Chromium in front of a real server: what the page's tests and its measurement share."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

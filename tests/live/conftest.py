@@ -1,7 +1,5 @@
 """A browser, a rig and a window on it, for the tests of the page."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where a Chromium is looked for, what is said where there is none, and that CI does not skip the page in silence."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A rig under a law, control period by control period, for the tests of the controllers: measurements and references."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

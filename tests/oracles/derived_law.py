@@ -3,8 +3,6 @@
 Nothing of the package's formulas is used; ``BacksteppingController`` is compared with this.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

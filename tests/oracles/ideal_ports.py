@@ -1,7 +1,5 @@
 """Ports whose impedance is known in closed form: Z(s) = m s^2 + b s + K exp(-s T), the same along x and y."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq

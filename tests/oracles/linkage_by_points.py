@@ -5,8 +5,6 @@ distance r2; cylinder 1 runs from O3 = d3 (cos gamma3, sin gamma3) to the point 
 arrays (2, ...).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Observers over N lanes outside a stage: their kernels, and the memory that a stage keeps for them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.estimation import disturbance_observer, observers

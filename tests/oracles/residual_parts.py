@@ -1,7 +1,5 @@
 """Parts of a residual's stage by themselves, over N lanes: what limits its authority, and what it finds unexplained."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from agents.residual import authority, unexplained

@@ -3,8 +3,6 @@
 What acceleration and jerk a law's openings give it: an independent truth for laws that ask for a jerk. Arrays are (rows, N).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Physics and laws are pinned to stored trajectories, and their bits to stored hashes; ``make golden`` makes them anew."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

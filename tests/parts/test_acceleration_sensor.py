@@ -1,7 +1,5 @@
 """The acceleration sensor at the end effector: against a low-pass in closed form, statistics, and rigs that have none."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

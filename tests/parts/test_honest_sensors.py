@@ -1,7 +1,5 @@
 """The sensor model ``honest``: every error against statistics, closed forms or what ``lab`` shows, and all of them off."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

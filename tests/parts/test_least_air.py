@@ -1,7 +1,5 @@
 """The schedule of least air: its model against the equations solved anew, its choice against all others, its bounds."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

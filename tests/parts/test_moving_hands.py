@@ -1,7 +1,5 @@
 """Hands that move: a sine is its formula, noise has its size and band, the guiding hand is its differential equation."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """A user's own actuation: when it is asked, what a policy sees of its memory, and that its arrays stay its own."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

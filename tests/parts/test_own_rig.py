@@ -1,7 +1,5 @@
 """A rig of one's own is the one that runs: ranges lie about it, bores and strokes have consequences, the rest is refused."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest
@@ -70,14 +68,6 @@ def test_what_is_drawn_is_said():
 def test_ranges_that_cannot_be(tmp_path, table, message):
     with pytest.raises(ValueError, match=message):
         drawn(tmp_path, f"[randomize]\n{table}\n")
-
-
-def test_draws_that_are_impossible_together_are_refused_before_any_episode():
-    with pytest.raises(ValueError, match=r"randomize: some of the rigs drawn are impossible: Mechanics\.mass"):
-        gymnasium.make(
-            "BirthSIM/Probe-v2", parameters=Parameters().replace({"friction.law": "coulomb"}),
-            randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
-        )  # fmt: skip
 
 
 def test_the_dead_volume_follows_the_bore(tmp_path):

@@ -1,7 +1,5 @@
 """A user's own force: when it is asked, what it is told, and how wrong answers are refused, in one lane and in many."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Sensor models: when the laboratory's samples are taken and arrive, how noisy they are, and that ideal ones are exact."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Chambers of the plant: balances of mass and energy, and the limits that thermodynamics knows in closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

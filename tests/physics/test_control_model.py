@@ -1,7 +1,5 @@
 """The control model of the air (6)-(10), proven with SymPy from the gas law and from total derivatives, not from itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from types import FunctionType

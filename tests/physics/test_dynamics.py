@@ -1,7 +1,5 @@
 """The right-hand side against the second model's, state by state, and what the kernels around it do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ Below break-away it is a spring: nothing drifts, where LuGre does. A single pist
 chambers so large that they act like the open air.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The state to start from: forces in balance on both pistons, pneumatic stiffness as asked for, pressures that can be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

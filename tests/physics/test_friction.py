@@ -6,8 +6,6 @@ The force that the plant applies is measured from its accelerations: friction is
 without friction in the same state.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Geometry (1), (2), (16), (17): closed formulas against points in the plane, SymPy and numerical differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -207,12 +205,6 @@ def test_what_is_well_inside_is_what_the_inverse_model_reaches(rig: Parameters) 
     assert [geometry.well_inside(x, y, column) for x, y in points.T] == reached
     corner = pose(half, rig).end_effector[:, 0]
     assert not geometry.well_inside(*corner, column), "on the edge is not well inside"
-
-
-@pytest.mark.parametrize("y1", [0.2, -0.4])
-def test_a_linkage_that_cannot_close_is_refused(y1: float) -> None:
-    with pytest.raises(ValueError, match=rf"y1 = {y1:g} m .* -0\.33 < y1 < 0\.17 m"):
-        geometry.theta1(np.array([0.0, y1]), Parameters())
 
 
 @each_rig

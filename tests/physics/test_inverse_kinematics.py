@@ -1,7 +1,5 @@
 """Positions to jerks of the pistons along moving targets, against mpmath's derivatives of the distances between points."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Mechanics (3), (5), (14), (17) and the end stops: against Lagrange, Newton's law between points, and energy."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

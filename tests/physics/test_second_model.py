@@ -1,7 +1,5 @@
 """The plant against the second model: other coordinates, other states, another integrator, the same motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

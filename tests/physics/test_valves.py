@@ -1,7 +1,5 @@
 """Servovalves: ISO 6358 flows, the spool's lag and the exact inverses of the characteristic, through the plant itself."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The documentation site: every page has its place, the generated parts know everything, tables sort, and it builds."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re

@@ -1,6 +1,4 @@
-"""The examples of ``examples/`` on other libraries are short (``tests/weekly`` runs them)."""
-
-from __future__ import annotations
+"""The examples of ``examples/`` on other libraries are short (``studies/clients`` runs them)."""
 
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Another package named ``agents`` in the way: one line that says where it is and how to mend it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

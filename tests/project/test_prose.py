@@ -1,7 +1,5 @@
 """What reads the prose: it knows the glossary's names and finds a long sentence."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What README and the pages in docs/ say runs as it stands there, and every link leads somewhere."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

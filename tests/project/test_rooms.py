@@ -1,7 +1,5 @@
 """What a user imports is importable from the packages, wherever it lives."""
 
-from __future__ import annotations
-
 import ast
 import pathlib
 import subprocess

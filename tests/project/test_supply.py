@@ -1,7 +1,5 @@
 """Hashes, versions and licences of what the project is made of; the pages and workflows that speak of it."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import tomllib

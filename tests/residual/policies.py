@@ -1,7 +1,5 @@
 """Policies that several tests use."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

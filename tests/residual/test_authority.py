@@ -1,7 +1,5 @@
 """What limits the authority: what oscillates loses it in its direction, what swings takes stiffness; what decays does not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

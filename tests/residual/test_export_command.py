@@ -1,7 +1,5 @@
 """``birthsim export``: where it writes, what it says, and what it refuses in one line."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What a policy may say of stiffness and damping: zero says nothing, a measured hand still feels K, an unknown push K'."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

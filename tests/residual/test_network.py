@@ -1,7 +1,5 @@
 """What a policy's network computes: by hand, against PyTorch, with the same bits for one lane and many."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

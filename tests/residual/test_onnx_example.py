@@ -1,7 +1,5 @@
 """The example runs the exported policy as the controller does."""
 
-from __future__ import annotations
-
 import runpy
 import subprocess
 import sys

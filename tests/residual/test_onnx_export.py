@@ -1,7 +1,5 @@
 """The exported policy is the policy: PyTorch, NumPy and onnxruntime agree, and the file says what it is."""
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A policy's file that is missing, damaged or foreign is refused by name, in the same words by loader and controller."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

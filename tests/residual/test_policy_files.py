@@ -1,7 +1,5 @@
 """A policy's file: what is written is what is read, for others too, and nothing is unpickled."""
 
-from __future__ import annotations
-
 import ast
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """What a privileged policy is told is what was drawn, and no more."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What pistons met: unknown weight and dry friction, told apart by the way that they move; lanes, and new starts."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

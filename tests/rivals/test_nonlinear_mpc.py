@@ -1,7 +1,5 @@
 """Nonlinear MPC: its quadratic programme against SciPy, what it knows, and what it achieves on the whole plant."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the nonlinear MPC expects of the rig: Newton, polytropic chambers and SciPy along the horizon; its residuals."""
 
-from __future__ import annotations
-
 import dataclasses
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """PID, LQR and sliding mode: each law against formulas derived anew, and its motion on the control model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PID, LQR and sliding mode on the plant: circle, stiffness, lanes, saturation and bad input."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """Trainings that are over soon, and what of them must repeat itself."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Trainings that are over soon."""
 
-from __future__ import annotations
-
 import gymnasium
 import pytest
 

@@ -1,7 +1,5 @@
 """PPO, SAC and TQC: each begins as the law, learns, and its NumPy network does what its own ``predict`` does."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Configurations of trainings: those that come with the package, one's own, and what is unknown or impossible by name."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from dataclasses import fields

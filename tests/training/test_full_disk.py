@@ -1,7 +1,5 @@
 """A training on a disk without room."""
 
-from __future__ import annotations
-
 import errno
 import os
 import threading

@@ -1,7 +1,5 @@
 """Trainings that die: they go on, and end with the policy and the curve of one that never did."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

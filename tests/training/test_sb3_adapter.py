@@ -1,7 +1,5 @@
 """Stable-Baselines3's view of a native vector environment: the same rollouts, and ends as its own wrappers report them."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Several training seeds: interquartile means, intervals, the table, the shipped policies, the evaluation of all of them."""
 
-from __future__ import annotations
-
 import base64
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A student remembers what its teacher is told: DAgger on a problem whose answer is known, and the command that teaches."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

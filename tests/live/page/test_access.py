@@ -1,7 +1,5 @@
 """The live page for everybody: keys, screen readers, high contrast, night, small windows; and frames without numbers."""
 
-from __future__ import annotations
-
 import os
 import sys
 from urllib.request import urlopen

@@ -1,7 +1,5 @@
 """axe-core finds nothing on the page, whatever it shows, by day and by night."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

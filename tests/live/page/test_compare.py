@@ -1,7 +1,5 @@
 """Two rigs under one hand in headless Chromium: chosen, dragged, pushed by keys, recorded, on small screens, by command."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the page teaches: it opens with a problem that can be seen, leads through five lessons, and is a link."""
 
-from __future__ import annotations
-
 import json
 import os
 

@@ -1,7 +1,5 @@
 """A controller of one's own under the page: Python commands, the browser's rig waits, and what goes wrong is shown."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The live page in headless Chromium, pushed and looked at as a person would: real mouse and key events."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """A recording that is opened on the page: dropped or chosen, played, searched, and refused in a line where it is none."""
 
-from __future__ import annotations
-
 import base64
 import os
 import struct

@@ -1,7 +1,5 @@
 """The page as a folder of files: any server shows it below any address, and it records and replays by itself."""
 
-from __future__ import annotations
-
 import os
 import shutil
 

@@ -1,7 +1,5 @@
 """What the page makes visible: the error, the physics behind the force, and what its words mean."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """Recordings for tests, without a rig: rows that a rig could have shown, and files of them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

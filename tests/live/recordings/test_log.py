@@ -1,7 +1,5 @@
 """Logs: every number of a recording or evaluation comes back to the last bit, with its unit, or a line says what is wrong."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings: what is read is what was written, and what is no recording is refused by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A folder with the page for the tests of its rig."""
 
-from __future__ import annotations
-
 import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters

@@ -1,7 +1,5 @@
 """What the stage ``outside`` makes of a target that changes, as Python calls it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_build.layout import FIRST, Inputs

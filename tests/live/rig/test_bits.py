@@ -1,7 +1,5 @@
 """The rig of the page computes the bits of the environments: every row of every control period."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Passages: their derivatives are those of their values, and they meet both ends."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the package carries of the page's rig is what its sources make: ``python -m birthsim_live.rig.build`` renews it."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pace without a clock, in Node: what is due, what is dropped, and what is said about it."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.live.rig.worker import node

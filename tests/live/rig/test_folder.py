@@ -1,7 +1,5 @@
 """A policy of one's own, another rig, and a rig that the page cannot show: ``birthsim live``."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

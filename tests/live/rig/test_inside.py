@@ -1,7 +1,5 @@
 """Friction and flows of a frame, against the plant's own equations of motion and of mass."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

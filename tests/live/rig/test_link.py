@@ -1,7 +1,5 @@
 """Settings in the page's address: what is unreadable is refused by name."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

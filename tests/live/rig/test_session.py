@@ -1,7 +1,5 @@
 """A rig that a person plays with: what changes while it moves, what it shows, and when it stands still."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The worker's rig in Node, which runs what a browser runs: its rows and what it says."""
 
-from __future__ import annotations
-
 import base64
 import json
 import subprocess

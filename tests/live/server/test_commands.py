@@ -1,7 +1,5 @@
 """The commands that serve a page: until they are interrupted, or refuse in one line."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

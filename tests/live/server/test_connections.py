@@ -1,7 +1,5 @@
 """Connections of clients that say nothing, half of it, or what is no text: each is closed, and the others go on."""
 
-from __future__ import annotations
-
 import contextlib
 import http.client
 import logging

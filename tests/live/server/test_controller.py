@@ -1,7 +1,5 @@
 """Controllers that run in Python for a rig in a browser: numbers in, openings out, or why not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path

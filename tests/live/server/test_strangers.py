@@ -1,7 +1,5 @@
 """What strangers meet: foreign hosts and origins, and addresses that are not served."""
 
-from __future__ import annotations
-
 import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect

@@ -4,8 +4,6 @@ A run is a few drawn worlds of a scenario under openings given beforehand, under
 residual policy that comes with the package. Hashed are states, observations and rewards of every step.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ plant_lugre, plant_coulomb   the plant alone under seeded openings and forces, i
 circle                       the law on the Circle, end effector and pressures every 20 ms for 3 s
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Compiled code is never stale, and no cache file, disk or home directory is needed to compile."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shutil

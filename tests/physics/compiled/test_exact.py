@@ -1,7 +1,5 @@
 """The elementary functions of ours against 40 digits of mpmath, and their bits compiled against plain Python's."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

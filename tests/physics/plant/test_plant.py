@@ -1,7 +1,5 @@
 """``Plant`` as an interface: shapes, refusals, equality of lanes and samples, balance at the start, vectorised kernel."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform
@@ -100,28 +98,6 @@ def test_advance_refuses_by_name_and_leaves_the_state(command: Any, force: Any, 
     with pytest.raises(ValueError, match=message):
         plant.advance(command, force, duration)
     np.testing.assert_array_equal(plant.state, before)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"parameters": [Parameters()] * 3, "num_envs": 2}, r"parameters has 3 entries; allowed: .* 2 lanes"),
-        ({"parameters": [Parameters(), 7], "num_envs": 2}, r"parameters\[1\] = 7; allowed: a Parameters"),
-        ({"parameters": "no such file.toml"}, r"parameters = 'no such file\.toml' cannot be read"),
-    ],
-)
-def test_plant_refuses_by_name(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Plant(**arguments)
-
-
-@pytest.mark.parametrize(
-    ("rows", "value", "message"),
-    [(17, 1.0, r"state has shape \(17, 2\); allowed: \(18, 2\)"), (18, math.nan, r"state\[0, 0\] = nan")],
-)
-def test_derivatives_refuse_by_name(rows: int, value: float, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Plant(num_envs=2).derivatives(np.full((rows, 2), value), *idle(2))
 
 
 def test_a_lane_of_a_thousand_is_the_plant_alone_bit_for_bit() -> None:

@@ -5,8 +5,6 @@ fraction of its volume, or torn open. Pressures far beyond supply and atmosphere
 equations' own.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator

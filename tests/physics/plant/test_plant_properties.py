@@ -1,7 +1,5 @@
 """Laws that the plant keeps in any state of any rig: balances of mass and energy, mirror images, order of lanes."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

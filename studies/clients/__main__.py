@@ -1,7 +1,7 @@
 """Real clients, each in a virtual environment of its own, on the wheel that a release would publish.
 
-``python -m tests.weekly [NAME ...] [--keep] [--out FOLDER]``. One client after another gets a fresh environment, the wheel and
-its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
+``python -m studies.clients [NAME ...] [--keep] [--out FOLDER]``. One client after another gets a fresh environment, the wheel
+and its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def attempt(name: str, built: Path, out: Path, keep: bool) -> bool:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.weekly", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m studies.clients", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"clients; all of {', '.join(CLIENTS)} where none is named")
     parser.add_argument("--keep", action="store_true", help="leave the environments on the disk")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "weekly", help="where environments are made")

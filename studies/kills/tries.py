@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.kills import checks
-from tests.kills.processes import LOOK, Hangs, Running
-from tests.kills.targets import Target
+from studies.kills import checks
+from studies.kills.processes import LOOK, HangError, Running
+from studies.kills.targets import Target
 
 ENDINGS: dict[str, tuple[signal.Signals, bool, int]] = {
     "SIGKILL": (signal.SIGKILL, False, 1),
@@ -173,7 +173,7 @@ class Course:
         """Wait until a command and all that it has begun are gone, and hear what it has said."""
         try:
             outcome.statuses.append(running.wait())
-        except Hangs as error:
+        except HangError as error:
             outcome.trouble.append(str(error))
         outcome.hear(running, allowed)
 

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 from PIL import Image
 
-from tests.kills.processes import Running
-from tests.kills.targets import Target
+from studies.kills.processes import Running
+from studies.kills.targets import Target
 
 _BAR = re.compile(r"\d+%\||\[\d\d:\d\d[<,]|BirthSIM: compiling")
 """Progress bars, and the word while kernels compile."""

@@ -1,16 +1,14 @@
 """The harness itself: it ends what it begins, and sees what is torn."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np
 import pytest
 
-from tests.kills import checks
-from tests.kills.report import write_outcomes, write_page
-from tests.kills.targets import TARGETS, Target
-from tests.kills.tries import Course, Outcome
+from studies.kills import checks
+from studies.kills.report import write_outcomes, write_page
+from studies.kills.targets import TARGETS, Target
+from studies.kills.tries import Course, Outcome
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.work.files import write_json, write_text
-from tests.kills.tries import SCENARIOS, Outcome
+from studies.kills.tries import SCENARIOS, Outcome
 
 COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
 
@@ -74,4 +74,4 @@ def _faults(outcome: dict[str, Any]) -> list[str]:
     words += [f"left: {', '.join(outcome['leftovers'][:3])}"] if outcome["leftovers"] else []
     words += ["a traceback"] if outcome["tracebacks"] else []
     words += ["a process left"] if outcome["alive"] else []
-    return words + outcome["trouble"]
+    return [*words, *outcome["trouble"]]

@@ -1,4 +1,4 @@
-"""Kills commands at random moments and says what that leaves: ``python -m tests.kills --target evaluate --kills 10``."""
+"""Kills commands at random moments and says what that leaves: ``python -m studies.kills --target evaluate --kills 10``."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.kills.processes import end_all, hear_signals
-from tests.kills.report import read_outcomes, summary, write_outcomes, write_page
-from tests.kills.targets import ROOT, TARGETS
-from tests.kills.tries import SCENARIOS, Course
+from studies.kills.processes import end_all, hear_signals
+from studies.kills.report import read_outcomes, summary, write_outcomes, write_page
+from studies.kills.targets import ROOT, TARGETS
+from studies.kills.tries import SCENARIOS, Course
 
 PAGE = ROOT / "docs" / "kills.md"
 
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(prog="python -m tests.kills", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m studies.kills", description=__doc__)
     names = tuple(TARGETS)
     parser.add_argument("--target", action="append", choices=names, help="may be repeated (default: all)")
     parser.add_argument("--scenario", action="append", choices=tuple(SCENARIOS), help="may be repeated (default: all)")

@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.kills.targets import ROOT, program
+from studies.kills.targets import ROOT, program
 
 PATIENCE = 300.0
 """s, assumed: nothing here takes so long; what does hangs."""
@@ -22,7 +22,7 @@ LOOK = 0.002
 """s between two looks at a folder or a session."""
 
 
-class Hangs(Exception):
+class HangError(Exception):
     """A command has not ended in ``PATIENCE``."""
 
 
@@ -61,12 +61,12 @@ class Running:
             (os.killpg if group else os.kill)(self.process.pid, number)
 
     def wait(self) -> int:
-        """Its status, once it has ended; whatever hangs is killed and raises ``Hangs``."""
+        """Its status, once it has ended; whatever hangs is killed and raises ``HangError``."""
         try:
             return self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.sweep()
-            raise Hangs(f"no end within {PATIENCE:g} s: {self.stderr()[-300:]}") from None
+            raise HangError(f"no end within {PATIENCE:g} s: {self.stderr()[-300:]}") from None
 
     def sweep(self) -> None:
         """Kill what is left of the session."""

@@ -1,0 +1,1 @@
+"""Real clients, each in a virtual environment of its own: ``make test-weekly``."""
