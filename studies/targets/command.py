@@ -17,16 +17,16 @@ from baselines.registry import LISTED, SLOW
 from baselines.work.files import make_folder, write_json, write_text
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
-from birthsim_build.check import reference
-from birthsim_build.check.reference import CHAMBERS, PERIODS, SHARED, as_inputs, first_difference
-from birthsim_build.check.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.estimate import HOST
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.targets import reference
 from studies.targets.page import CLOCK, Line, page
+from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, first_difference
+from studies.targets.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
 
 LAWS, POLICY = ("backstepping", "admittance-backstepping"), "circle"
 LOOPS = [("ideal", "backstepping"), ("lab", "admittance-backstepping"), ("ideal", f"residual:{POLICY}")]

@@ -13,11 +13,11 @@ from starlette.testclient import TestClient
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_build.check.reference import whole_rows
 from birthsim_env.loop.rows import ASKED, OPENING, WORLD
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page
 from birthsim_live.server.controller import offer
+from studies.targets.reference import whole_rows
 from tests.live.server.conftest import HERE
 
 SOCKET = "ws://127.0.0.1:8000/controller?name="
