@@ -11,7 +11,7 @@ import sys
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import ForceProfile, Parameters
-from birthsim_env.parts.labour.model import Labour
+from studies.labour.model import Labour
 
 file = sys.argv[1] if len(sys.argv) > 1 else "labour.csv"
 labour, faster = Labour(), 25.0

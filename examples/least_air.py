@@ -11,9 +11,9 @@ import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
-from birthsim_env.parts.least_air import least_air
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.least_air.schedule import least_air
 
 PUSHES = {"circle": [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0), (0.0, -30.0)], "descent": [(80.0, 0.0)]}
 """N: the strongest pushes of the scenarios' hands."""

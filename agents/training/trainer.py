@@ -27,11 +27,7 @@ __all__ = ["train"]
 
 
 def train(
-    settings: TrainingSettings,
-    residual: ResidualSettings,
-    folder: Path,
-    parameters: Any = None,
-    position: int = 0,
+    settings: TrainingSettings, residual: ResidualSettings, folder: Path, parameters: Any = None, position: int = 0
 ) -> dict[str, Any]:
     """Train one residual policy and write it to ``folder``; returns what was reached.
 

@@ -98,11 +98,7 @@ class AdmittanceController(StagedController):
     }
 
     def __init__(
-        self,
-        parameters: Parameters | str | Path | None = None,
-        force_sensor: bool = True,
-        learn: bool = True,
-        **gains: float,
+        self, parameters: Parameters | str | Path | None = None, force_sensor: bool = True, learn: bool = True, **gains: float
     ) -> None:
         check_gains(self, gains)
         check_flags({"force_sensor": force_sensor, "learn": learn})

@@ -69,13 +69,7 @@ class Evaluation:
 
 
 def evaluate(
-    environment: str,
-    controller: Controller,
-    name: str,
-    episodes: int,
-    seed: int,
-    progress: bool = True,
-    **arguments: Any,
+    environment: str, controller: Controller, name: str, episodes: int, seed: int, progress: bool = True, **arguments: Any
 ) -> Evaluation:
     """Run ``episodes`` episodes of a registered id under a controller, which commands at every control period.
 

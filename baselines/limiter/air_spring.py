@@ -15,7 +15,7 @@ import math
 
 from baselines.valve_inverse import driving_flows
 from birthsim_env.loop.rows import Signals
-from birthsim_env.loop.signals import Joints
+from birthsim_env.loop.signals import InPlane, Joints
 from birthsim_env.physics import geometry, mechanics, valves
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
@@ -29,13 +29,13 @@ MEMORY = 1.0
 
 @helper
 def passive_openings(
-    forces: Array, rate: float, pressures: Array, hand: Array, here: Joints, there: Joints, seen: Signals, p: Rig,
+    forces: Array, rate: float, pressures: Array, hand: InPlane, here: Joints, there: Joints, seen: Signals, p: Rig,
     opening: Array, i: int,
 ) -> None:  # fmt: skip
     """Writes the spool openings (4, N) of lane ``i`` at the signals of now.
 
     ``forces`` (4, N), N, of the chambers that balance the weight, NaN before the first, go on by the fraction ``rate``. The
-    ``pressures`` (4, N), Pa, and the ``hand``'s force (2, N), N, are those when the position was taken; the pistons are
+    ``pressures`` (4, N), Pa, and the ``hand``'s force, N, are those when the position was taken; the pistons are
     ``here``, and belong ``there``.
     """
     y1, y2 = here.position[0, i], here.position[1, i]
@@ -48,9 +48,9 @@ def passive_openings(
         area_p, area_n = (p.area_p1, p.area_n1) if first else (p.area_p2, p.area_n2)
         area, other = (area_p, area_n) if outward > 0.0 else (area_n, area_p)
         along = (
-            mechanics.user_force1(hand[0, i], hand[1, i], kappa, sine, cosine)
+            mechanics.user_force1(hand.x[i], hand.y[i], kappa, sine, cosine)
             if first
-            else mechanics.user_force2(hand[0, i], hand[1, i], sine, cosine)
+            else mechanics.user_force2(hand.x[i], hand.y[i], sine, cosine)
         )
         length, stroke = half + p.dead_volume / area + outward * y, 2.0 * half + p.dead_volume / area + p.dead_volume / other
         force = pressures[chamber, i] * area

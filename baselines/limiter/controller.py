@@ -2,8 +2,8 @@
 
 *Energy.* The tank holds what the hand has given and has not been given back, at most ``MARGIN`` times the energy e'Ke/2 of the
 spring that is asked for and ``capacity`` besides. Its level over ``capacity``, at most 1, bounds the law's authority: the
-openings are that fraction of the law's, and for the rest those of a passive air spring about the target (``AirSpring``). The
-work is counted with late positions and with late forces (``PortEnergy``), and the emptier tank holds: so an oscillation that
+openings are that fraction of the law's, and for the rest those of a passive air spring about the target (``air_spring``). The
+work is counted with late positions and with late forces (``port_energy``), and the emptier tank holds: so an oscillation that
 goes on empties one of them. Authority comes back within ``BACK``. Where it has been low for longer than ``LASTING`` it stays
 lower, for ``RECOVERY``: a law that is too stiff for a hand settles at an authority with which it gives nothing.
 
@@ -33,7 +33,7 @@ from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
 from baselines.staged import LawStage, StagedController
 from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.signals import Joints, Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference, one_lane
 from birthsim_env.loop.stage import Stage, block, scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel
@@ -56,8 +56,11 @@ FULL = 2.0
 """The brake is on in full at so many times the speed limit."""
 
 
-SIGNALS = 6
-"""Pressures and the hand's force, which are kept for late positions."""
+class Late(Rows):
+    """What is kept for late positions."""
+
+    pressure = rows(4, "Pa", "of the chambers")
+    force = part(InPlane, "of the hand")
 
 
 class Limits(Numbers):
@@ -116,51 +119,53 @@ def _fill(tank: Tank, work: Work, asked: Reference, about: Limits, i: int) -> No
 
 
 @helper
-def _brake(seen: Seen, speed: float, moving: Array, i: int) -> None:
-    """Drives the valves of lane ``i`` against its pistons, which move at rows 2 and 3 of ``moving`` relative to the target."""
+def _brake(seen: Seen, speed: float, moving: Joints, i: int) -> None:
+    """Drives the valves of lane ``i`` against its pistons, which move relative to the target."""
     x, y = seen.velocity[0, i] - seen.reference.velocity[0, i], seen.velocity[1, i] - seen.reference.velocity[1, i]
     brake = min(max((math.sqrt(x * x + y * y) / speed - 1.0) / (FULL - 1.0), 0.0), 1.0)
     for chamber in range(4 if brake > 0.0 else 0):
-        rate = moving[2 + chamber // 2, i]
+        rate = moving.speed[chamber // 2, i]
         outwards = 1.0 if rate > 0.0 else -1.0 if rate < 0.0 else 0.0
         against = outwards if chamber % 2 else -outwards
         seen.opening[chamber, i] = (1.0 - brake) * seen.opening[chamber, i] + brake * against
 
 
 @helper
-def _joints(seen: Seen, about: Limits, still: bool, asked: bool, joints: Array, n: int) -> None:
-    """Writes the pistons (4, n) where the end effector is, or is ``asked`` to be; ``still``, or relative to the target."""
-    motion, target = scratch(4), seen.reference
+def _joints(seen: Seen, about: Limits, still: bool, asked: bool, joints: Joints, n: int) -> None:
+    """Writes the pistons where the end effector is, or is ``asked`` to be; ``still``, or relative to the target."""
+    motion, target = Point(scratch(Point.size)), seen.reference
     for k in range(2):
         for i in range(n):
-            motion[k, i] = target.position[k, i] if asked else seen.position[k, i]
-            motion[2 + k, i] = 0.0 if still else seen.velocity[k, i] - target.velocity[k, i]
-    piston_motion(motion, about.rig, joints, n)
+            motion.position[k, i] = target.position[k, i] if asked else seen.position[k, i]
+            motion.velocity[k, i] = 0.0 if still else seen.velocity[k, i] - target.velocity[k, i]
+    piston_motion(motion.rows, about.rig, joints.rows, n)
 
 
 @kernel
 def limit(world: int, seen: Seen, memory: int, about: Limits, tables: int, lane: int, n: int) -> int:
     """Bounds the openings of the law before."""
     slots = int(about.slots)
-    tank = Tank(block(memory, Tank.size + SIGNALS * slots))
-    here, there, signals, told, passive = scratch(4), scratch(4), scratch(SIGNALS), scratch(SIGNALS), scratch(4)
-    work = Work(scratch(Work.size))
+    tank, work = Tank(block(memory, Tank.size + Late.size * slots)), Work(scratch(Work.size))
+    now, then, passive = Late(scratch(Late.size)), Late(scratch(Late.size)), PerChamber(scratch(PerChamber.size))
+    here, there = Joints(scratch(Joints.size)), Joints(scratch(Joints.size))
     if about.capacity < math.inf:
         _joints(seen, about, True, False, here, n)
         _joints(seen, about, True, True, there, n)
         for i in range(n):
-            for k in range(SIGNALS):
-                signals[k, i] = seen.pressure[k, i] if k < 4 else seen.user_force[k - 4, i]
+            for chamber in range(4):
+                now.pressure[chamber, i] = seen.pressure[chamber, i]
+            for axis in range(2):
+                now.force.rows[axis, i] = seen.user_force[axis, i]
             late = (seen.time[i] - seen.position_time[i]) / about.period
-            recall(tank.past, tank.newest, slots, late, signals, told, i)
-            count_work(tank.energy, seen, told[4:], work, i)
+            recall(tank.past, tank.newest, slots, late, now.rows, then.rows, i)
+            count_work(tank.energy, seen, then.force.rows, work, i)
             _fill(tank, work, seen.reference, about, i)
             air_spring.passive_openings(
-                tank.forces, about.balance, told, told[4:], Joints(here), Joints(there), seen, about.rig, passive, i
+                tank.forces, about.balance, then.pressure, then.force, here, there, seen, about.rig, passive.rows, i
             )
             for valve in range(4):
                 own = tank.authority[i]
-                seen.opening[valve, i] = own * seen.opening[valve, i] + (1.0 - own) * passive[valve, i]
+                seen.opening[valve, i] = own * seen.opening[valve, i] + (1.0 - own) * passive.rows[valve, i]
     _joints(seen, about, False, False, here, n)
     for i in range(n):
         _brake(seen, about.speed, here, i)
@@ -217,7 +222,7 @@ class PortLimiter(StagedController):
         )  # fmt: skip
         fresh = Tank.lane(
             authority=1.0, ceiling=1.0, level=self._capacity, stiffness=np.nan, energy=Energy.lane(stamp=-np.inf),
-            forces=np.nan, past=np.full(SIGNALS * slots_of(period), np.nan),
+            forces=np.nan, past=np.full(Late.size * slots_of(period), np.nan),
         )  # fmt: skip
         return [LawStage(limit, about, fresh)]
 

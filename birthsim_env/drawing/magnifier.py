@@ -29,14 +29,7 @@ class Magnifier:
         offset = max([value for value in offsets if math.isfinite(value)], default=0.0)
         return next((window for window in _WINDOWS if offset <= 0.42 * window), _WINDOWS[-1])
 
-    def draw(
-        self,
-        picture: pygame.Surface,
-        scene: Scene,
-        end_effector: Point,
-        window: float,
-        main_scale: float,
-    ) -> None:
+    def draw(self, picture: pygame.Surface, scene: Scene, end_effector: Point, window: float, main_scale: float) -> None:
         """Show ``window`` m around the compliant target; ``main_scale`` is that of the rig, px/m."""
         box, unit, target, compliant_target = self.box, self._unit, scene.target, scene.compliant_target
         places = (compliant_target, end_effector, target)

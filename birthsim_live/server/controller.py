@@ -1,6 +1,7 @@
 """A controller that runs in Python for a rig in somebody's browser (``page/worker/remote.js``).
 
-A socket is one controller, from its making to its end. In each control period the page sends numbers: 1 where positions are
+A socket is one controller, from its making to its end, in a thread of its own, so that one that hangs stops nothing else that
+is served. In each control period the page sends numbers: 1 where positions are
 samples, else 0, and the rows of ``Signals``; the answer are the openings of the four valves. Where the controller gives up the
 answer is a line of text, and the end.
 """
@@ -9,10 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
-import time
 import traceback
-from collections.abc import Collection, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Iterable
+from concurrent.futures import Future
+from functools import partial
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -23,9 +26,6 @@ from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.words import controller_choice
-
-QUICK = 0.002
-"""s: a controller that answered in less is called beside all else that is served; a thread of its own costs 0.13 ms more."""
 
 
 def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
@@ -62,22 +62,38 @@ async def command(socket: WebSocket, rig: Parameters, names: Collection[str]) ->
         await socket.close(1008)
         return
     await socket.accept()
-    loop, spent = asyncio.get_running_loop(), QUICK
-    with ThreadPoolExecutor(1) as thread:
-        try:
-            law = await loop.run_in_executor(thread, made, name, rig)
-            while True:
-                numbers = np.frombuffer(await socket.receive_bytes())
-                given, started = (law, name, rig, numbers), time.perf_counter()
-                answer = openings(*given) if spent < QUICK else await loop.run_in_executor(thread, openings, *given)
-                spent = time.perf_counter() - started
-                await socket.send_bytes(answer)
-        except WebSocketDisconnect:
-            return
-        except Exception as error:
-            traceback.print_exc()
-            await socket.send_text("".join(traceback.format_exception_only(error)).strip().splitlines()[-1])
-            await socket.close()
+    questions = SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]()
+    Thread(target=_answer, args=(questions,), daemon=True).start()
+
+    def asked(function: Callable[..., Any], *arguments: Any) -> asyncio.Future[Any]:
+        answer = Future[Any]()
+        questions.put((answer, partial(function, *arguments)))
+        return asyncio.wrap_future(answer)
+
+    try:
+        law = await asked(made, name, rig)
+        while True:
+            numbers = np.frombuffer(await socket.receive_bytes())
+            await socket.send_bytes(await asked(openings, law, name, rig, numbers))
+    except WebSocketDisconnect:
+        return
+    except Exception as error:
+        traceback.print_exc()
+        await socket.send_text("".join(traceback.format_exception_only(error)).strip().splitlines()[-1])
+        await socket.close()
+    finally:
+        questions.put(None)
+
+
+def _answer(questions: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]) -> None:
+    """Answer questions in turn until there is None."""
+    while (question := questions.get()) is not None:
+        answer, function = question
+        if answer.set_running_or_notify_cancel():
+            try:
+                answer.set_result(function())
+            except BaseException as error:  # a user's own code may also end Python
+                answer.set_exception(error)
 
 
 def openings(law: Controller, name: str, rig: Parameters, numbers: Any) -> bytes:

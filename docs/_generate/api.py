@@ -10,8 +10,6 @@ BEYOND = {
         "env.BirthSIMEnv",
         "vector_env.BirthSIMVectorEnv",
         "parts.actuation.Actuation",
-        "parts.least_air.least_air",
-        "parts.labour.model.Labour",
     ),
     "baselines": ("staged.StagedController", "staged.LawStage", "bench.evaluation.table"),
     "agents": (),

@@ -98,11 +98,7 @@ def stiffness_study(
 
 
 def disturbance_study(
-    controller: str,
-    source: str,
-    rig: dict[str, Any],
-    amplitudes: Sequence[float] = AMPLITUDES,
-    poses: Sequence[Pose] = POSES,
+    controller: str, source: str, rig: dict[str, Any], amplitudes: Sequence[float] = AMPLITUDES, poses: Sequence[Pose] = POSES
 ) -> Result:
     """Distance from the compliant target (19) under a held push, ``error_mm``, and in % of the displacement asked for,
     ``error_percent``: a row per amplitude, a column per pose and direction along the axes. The weight counts."""

@@ -74,7 +74,4 @@ def _controller_file(_: Any, rng: Rng, folder: Path, case: Case) -> None:
     make_controller(f"{path}:Own", Parameters())
 
 
-OWN_PARTS: dict[str, Kind] = {
-    "csv": Kind(loaded, _csv),
-    "controller-file": Kind(loaded, _controller_file, runs_code=True),
-}
+OWN_PARTS: dict[str, Kind] = {"csv": Kind(loaded, _csv), "controller-file": Kind(loaded, _controller_file, runs_code=True)}

@@ -19,15 +19,7 @@ from studies.haptics.impedance import (
     port_damping,
     unnoticed_up_to,
 )
-from studies.haptics.multisine import (
-    FREQUENCIES,
-    FUNDAMENTAL,
-    SECONDS,
-    SETTLING,
-    impedance_felt,
-    measured_part,
-    multisine_hand,
-)
+from studies.haptics.multisine import FREQUENCIES, FUNDAMENTAL, SECONDS, SETTLING, impedance_felt, measured_part, multisine_hand
 from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
 from studies.haptics.recording import record
 from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, lost_lanes, resting

@@ -15,7 +15,7 @@ from baselines.work.files import write_json
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
-from birthsim_build.check.reference import (
+from studies.targets.reference import (
     CHAMBERS,
     PERIODS,
     SHARED,
@@ -25,7 +25,7 @@ from birthsim_build.check.reference import (
     loop_rows,
     plant_states,
 )
-from birthsim_build.check.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
+from studies.targets.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.estimate import CYCLES, HOST
 from birthsim_env.parts.scenarios import SCENARIOS

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from baselines.backstepping.strict_feedback import neglected_acceleration, strict_feedback_rates
 from birthsim_env import Parameters
+from studies.verification.strict_feedback import neglected_acceleration, strict_feedback_rates
 from tests.oracles import derived_law as derived
 
 RIGS = {

@@ -5,9 +5,9 @@ from functools import cache
 import pytest
 
 from birthsim_build.bundle import identifier
-from birthsim_build.check import reference
-from birthsim_build.check.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
-from birthsim_build.check.running import ROW, library_rows, node_rows
+from studies.targets import reference
+from studies.targets.reference import CHAMBERS, PERIODS, SHARED, as_inputs, loop_rows
+from studies.targets.running import ROW, library_rows, node_rows
 from tests.build.targets import assert_same_bits, need_program
 
 CASES = [

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from birthsim_build.check.reference import PERIODS, SHARED, loop_rows
-from birthsim_build.check.running import ROW, library_loop, node_rows
 from birthsim_build.image import HEAD, LEFT_OUT
 from birthsim_build.layout import ROWS
 from birthsim_build.stages import FORCE_TIME, SETPOINTS_TIME
 from birthsim_env import StiffnessSchedule, UserForce
 from birthsim_env.parts.scenarios import SCENARIOS
+from studies.targets.reference import PERIODS, SHARED, loop_rows
+from studies.targets.running import ROW, library_loop, node_rows
 from tests.build.targets import assert_same_bits, need_program
 
 LOOP = {"scenario": "circle", "sensors": "ideal", "controller": "admittance-backstepping"}

@@ -7,11 +7,11 @@ import pytest
 
 from birthsim_build.building import build_c
 from birthsim_build.bundle import Bundle
-from birthsim_build.check.reference import plant_states
-from birthsim_build.check.running import ROW, library_rows
 from birthsim_build.estimate import HOST
 from birthsim_build.loops import plant_world
 from birthsim_env import Parameters, Plant
+from studies.targets.reference import plant_states
+from studies.targets.running import ROW, library_rows
 from tests.build.targets import assert_same_bits, need_linker
 
 PERIODS = 500

@@ -3,9 +3,9 @@
 import pytest
 
 from birthsim_build.bundle import identifier
-from birthsim_build.check.reference import PERIODS, SHARED, law_openings, loop_rows
-from birthsim_build.check.running import EMULATED, ROW, emulated_rows
 from birthsim_build.estimate import HOST
+from studies.targets.reference import PERIODS, SHARED, law_openings, loop_rows
+from studies.targets.running import EMULATED, ROW, emulated_rows
 from tests.build.targets import BUILT, assert_same_bits, build, need_linker, need_program
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ from baselines.limiter import air_spring
 from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
 from birthsim_env.loop.rows import Signals, fill_measurement
-from birthsim_env.loop.signals import Joints
+from birthsim_env.loop.signals import InPlane, Joints
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
@@ -28,9 +28,9 @@ def _count(own: Energy, seen: Signals, force: Array, work: Work) -> None:
 
 @kernel
 def _passive(
-    forces: Array, rate: float, hand: Array, here: Joints, there: Joints, seen: Signals, p: Rig, opening: Array
+    forces: Array, rate: float, hand: InPlane, here: Joints, there: Joints, seen: Signals, p: Rig, opening: Array
 ) -> None:  # fmt: skip
-    for i in range(hand.shape[1]):
+    for i in range(hand.x.shape[0]):
         air_spring.passive_openings(forces, rate, seen.pressure, hand, here, there, seen, p, opening, i)
 
 
@@ -74,5 +74,5 @@ class AirSpring:
             joints.append(Joints(np.empty((Joints.size, place.shape[1]))))
             pistons_at(np.concatenate([place, np.zeros_like(place)]), Rig(self.p), joints[-1].rows)
         seen = signals_of(measurement, reference)
-        _passive(self.forces, self.rate, seen.user_force, *joints, seen, Rig(self.p), opening)
+        _passive(self.forces, self.rate, InPlane(seen.user_force.copy()), *joints, seen, Rig(self.p), opening)
         return opening

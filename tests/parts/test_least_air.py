@@ -11,8 +11,8 @@ import pytest
 
 from baselines.bench.pneumatic_range import pneumatic_range
 from birthsim_env import Circle, Hold, Parameters, Path, StiffnessSchedule
-from birthsim_env.parts import least_air as module
-from birthsim_env.parts.least_air import GRID, leaked, least_air, supplied
+from studies.least_air import schedule as module
+from studies.least_air.schedule import GRID, leaked, least_air, supplied
 
 RIG = Parameters()
 PUSHES = [(20.0, 0.0), (-20.0, 0.0), (0.0, 20.0), (0.0, -20.0)]

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from birthsim_build.check.reference import SHARED, loop_rows
 from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT
 from birthsim_env import Parameters, StiffnessSchedule, UserForce
 from birthsim_env.loop.rows import SINCE_JUMP
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_live.rig.folder import packed_page, write_page
+from studies.targets.reference import SHARED, loop_rows
 from tests.build.targets import assert_same_bits
 from tests.live.rig.worker import run
 

@@ -1,5 +1,6 @@
 """Controllers that run in Python for a rig in a browser: numbers in, openings out, or why not."""
 
+import threading
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -10,11 +11,11 @@ from starlette.testclient import TestClient
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocketDisconnect
 
-from birthsim_build.check.reference import whole_rows
 from birthsim_env.loop.rows import ASKED, OPENING, WORLD
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page
 from birthsim_live.server.controller import offer
+from studies.targets.reference import whole_rows
 from tests.live.server.conftest import HERE
 
 SOCKET = "ws://127.0.0.1:8000/controller?name="
@@ -50,6 +51,20 @@ class Wide(Law):
     def command(self, measurement, reference):
         return np.full((4, 1), 2.0)
 """
+HELD = """
+from tests.live.server.test_controller import GOES_ON, HANGS, LET_GO
+
+class Held(Law):
+    calls = 0
+    def command(self, measurement, reference):
+        self.calls += 1
+        if self.calls > 10:
+            HANGS.set()
+            GOES_ON.append(LET_GO.wait(60.0))
+        return self.own.command(measurement, reference)
+"""
+HANGS, LET_GO = threading.Event(), threading.Event()
+GOES_ON: list[bool] = []
 
 
 def numbers(rows: np.ndarray | None = None, sampled: bool = False) -> bytes:
@@ -59,7 +74,7 @@ def numbers(rows: np.ndarray | None = None, sampled: bool = False) -> bytes:
 
 @pytest.fixture
 def own(tmp_path: Path) -> str:
-    (tmp_path / "mine.py").write_text(OWN)
+    (tmp_path / "mine.py").write_text(OWN + HELD)
     return str(tmp_path / "mine.py")
 
 
@@ -85,6 +100,23 @@ def test_one_that_gives_up_says_why_and_is_closed(kind: str, said: str, own: str
         with pytest.raises(WebSocketDisconnect):
             ws.receive_text()
     assert "Traceback" in capfd.readouterr().err  # where the author looks
+
+
+def test_one_that_hangs_stops_nothing_else(own: str, app: Callable[..., ASGIApp]) -> None:
+    hanging, other = f"{own}:Held", f"{own}:Law"
+    with TestClient(app(hanging, other), base_url=HERE) as live, live.websocket_connect(SOCKET + hanging) as ws:
+        for _ in range(10):
+            ws.send_bytes(numbers())
+            last = ws.receive_bytes()
+        ws.send_bytes(numbers())
+        assert HANGS.wait(60.0)
+        assert live.get("/").status_code == 200
+        with live.websocket_connect(SOCKET + other) as beside:
+            beside.send_bytes(numbers())
+            assert beside.receive_bytes() == last
+        assert GOES_ON == []  # it has hung all the while
+        LET_GO.set()
+        assert len(ws.receive_bytes()) == len(last)
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 7, b"\0" * 8 * ASKED, b"\0" * 3000])

@@ -1,1 +1,0 @@
-"""Runs what was built, and the same in Python, so that bits can be compared."""
