@@ -87,8 +87,7 @@ def main() -> None:
         raise SystemExit(2)
     sys.argv[1:] = rest
     package, module, _, example = COMMANDS[name]
-    own = name == "export" and any(word.startswith("--to") for word in rest)  # a form has an example of its own
-    perform(f"birthsim {name}", package, module, "" if own else f"birthsim {example}")
+    perform(f"birthsim {name}", package, module, f"birthsim {example}")
 
 
 def overview() -> str:
