@@ -15,8 +15,8 @@ from studies.fuzz.harness import Case, Kind
 from studies.fuzz.mutations import Rng
 
 MODULES = {
-    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify")},
-    **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "explain")},
+    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify", "evaluate", "train")},
+    **{name: f"agents.commands.{name}" for name in ("export", "explain")},
     "sweep": "studies.sweeps.command",
     "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},

@@ -78,11 +78,10 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
             if command == "live":
                 _live(path)
                 return "works", ""
-            package = "agents" if command in ("evaluate", "train") else "baselines"
             place = out.with_suffix(".webp") if command == "animate" else out
             argv = [f"birthsim {command}", *lines[command], "--parameters", str(path), "--out", str(place)]
             with patch.object(sys, "argv", argv):
-                perform(f"birthsim {command}", package, f"commands.{command}")
+                perform(f"birthsim {command}", "baselines", f"commands.{command}")
         return "works", ""
     except SystemExit as end:
         line = [text for text in re.split(r"[\r\n]+", complained.getvalue()) if "error:" in text or "Error" in text]
