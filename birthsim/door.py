@@ -33,7 +33,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             "animate --seed 1 --out out/forceps.webp"),
     },
     "measure": {
-        "evaluate": Command("agents", "commands.evaluate", "controllers over seeded episodes, with tables",
+        "evaluate": Command("baselines", "commands.evaluate", "controllers over seeded episodes, with tables",
             "evaluate --controller backstepping pid --out out/evaluation"),
         "tune": Command("baselines", "commands.tune", "a search for a controller's gains",
             "tune --controller pid --trials 75 --out out/tune"),
@@ -43,7 +43,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             "study speed"),
     },
     "learn": {
-        "train": Command("agents", "commands.train", "residual policies by PPO, SAC or TQC",
+        "train": Command("baselines", "commands.train", "residual policies by PPO, SAC or TQC",
             "train --config circle --seeds 5 --out out/circle"),
         "distill": Command("agents", "commands.distill", "students without what their teachers are told",
             "distill --teacher out/told --out out/students"),
@@ -87,8 +87,7 @@ def main() -> None:
         raise SystemExit(2)
     sys.argv[1:] = rest
     package, module, _, example = COMMANDS[name]
-    own = name == "export" and any(word.startswith("--to") for word in rest)  # a form has an example of its own
-    perform(f"birthsim {name}", package, module, "" if own else f"birthsim {example}")
+    perform(f"birthsim {name}", package, module, f"birthsim {example}")
 
 
 def overview() -> str:

@@ -31,7 +31,8 @@ def main() -> None:
     elif form is None and {"-h", "--help"} & set(arguments):
         forms = (f"  {name:10} {what}" for name, (_, _, what, _) in FORMS.items())
         lines = ["usage: birthsim export --to FORM ...", "", "forms:", *forms]
-        print("\n".join([*lines, "", "birthsim export --to FORM --help has a form's options."]))
+        example = f"example: birthsim export --to wasm {FORMS['wasm'][3]}"
+        print("\n".join([*lines, "", "birthsim export --to FORM --help has a form's options.", example]))
         raise SystemExit(0)
     else:
         said, asked = ("is missing", "") if form is None else (shown(form), near(form, FORMS))

@@ -8,6 +8,11 @@ import sys
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def begin(module: str, settings: dict[str, str]) -> None:
-    """Go on as ``python -m module`` with the same arguments and these variables; imports of this process are gone."""
-    os.execve(sys.executable, [sys.executable, "-m", module, *sys.argv[1:]], os.environ | settings)
+def only_under(settings: dict[str, str], module: str = "") -> None:
+    """Begin anew with these variables, unless they are as they should be; or go on as ``python -m module`` with them.
+
+    Imports of this process are gone then; the arguments stay.
+    """
+    if module or any(os.environ.get(name) != value for name, value in settings.items()):
+        words = [module] if module else ["birthsim", *sys.argv[0].split()[1:]]
+        os.execve(sys.executable, [sys.executable, "-m", *words, *sys.argv[1:]], os.environ | settings)

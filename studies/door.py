@@ -57,7 +57,7 @@ def overview() -> str:
     width = max(map(len, STUDIES))
     lines = [f"  {name:{width}}  {study.measures}" for name, study in STUDIES.items()]
     own = [f"  {name:{width}}  {does}" for name, does in OWN.items()]
-    return "\n".join(["usage: birthsim study NAME ...", "", *lines, "", *own])
+    return "\n".join(["usage: birthsim study NAME ...", "", *lines, "", *own, "", "example: birthsim study speed"])
 
 
 def main(arguments: list[str]) -> None:

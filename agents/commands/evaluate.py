@@ -1,33 +1,18 @@
-"""birthsim evaluate: controllers over seeded episodes, tables, JSON and figures."""
+"""What birthsim evaluate does: controllers over seeded episodes, tables, JSON and figures."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import gymnasium
-from cyclopts import Parameter
 
 from agents.residual.settings import NO_LAW
 from baselines.bench.evaluation import merged, overview, table
 from baselines.bench.evaluation_data import data
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
-from baselines.commands.settings import (
-    CONTROL,
-    EPISODES,
-    RANDOMIZE,
-    Controllers,
-    Env,
-    Parts,
-    Processes,
-    Randomize,
-    RigFile,
-    Seed,
-    Sensors,
-    Set,
-    whole,
-)
+from baselines.commands.evaluate import Settings
+from baselines.commands.settings import RANDOMIZE
 from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
 from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks
@@ -35,33 +20,7 @@ from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import load_parameters
 
 
-@dataclass(kw_only=True)
-class Settings(Parts, Processes):
-    """Evaluate controllers: the same seeds, so the same worlds, for each of them.
-
-    Without --controller and --policy it is backstepping. With --policy the trained residual runs beside the controllers named,
-    or else beside the paper's and the one that it corrects. What the output folder holds of the same settings, rig and code is
-    kept, so that an interrupted run goes on.
-    """
-
-    env: Env = "BirthSIM/Circle-v1"
-    controller: Controllers = None
-    policy: Annotated[str | None, Parameter(group=CONTROL, metavar="DIR")] = None
-    """For the controller residual: a folder that birthsim train wrote, or the name of what is shipped, such as circle."""
-    set: Set = field(default_factory=list)
-    episodes: Annotated[int, whole(1, EPISODES)] = 32
-    """Episodes of each controller."""
-    seed: Seed = 0
-    """Seed of the first episode."""
-    sensors: Sensors = "ideal"
-    randomize: Randomize = "all"
-    """What differs between episodes; sensors: the scenario, and the figures of honest sensors."""
-    parameters: RigFile = None
-    out: Path
-    """Folder for evaluation.json, .md and .csv, and figures."""
-
-
-def main(settings: Settings) -> None:
+def run(settings: Settings) -> None:
     """Run the episodes that the folder lacks; write and print tables."""
     settings.controller = settings.controller or (["backstepping"] if settings.policy is None else ["residual"])
     rig = load_parameters(settings.parameters)

@@ -1,18 +1,17 @@
-"""birthsim train: residual policies by reinforcement learning, several seeds in one command."""
+"""What birthsim train does: residual policies by reinforcement learning, several seeds in one command."""
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import Parameter
-
-from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
-from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
+from agents.residual.settings import LAWS, ResidualSettings
+from agents.training.configuration import TrainingSettings, load_configuration, override
 from agents.training.time_split import told
-from baselines.commands.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
+from baselines.commands.settings import RANDOMIZE
+from baselines.commands.train import Settings
 from baselines.commands.worlds import check_environment, check_world
 from baselines.work.files import make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
@@ -20,44 +19,7 @@ from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 
-@dataclass(kw_only=True)
-class Settings:
-    """Train residual policies on top of a controller, by PPO, SAC or TQC.
-
-    Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
-    whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
-    the same policy.
-    """
-
-    config: Annotated[str, Parameter(metavar="NAME", help=f"{', '.join(configuration_names())}, or a TOML file.")] = "circle"
-    algorithm: Annotated[str | None, Parameter(choices=ALGORITHMS)] = None
-    """How it learns."""
-    law: Annotated[str | None, Parameter(choices=LAWS)] = None
-    """Controller underneath; none: the policy drives the valves by itself."""
-    impedance: Annotated[str | None, Parameter(choices=tuple(IMPEDANCES))] = None
-    """What an action sets beside forces."""
-    authority: Annotated[float | None, Parameter(metavar="N")] = None
-    """Bound of the residual force."""
-    steps: Annotated[int | None, whole()] = None
-    """Policy steps of each seed."""
-    until: Annotated[float | None, Parameter(metavar="PERCENT")] = None
-    """End once the error in validation is so far below that of the paper's controller."""
-    seed: Seed | None = None
-    """First seed, else the configuration's, 0."""
-    seeds: Annotated[int, whole()] = 1
-    """Number of seeds, one after the other from --seed on."""
-    jobs: Annotated[int, whole(), Parameter(group=PROCESSES)] = 1
-    """Seeds trained side by side."""
-    out: Path
-    """Folder; each seed has one in it with its policy, checkpoint, curve and events."""
-    env: Env | None = None
-    sensors: Sensors | None = None
-    randomize: Randomize | None = None
-    """What training varies."""
-    parameters: RigFile = None
-
-
-def main(settings: Settings) -> None:
+def run(settings: Settings) -> None:
     """Train every seed and report."""
     training, residual = _settings(settings)
     check_environment(training.environment, residual=True)

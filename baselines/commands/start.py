@@ -37,20 +37,12 @@ def perform(name: str, package: str, module: str, example: str = "") -> None:
     """Run a command that is called by ``name``; its help ends with the example."""
     sys.argv[0] = name
     loaded = load(name, package, module)
-    try:
-        if not hasattr(loaded, "Settings"):  # argparse reads its options
-            loaded.main()
-            return
+    if hasattr(loaded, "Settings"):
         from baselines.commands.command import perform_with
 
         perform_with(name, loaded.Settings, loaded.main, example)
-    except SystemExit as end:
-        try:
-            if not hasattr(loaded, "Settings") and example and not end.code and {"-h", "--help"} & set(sys.argv[1:]):
-                print(f"\nexample: {example}", flush=True)
-        except BrokenPipeError:  # who reads has seen enough, as head has; what is left goes nowhere
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise
+    else:  # it has commands of its own below it
+        loaded.main()
 
 
 def load(name: str, package: str, module: str) -> ModuleType:

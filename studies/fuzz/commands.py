@@ -15,65 +15,18 @@ from studies.fuzz.harness import Case, Kind
 from studies.fuzz.mutations import Rng
 
 MODULES = {
-    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify")},
-    **{name: f"agents.commands.{name}" for name in ("evaluate", "train", "export", "explain")},
-    "speed": "studies.speed.command",
+    **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify", "evaluate", "train")},
+    **{name: f"agents.commands.{name}" for name in ("export", "explain")},
+    "sweep": "studies.sweeps.command",
     "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},
 }
 ODD = (
-    *(
-        "0",
-        "-1",
-        "1",
-        "2",
-        "1000000000",
-        "9" * 320,
-        "9" * 5000,
-        "1e308",
-        "nan",
-        "inf",
-        "-inf",
-        "1.5",
-        "",
-        " ",
-        "x",
-        "²",
-        "٣",
-        "१",
-    ),
-    *(
-        "\udcff",
-        "[[",
-        "a=b",
-        "=",
-        "a=",
-        "=b",
-        "pid[",
-        "pid[a=]",
-        "pid[bandwidth=1e999]",
-        "/dev/zero",
-        "/",
-        "..",
-        "x\ny",
-        "0x10",
-        "1_000",
-    ),
-    *(
-        "pid",
-        "circle",
-        "both",
-        "lab",
-        "BirthSIM/Circle-v1",
-        "CartPole-v1",
-        "BirthSIM/",
-        "none",
-        "true",
-        "bandwidth=60",
-        "--",
-        "-x",
-    ),
-)
+    *("0", "-1", "1", "2", "1000000000", "9" * 320, "9" * 5000, "1e308", "nan", "inf", "-inf", "1.5", "0x10", "1_000", "", " "),
+    *("x", "²", "٣", "१", "\udcff", "[[", "a=b", "=", "a=", "=b", "pid[", "pid[a=]", "pid[bandwidth=1e999]", "/dev/zero"),
+    *("/", "..", "x\ny", "pid", "circle", "both", "lab", "BirthSIM/Circle-v1", "CartPole-v1", "BirthSIM/", "none", "true"),
+    *("bandwidth=60", "--", "-x"),
+)  # fmt: skip
 
 
 class BeganError(Exception):
@@ -81,23 +34,8 @@ class BeganError(Exception):
 
 
 def _options(module: Any) -> list[str]:
-    if hasattr(module, "Settings"):
-        options = program("x", module.Settings).assemble_argument_collection()
-        return [name for option in options for name in option.names if name.startswith("--")]
-    import argparse
-
-    found: list[str] = []
-    add = argparse._ActionsContainer.add_argument
-
-    def note(self: Any, *names: str, **rest: Any) -> Any:
-        found.extend(name for name in names if name.startswith("--"))
-        return add(self, *names, **rest)
-
-    silent = contextlib.redirect_stdout(io.StringIO())
-    noted, asked = patch.object(argparse._ActionsContainer, "add_argument", note), patch.object(sys, "argv", ["x", "--help"])
-    with noted, asked, silent, contextlib.suppress(SystemExit):
-        module.main()
-    return [name for name in dict.fromkeys(found) if name != "--help"]
+    options = program("x", module.Settings).assemble_argument_collection()
+    return [name for option in options for name in option.names if name.startswith("--")]
 
 
 def _commands(_: Path) -> dict[str, tuple[Any, list[str]]]:
@@ -120,24 +58,15 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
     def begin(*_: Any) -> None:
         raise BeganError
 
-    def parsed(parser: Any, action: Any) -> None:
-        parser.parse_args()
-        begin()
-
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said), patch.object(sys, "argv", [name, *line]):
-            if hasattr(module, "Settings"):
-                perform_with(name, module.Settings, begin, "")
-            else:
-                with patch.object(module, "run", parsed):
-                    module.main()
+            perform_with(name, module.Settings, begin, "")
     except BeganError:
         return
     except SystemExit as end:
         lines = [text for text in said.getvalue().split("\n") if "error:" in text]
         if end.code == 2 and len(lines) == 1:
-            # argparse repeats a word that is no choice at whatever length it was given.
             raise ValueError(f"{lines[0][:300]} (at the command line)") from None
         raise
 

@@ -1,14 +1,11 @@
 """Random rigs through every command: each works or is refused in one line that names the cause.
 
-    birthsim study odd-rigs --rigs 100
-
 Bores are 16 to 63 mm, strokes 50 to 600 mm, masses 0.5 to 20 kg, rods, friction and valves in proportion; a file names nothing
 else. Exits with 1 where a command ends in anything but success or one line.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import re
@@ -16,15 +13,27 @@ import sys
 import tempfile
 import traceback
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 from unittest.mock import patch
 
 import numpy as np
 import tomli_w
 from tqdm import tqdm
 
+from baselines.commands.settings import Configured, Seed, whole
 from baselines.commands.start import perform
 from birthsim_env.physics.rig.parameters import load_parameters
+
+
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Take random rigs through every command: each works or is refused in one line that names the cause."""
+
+    rigs: Annotated[int, whole()] = 100
+    seed: Seed = 0
+
 
 COMMANDS = ("evaluate", "train", "tune", "animate", "live")
 
@@ -69,11 +78,10 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
             if command == "live":
                 _live(path)
                 return "works", ""
-            package = "agents" if command in ("evaluate", "train") else "baselines"
             place = out.with_suffix(".webp") if command == "animate" else out
             argv = [f"birthsim {command}", *lines[command], "--parameters", str(path), "--out", str(place)]
             with patch.object(sys, "argv", argv):
-                perform(f"birthsim {command}", package, f"commands.{command}")
+                perform(f"birthsim {command}", "baselines", f"commands.{command}")
         return "works", ""
     except SystemExit as end:
         line = [text for text in re.split(r"[\r\n]+", complained.getvalue()) if "error:" in text or "Error" in text]
@@ -84,16 +92,12 @@ def attempt(command: str, path: Path, folder: Path) -> tuple[str, str]:
         return "BAD", traceback.format_exc()
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim study odd-rigs", description=__doc__)
-    parser.add_argument("--rigs", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
+def main(settings: Settings) -> None:
+    """Try the commands."""
     counts: dict[str, Counter[str]] = {command: Counter() for command in COMMANDS}
     causes: Counter[str] = Counter()
     bad = []
-    for seed in tqdm(range(arguments.seed, arguments.seed + arguments.rigs), unit=" rigs", file=sys.stderr):
+    for seed in tqdm(range(settings.seed, settings.seed + settings.rigs), unit=" rigs", file=sys.stderr):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             (folder / "rig.toml").write_text(written(seed), encoding="utf-8")
@@ -112,7 +116,3 @@ def main() -> None:
     if bad:
         print("\n\n".join(bad))
         raise SystemExit(1)
-
-
-if __name__ == "__main__":
-    main()

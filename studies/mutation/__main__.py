@@ -1,8 +1,6 @@
 """Mutation tester of the small numerical modules: a changed operator or number in them should make some test fail.
 
-``birthsim study mutation [--module NAME ...] [--every K] [--before FILE.json] [--out FILE.json]`` prints the fraction of
-mutants killed of each module and the survivors. ``--before`` compares with the report of an earlier run, mutant by mutant;
-``--again`` goes on from one: after new tests only the survivors are tried.
+It prints the fraction of mutants killed of each module and the survivors.
 
 Kernels run uncompiled here, so that a mutant needs no compilation: a forked child replaces the code of one function, runs the
 tests of its module until one fails, and ends. The tests that are quick enough uncompiled are found by running each once.
@@ -11,7 +9,6 @@ An error that compiled code would not raise, such as the root of a negative numb
 
 from __future__ import annotations
 
-import argparse
 import gc
 import importlib
 import json
@@ -23,12 +20,16 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
+from cyclopts import Parameter
 
+from baselines.commands.command import perform_with
+from baselines.commands.settings import MANY, Configured, number, whole
 from studies.mutation.changes import mutants_of
 from studies.mutation.modules import MODULES, files_of
 from studies.mutation.uncompiled import switch_off
@@ -41,6 +42,26 @@ BUDGET = 60.0
 
 PATIENCE = 3.0
 """A mutant that needs so many times the CPU time of its tests, and five seconds more, is taken to run for ever."""
+
+
+@dataclass(kw_only=True)
+class Settings(Configured):
+    """Change an operator or a number of numerical modules: some test should fail."""
+
+    module: Annotated[list[str], MANY, Parameter(choices=tuple(MODULES), metavar="NAME...")] = field(default_factory=list)
+    """Modules, else all."""
+    every: Annotated[int, whole()] = 1
+    """Try only every k-th mutant of a module."""
+    limit: Annotated[float, number("S", above=0.0)] = LIMIT
+    """CPU seconds of a test."""
+    budget: Annotated[float, number("S", above=0.0)] = BUDGET
+    """CPU seconds per survivor."""
+    before: Path | None = None
+    """Report of an earlier run to compare with, mutant by mutant."""
+    again: Path | None = None
+    """Report of the same sources: after new tests, try only what survived there."""
+    out: Path | None = None
+    """Where to write the report, as JSON."""
 
 
 def run_in_child(items: list[pytest.Item], seconds: float, apply: Callable[[], None]) -> tuple[str | None, float]:
@@ -93,8 +114,8 @@ def run_here(item: pytest.Item, seconds: float) -> str | None:
 class Tester:
     """A pytest plugin that runs the collected tests of each module once per mutant."""
 
-    def __init__(self, options: argparse.Namespace, report: Callable[[str, dict[str, Any]], None]) -> None:
-        self.modules, self.every, self.report = options.module, options.every, report
+    def __init__(self, options: Settings, report: Callable[[str, dict[str, Any]], None]) -> None:
+        self.modules, self.every, self.report = options.module or list(MODULES), options.every, report
         self.limit, self.budget = options.limit, options.budget
         self.again = json.loads(options.again.read_text()) if options.again else {}
         self.measured: dict[str, tuple[str | None, float]] = {}
@@ -172,19 +193,8 @@ def print_results(module: str, results: dict[str, Any], before: dict[str, Any]) 
     sys.stdout.flush()
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(prog="birthsim study mutation", description="Mutation score of numerical modules.")
-    parser.add_argument("--module", nargs="+", choices=list(MODULES), default=list(MODULES), metavar="NAME")
-    parser.add_argument("--every", type=int, default=1, metavar="K", help="try only every k-th mutant of a module")
-    parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help="CPU seconds of a test (default: %(default)s)")
-    parser.add_argument(
-        "--budget", type=float, default=BUDGET, metavar="S", help="CPU seconds per survivor (default: %(default)s)"
-    )
-    parser.add_argument("--before", type=Path, metavar="FILE", help="report of an earlier run to compare with")
-    parser.add_argument("--again", type=Path, metavar="FILE", help="report of the same sources: try only what survived there")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where to write the report, as JSON")
-    options = parser.parse_args()
+def main(options: Settings) -> None:
+    """Run the tests."""
     before = json.loads(options.before.read_text()) if options.before else {}
     switch_off()
     found = {}
@@ -195,10 +205,10 @@ def main() -> None:
             options.out.write_text(json.dumps(found, indent=1))
         print_results(module, results, before.get(module, {}).get("mutants", {}))
 
-    files = sorted({str(path) for module in options.module for path in files_of(module)})
+    files = sorted({str(path) for module in options.module or MODULES for path in files_of(module)})
     arguments = ["-qq", "-s", "--tb=no", "--no-header", "-m", "not slow", "-p", "no:xdist", "-p", "no:cacheprovider"]
     sys.exit(pytest.main([*arguments, *files], plugins=[Tester(options, report)]))
 
 
 if __name__ == "__main__":
-    main()
+    perform_with("birthsim study mutation", Settings, main, "birthsim study mutation --every 3")

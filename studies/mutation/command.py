@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from studies.alone import begin
+from studies.alone import only_under
 from studies.mutation.uncompiled import SETTINGS
 
 
 def main() -> None:
     """Entry point."""
-    begin("studies.mutation.__main__", SETTINGS)
+    only_under(SETTINGS, "studies.mutation.__main__")

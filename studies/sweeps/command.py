@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from baselines.commands.shared import JOBS, add_processes, run
+from baselines.commands.settings import Processes
 from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, Task, run_tasks
 from studies.sweeps.plan import Point, Sweep, load_sweep
@@ -15,27 +15,27 @@ from studies.sweeps.search import search_points
 from studies.sweeps.work import tasks_of
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(
-        prog="birthsim study sweep",
-        description="Evaluate, or train and evaluate, every point of a grid, of random draws or of a search.",
-        epilog="What the output folder holds of the same settings and code is kept, so that an interrupted sweep goes on. "
-        "docs/sweeps.md has examples.",
-    )
-    parser.add_argument("file", type=Path, help="TOML file with tables [base], [grid], [draw], [search] and [[map]]")
-    add_processes(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for episodes.parquet, sweep.md, sweep.json and maps")
-    run(parser, _sweep)
+@dataclass(kw_only=True)
+class Settings(Processes):
+    """Evaluate, or train and evaluate, every point of a grid, of random draws or of a search. docs/sweeps.md has examples.
+
+    What the output folder holds of the same settings and code is kept, so that an interrupted sweep goes on.
+    """
+
+    file: Path = field(kw_only=False)
+    """TOML file with tables [base], [grid], [draw], [search] and [[map]]."""
+    out: Path
+    """Folder for episodes.parquet, sweep.md, sweep.json and maps."""
 
 
-def _sweep(arguments: argparse.Namespace) -> None:
-    sweep = load_sweep(arguments.file)
-    folder = make_folder(arguments.out)
+def main(settings: Settings) -> None:
+    """Evaluate the points that the folder lacks; write tables and maps."""
+    sweep = load_sweep(settings.file)
+    folder = make_folder(settings.out)
 
     def evaluated(points: Sequence[Point], title: str) -> tuple[list[list[Result] | None], dict[str, str]]:
         """The pieces of every point, None where one failed, and what went wrong."""
-        return _evaluated(points, sweep, folder, title, arguments)
+        return _evaluated(points, sweep, folder, title, settings)
 
     failures: dict[str, str] = {}
     with own_folder(folder):
@@ -53,7 +53,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
 
 
 def _evaluated(
-    points: Sequence[Point], sweep: Sweep, folder: Path, title: str, arguments: argparse.Namespace
+    points: Sequence[Point], sweep: Sweep, folder: Path, title: str, settings: Settings
 ) -> tuple[list[list[Result] | None], dict[str, str]]:
     tasks: dict[int, list[Task]] = {}
     failures: dict[str, str] = {}
@@ -64,7 +64,7 @@ def _evaluated(
             failures[f"point {number}"] = str(error)
     # Points with the same settings are one piece.
     every = {task.name: task for pieces in tasks.values() for task in pieces}
-    done, failed = run_tasks(list(every.values()), folder, arguments.jobs or JOBS, title, arguments.cluster)
+    done, failed = run_tasks(list(every.values()), folder, settings.jobs, title, settings.cluster)
     for number, pieces in tasks.items():
         failures |= {f"point {number}": failed[task.name] for task in pieces if task.name in failed}
     results = [

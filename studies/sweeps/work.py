@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash
-from baselines.commands.shared import policy_of
+from baselines.commands.worlds import policy_of
 from baselines.work.files import own_folder
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters

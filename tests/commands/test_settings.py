@@ -7,11 +7,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import pytest
 import tomli_w
 
+from agents.residual.settings import IMPEDANCES
+from agents.training.configuration import ALGORITHMS
+from baselines.commands import train
 from baselines.commands.command import program
 from baselines.commands.settings import NAMES, RANDOMIZE, Configured, Kind, Randomize
 from baselines.commands.start import load
@@ -79,12 +82,16 @@ def test_choices_that_help_lists_are_those_that_there_are(monkeypatch, capsys):
     assert set(get_args(get_args(Randomize)[0])) == set(RANDOMIZE)
     assert set(RANDOMIZE.values()) == set(WORDS)
     assert [name for name in CONTROLLERS if name not in NAMES] == []
+    hints = get_type_hints(train.Settings)
+    for option, known in (("algorithm", ALGORITHMS), ("impedance", IMPEDANCES)):
+        assert set(get_args(get_args(hints[option])[0])) == set(known)
     _, printed, _ = call("run", monkeypatch, capsys, "--help")
     assert [name for name in HANDS if not re.search(rf" {name}[,;]", printed)] == []
 
 
-def test_help_of_an_episode_loads_nothing_that_is_slow():
+@pytest.mark.parametrize("command", ["run", "evaluate", "train", "doctor"])
+def test_help_loads_nothing_that_is_slow(command):
     program = "import sys; from birthsim.door import main; main(); print(*sorted(sys.modules))"
-    line = [sys.executable, "-c", program, "run", "--help"]
+    line = [sys.executable, "-c", program, command, "--help"]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
     assert {"numpy", "numba", "gymnasium", "birthsim_env"} & set(done.stdout.splitlines()[-1].split()) == set()

@@ -10,7 +10,7 @@ import birthsim_env
 from agents.policy.seeds import shipped_names
 from baselines.bench.evaluation import evaluate
 from baselines.bench.measures import DISCOUNTS
-from baselines.commands.shared import policy_of
+from baselines.commands.worlds import policy_of
 from baselines.registry import make_controller
 from birthsim_env.loop.rows import World
 from birthsim_env.loop.signals import Reference

@@ -147,7 +147,7 @@ def test_evaluation_says_of_a_policy_that_was_trained_with_other_sensors(tmp_pat
     monkeypatch.setattr(command, "run_tasks", refused)
     settings = command.Settings(policy="circle_honest_student", sensors=sensors, episodes=1, out=tmp_path)
     with pytest.raises(ValueError, match="enough"):
-        command.main(settings)
+        command.run(settings)
     told = "the policy was trained with honest sensors; here they are lab"
     assert (told in capsys.readouterr().out) is said
 
@@ -191,7 +191,7 @@ def test_without_a_policy_the_scenarios_own_is_evaluated_with_every_seed(tmp_pat
         return {task.name: result for task in tasks}, {}
 
     monkeypatch.setattr(command, "run_tasks", computed)
-    command.main(command.Settings(env="BirthSIM/Probe-v2", controller=["residual"], episodes=4, out=tmp_path))
+    command.run(command.Settings(env="BirthSIM/Probe-v2", controller=["residual"], episodes=4, out=tmp_path))
     assert asked == ["backstepping", "backstepping-force-first", *(f"residual seed_{k}" for k in range(5))]
     assert "residual, 5 seeds " in capsys.readouterr().out
     for page in ("evaluation.md", "seeds.md"):
