@@ -3,7 +3,6 @@ where the paper's empties both chambers."""
 
 import gymnasium
 import numpy as np
-import pytest
 
 import birthsim_env
 from baselines import BacksteppingController
@@ -58,8 +57,3 @@ def test_a_push_that_empties_both_chambers_under_the_papers_law_is_held() -> Non
     """4 kg where 3 are believed, a hand pulls with 35 N at 1102 N/m: found among random circles."""
     assert 9.0 < survived(make_controller("backstepping", RIG), 120061) < 10.5
     assert survived(make_controller("backstepping-force-first", RIG), 120061) == np.inf
-
-
-def test_one_valve_has_nothing_that_could_give_way() -> None:
-    with pytest.raises(ValueError, match="force_first = True; allowed: False with valves = 'one_valve'"):
-        BacksteppingController(RIG, valves="one_valve", force_first=True)

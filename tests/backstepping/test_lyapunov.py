@@ -167,8 +167,3 @@ def test_it_keeps_an_observer_of_its_own() -> None:
     after = function.evaluate(measured_at[-1], Reference(rows)).value
     function.reset()
     assert not np.array_equal(function.evaluate(measured_at[-1], Reference(rows)).value, after)
-
-
-def test_a_law_outside_the_proof_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"law\.frozen_friction = True; allowed: False"):
-        LyapunovFunction(BacksteppingController(frozen_friction=True))

@@ -70,10 +70,3 @@ def test_strict_feedback_leaves_cylinder_1_out_of_cylinder_2(case):
     assert np.abs(with_it[0] - with_it[1]).max() > 0.1
     gap = strict_feedback_rates(x, u, rig, True)[1] - strict_feedback_rates(x, u, rig)[1]
     np.testing.assert_allclose(neglected_acceleration(x, rig), gap, rtol=1e-9, atol=1e-12)
-
-
-def test_wrong_input_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"state has shape \(7, 2\); allowed: \(8, 2\)"):
-        strict_feedback_rates(np.zeros((7, 2)), np.zeros((4, 2)), Parameters())
-    with pytest.raises(ValueError, match=r"flows has shape \(3, 2\); allowed: \(4, 2\)"):
-        strict_feedback_rates(np.zeros((8, 2)), np.zeros((3, 2)), Parameters())

@@ -35,7 +35,7 @@ from tests.controllers.test_named_controllers import OWN
 RIG = Parameters()
 CIRCLE = Conditions("BirthSIM/Circle-v1", "ideal", "randomised")
 PROBE = Conditions("BirthSIM/Probe-v2", "ideal", "nominal")
-NAN, INF = math.nan, math.inf
+INF = math.inf
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from baselines.registry import SHORT_NAMES, controller_names, make_controller, r
 from birthsim_env import Parameters
 from tests.bench.test_evaluation import Spy, run
 
-PROBE, CIRCLE = "BirthSIM/Probe-v2", "BirthSIM/Circle-v1"
+CIRCLE = "BirthSIM/Circle-v1"
 RIG = Parameters()
 
 

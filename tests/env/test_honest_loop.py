@@ -179,10 +179,6 @@ def test_drawn_sensors_meet_the_nominal_rig_and_have_the_errors_of_rigs_and_sens
 def test_sensors_are_drawn_only_where_the_model_can():
     ranges = {"electronics.force_bias": (0.0, 5.0)}
     gymnasium.make(CIRCLE, sensors="honest", randomize=ranges).reset(seed=0)
-    with pytest.raises(ValueError, match=r"randomize\['electronics.force_bias'\].*other sensors"):
-        gymnasium.make(CIRCLE, sensors="lab", randomize=ranges)
-    with pytest.raises(ValueError, match=r"randomize\['electronics.control_period'\].*allowed"):
-        gymnasium.make(CIRCLE, sensors="honest", randomize={"electronics.control_period": (0.001, 0.002)})
     assert "force bias 0 to 2 N" in described(Parameters(), True, "honest")
     assert "force bias" not in described(Parameters(), True)
 

@@ -76,11 +76,6 @@ def test_frames_are_independent_arrays_and_depend_on_the_scene_only():
     np.testing.assert_array_equal(renderer.frame(SCENE), kept)
 
 
-def test_too_small_a_picture_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"\(319, 240\).*320 x 240"):
-        Renderer(RIG, 319, 240)
-
-
 def test_the_transform_is_to_scale_with_y_up():
     renderer = Renderer(RIG)
     (x0, y0), (x1, y1), (x2, y2) = (renderer.to_pixel(p) for p in ((0, 0), (0.1, 0), (0, 0.1)))

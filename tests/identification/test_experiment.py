@@ -59,12 +59,6 @@ def test_what_is_wrong_with_a_plan_is_named(text: str, words: str, tmp_path: Pat
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("duration", [0.0, 3.9, 601.0, float("nan")])
-def test_a_duration_is_checked(duration: float) -> None:
-    with pytest.raises(ValueError, match="duration = "):
-        propose(OWNER, duration)
-
-
 def test_a_lane_of_many_is_the_single_rig() -> None:
     plan = propose(OWNER, 4.0, 3)
     both = run_plan(plan, [OWNER, TRUE], make_controller("backstepping", OWNER), "lab", 10)

@@ -151,18 +151,3 @@ def test_files_without_stiffness_are_refused(text, tmp_path):
     file.write_text(text)
     with pytest.raises(ValueError, match="stiffness"):
         stiffness_of(file)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"contractions": 0}, "contractions = 0; allowed"),
-        ({"damping": 0.0}, "damping = 0; allowed: more than 0"),
-        ({"head_diameter": -0.1}, r"head_diameter = -0.1"),
-        ({"pushes": 6}, r"lasts = 60 s; allowed: from 80 s"),
-        ({"floor_ends": 0.01}, r"floor_ends = 0.01 m; allowed: more than floor_begins"),
-    ],
-)
-def test_impossible_constants_are_refused(wrong, message):
-    with pytest.raises(ValueError, match=message):
-        Labour(**wrong)

@@ -70,14 +70,6 @@ def test_ranges_that_cannot_be(tmp_path, table, message):
         drawn(tmp_path, f"[randomize]\n{table}\n")
 
 
-def test_draws_that_are_impossible_together_are_refused_before_any_episode():
-    with pytest.raises(ValueError, match=r"randomize: some of the rigs drawn are impossible: Mechanics\.mass"):
-        gymnasium.make(
-            "BirthSIM/Probe-v2", parameters=Parameters().replace({"friction.law": "coulomb"}),
-            randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
-        )  # fmt: skip
-
-
 def test_the_dead_volume_follows_the_bore(tmp_path):
     rig = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}})
     assert rig.chambers.dead_volume == pytest.approx(4 * Parameters().chambers.dead_volume)

@@ -168,38 +168,7 @@ def test_a_drawn_rig_moves_otherwise_but_starts_on_the_same_target():
     assert np.abs(runs[0][1] - runs[1][1]).max() > 1e-5
 
 
-@pytest.mark.parametrize(
-    ("ranges", "words"),
-    [
-        ({"mechanics.mas": (2, 5)}, ("mechanics.mas", "allowed", "mass")),
-        ({"motor.mass": (2, 5)}, ("motor", "allowed", "mechanics")),
-        ({"mass": (2, 5)}, ("mass", "allowed", "mechanics")),
-        ({3: (2, 5)}, ("3", "allowed")),
-        ({"mechanics.mass": (0.0, 3.0)}, ("Mechanics.mass", "0.0", "> 0")),
-        ({"valves.critical_ratio": (0.2, 0.95)}, ("critical_ratio", "0.95", "0.9")),
-        ({"friction.law": ("coulomb", "lugre")}, ("friction.law", "numeric")),
-    ],
-)
-def test_bad_ranges_are_refused_by_name_before_the_first_episode(ranges, words):
-    with pytest.raises(ValueError, match="allowed") as refusal:
-        gymnasium.make("BirthSIM/Circle-v1", randomize=ranges)
-    assert all(word in str(refusal.value) for word in words), refusal.value
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["geometry.k2", "cylinder1.stroke", "cylinder2.stroke", "mechanics.impact_speed", "electronics.position_noise"],
-)
-def test_what_all_lanes_share_cannot_be_randomized(name):
-    # Drawing them would change nothing, or put the end effector beside its target.
-    with pytest.raises(ValueError, match=rf"randomize\['{name}'\].*allowed"):
-        gymnasium.make("BirthSIM/Circle-v1", randomize={name: (0.1, 0.4)})
-
-
 def test_ranges_are_judged_on_the_users_rig():
-    rig = Parameters().replace({"air.supply_pressure": 1.5e5})
-    with pytest.raises(ValueError, match="supply_pressure"):
-        gymnasium.make("BirthSIM/Circle-v1", parameters=rig, randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)})
     wide = Parameters().replace(
         {"cylinder1.rod_diameter": 0.02, "cylinder1.piston_diameter": 0.05, "chambers.dead_volume": 2e-5}
     )
@@ -217,14 +186,6 @@ def test_lane_seeds_count_up_or_are_as_given():
     missing = lane_seeds([4, None, None], 3, rng)
     assert missing[0] == 4
     assert len({*missing, *lane_seeds(None, 3, rng)}) == 6
-
-
-@pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc", -1])
-def test_bad_seeds_are_refused_by_name(seed):
-    env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3)
-    with pytest.raises((ValueError, gymnasium.error.Error), match=r"[Ss]eed") as refusal:
-        env.reset(seed=seed)
-    assert "allowed" in str(refusal.value) or "greater or equal to zero" in str(refusal.value)
 
 
 @pytest.mark.parametrize("bad", [(2.0, 1.0), (1.0, 2.0, 3.0), (0.0, float("nan")), ("a", "b")])

@@ -176,19 +176,6 @@ def test_columns_of_drawn_rigs_are_those_of_rigs_drawn_one_by_one():
     np.testing.assert_array_equal(draw_columns(Parameters(), ranges, ours, 50), np.stack(expected, axis=1))
 
 
-@pytest.mark.parametrize(
-    "ranges",
-    [
-        {"cylinder1.piston_diameter": (0.02, 0.03), "cylinder1.rod_diameter": (0.01, 0.024)},
-        {"cylinder1.piston_diameter": (0.025, 0.045), "chambers.dead_volume": (1e-5, 3e-5)},
-        {"air.supply_pressure": (1.5e5, 7e5), "air.atmospheric_pressure": (1e5, 2e5)},
-    ],
-)
-def test_ranges_that_hold_impossible_rigs_are_refused_before_the_first_episode(ranges):
-    with pytest.raises(ValueError, match=r"randomize: some of the rigs drawn are impossible: .*allowed"):
-        gymnasium.make("BirthSIM/Circle-v1", randomize=ranges)
-
-
 def new(seeds=(11, 12, 13), name="user_force"):
     lanes = np.arange(len(seeds))
     ((block, streams),) = worlds(lanes, list(seeds), np.zeros(len(seeds), dtype=np.int64))

@@ -12,8 +12,6 @@ from birthsim_env.parts.hands.user_forces import AlternatingSteps, Pulls
 from birthsim_env.parts.hands.vacuum import VacuumPulls
 from birthsim_env.parts.scenarios import SCENARIOS
 
-PROBE = "BirthSIM/Probe-v2"
-
 
 def course(force, seconds, seed=0, step=0.001):
     """Times (K,) and forces (K, 2) of one lane."""
@@ -178,16 +176,6 @@ def test_a_profile_is_linear_between_knots_and_constant_outside():
     expected = [(10, 0), (10, 0), (5, -10), (5, 5), (5, 5), (5, 5)]
     np.testing.assert_allclose([at(times, rows, t) for t in (0.0, 0.5, 0.75, 1.0, 1.5, 3.0)], expected)
     assert np.abs(course(ForceProfile(), 2.0)[1]).max() == 0.0
-
-
-class Wrong(ForceProfile):
-    def knots(self, rng):
-        return [(0.0, 1.0)]
-
-
-def test_knots_of_a_users_own_profile_are_refused_by_name():
-    with pytest.raises(ValueError, match=r"Wrong\.knots\(rng\) = \[\(0\.0, 1\.0\)\]; allowed: .*\(time, Fx, Fy\)"):
-        gymnasium.make(PROBE, user_force=Wrong()).reset(seed=0)
 
 
 def test_every_push_of_the_circle_is_a_jump_however_small():

@@ -219,30 +219,6 @@ def test_edges_of_the_pressures_are_finite() -> None:
     assert_same(model.A, plant_jacobian(rig, model)[:, :18], SCALES[:18], 1e-4)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"pose": (0.5, 9.0)}, r"position = \(0.5, 9\) m is unreachable"),
-        ({"pose": (0.5, np.nan)}, r"pose\[1\] = nan; allowed: finite numbers"),
-        ({"pressures": (1e5, 2e5, 3e5, 9e5)}, r"pressures = .*; allowed: 101300 to 700000 \(Pa"),
-        ({"pressures": (2e5, 2e5, 6e5, 2e5)}, r"leave .* N on piston 2; allowed: what friction holds, at most 19.95 N"),
-        ({"pressures": (2e5, 2e5, 6e5, 2e5), "friction": "sliding"}, r"leave 204.1 N on piston 2"),
-        ({"openings": (0.0, 0.0, 0.0, 2.0)}, r"openings = .*; allowed: -1 to 1"),
-        ({"force": (1.0,)}, r"force has shape \(1,\); allowed: \(2,\)"),
-        ({"parameters": Parameters().replace({"chambers.tube_length": 1.0})}, "allowed: a rig whose options are off"),
-    ],
-)
-def test_bad_input_is_named(given: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=words) as caught:
-        linearize(**{"parameters": None, "pose": (0.5, 0.0), **given})  # type: ignore[arg-type]
-    assert "\n" not in str(caught.value)
-
-
-def test_a_frequency_of_zero_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"frequency = 0; allowed: above 0"):
-        linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])
-
-
 def test_names_units_and_arrays_belong_together_and_cannot_be_changed() -> None:
     model = linearize(None, (0.5, 0.0))
     assert model.A.shape == (len(model.states), len(model.states))

@@ -8,7 +8,7 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import load_policy
 from agents.residual.privileged import FIGURES, true_figures
 from agents.residual.settings import ResidualSettings
-from agents.training.configuration import TrainingSettings, override
+from agents.training.configuration import TrainingSettings
 from agents.training.privileged import Privileged
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
@@ -46,8 +46,3 @@ def test_a_privileged_policy_is_trained_and_refused_by_the_controller(tmp_path):
         ValueError, match=rf"maps {policy.network.inputs} to 2 numbers; allowed: {policy.network.inputs - FIGURES}"
     ):
         ResidualController(policy=tmp_path)
-
-
-def test_privileged_is_true_or_false():
-    with pytest.raises(ValueError, match="privileged = 'yes'; allowed: True, False"):
-        override(TrainingSettings(), privileged="yes")

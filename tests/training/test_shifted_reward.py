@@ -62,9 +62,3 @@ def test_survival_is_what_is_taken_off():
         assert (paid[~ended] > -1).all()
     assert (paid[ended] < -24).all()
     assert all(info["episode"]["r"] > 0 for info in infos if info)
-
-
-@pytest.mark.parametrize("discount", [-0.1, 1.0, 2.0, float("nan")])
-def test_a_discount_of_one_has_no_value_to_shift(discount):
-    with pytest.raises(ValueError, match=r"discount = .*; allowed: 0 or more and less than 1"):
-        ShiftedReward(told([1.0], False), 1.0, discount)

@@ -100,28 +100,6 @@ def test_advance_refuses_by_name_and_leaves_the_state(command: Any, force: Any, 
     np.testing.assert_array_equal(plant.state, before)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"parameters": [Parameters()] * 3, "num_envs": 2}, r"parameters has 3 entries; allowed: .* 2 lanes"),
-        ({"parameters": [Parameters(), 7], "num_envs": 2}, r"parameters\[1\] = 7; allowed: a Parameters"),
-        ({"parameters": "no such file.toml"}, r"parameters = 'no such file\.toml' cannot be read"),
-    ],
-)
-def test_plant_refuses_by_name(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Plant(**arguments)
-
-
-@pytest.mark.parametrize(
-    ("rows", "value", "message"),
-    [(17, 1.0, r"state has shape \(17, 2\); allowed: \(18, 2\)"), (18, math.nan, r"state\[0, 0\] = nan")],
-)
-def test_derivatives_refuse_by_name(rows: int, value: float, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Plant(num_envs=2).derivatives(np.full((rows, 2), value), *idle(2))
-
-
 def test_a_lane_of_a_thousand_is_the_plant_alone_bit_for_bit() -> None:
     lanes, rng = 1000, np.random.default_rng(0)
     rigs = varied_rigs(lanes, rng)

@@ -1,0 +1,255 @@
+"""Calls that are refused in one line beyond single values: shapes, what goes with what, what nothing can serve."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from agents.residual.settings import FORCE_LAWS, ResidualSettings
+from agents.training.shifted_reward import ShiftedReward
+from baselines import BacksteppingController
+from baselines.backstepping.gains import gains_for, least_damping
+from baselines.backstepping.lyapunov import LyapunovFunction
+from baselines.backstepping.strict_feedback import strict_feedback_rates
+from baselines.identification.experiment import propose
+from baselines.registry import make_controller
+from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
+from birthsim_env.drawing.rendering import Renderer
+from birthsim_env.loop.loop import Loop
+from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.labour.model import Labour
+from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled.records import Rows, row, rows
+
+CIRCLE = "BirthSIM/Circle-v1"
+NAN, INF = math.nan, math.inf
+RIG = Parameters()
+STILL = np.zeros((4, 2)), np.zeros((2, 2))
+PHASES = {"times": (0.0, 1.0), "closed_loop": (2e3, 4e3), "pneumatic1": (4600.0, 3600.0), "pneumatic2": (2300.0, 1800.0)}
+HIGH_BELOW = (2e5, 2e5, 6e5, 2e5)
+
+
+class Memory(Rows):
+    bristle = rows("z1 z2", "m", "deflections")
+
+
+class History(Rows):
+    slot = row("1", "the present")
+    past = rows(0, "m", "a ring")
+
+
+class Wrong(ForceProfile):
+    def knots(self, rng):
+        return [(0.0, 1.0)]
+
+
+def env(**given):
+    return lambda: gymnasium.make(CIRCLE, **given)
+
+
+def started(**given):
+    return lambda: gymnasium.make(CIRCLE, **given).reset(seed=0)
+
+
+def lanes(**given):
+    return lambda: gymnasium.make_vec(CIRCLE, num_envs=2, **given).reset(seed=0)
+
+
+def seeded(seed):
+    return lambda: gymnasium.make_vec(CIRCLE, num_envs=3).reset(seed=seed)
+
+
+def gains(*given):
+    return lambda: gains_for(*given)
+
+
+def paper(**given):
+    return lambda: BacksteppingController(RIG, **given)
+
+
+def schedule(**given):
+    return lambda: StiffnessSchedule(**given)
+
+
+def labour(**given):
+    return lambda: Labour(**given)
+
+
+def linear(pose=(0.5, 0.0), parameters=None, **given):
+    return lambda: linearize(parameters, pose, **given)
+
+
+def residual(*given, **named):
+    return lambda: ResidualSettings(*given, **named)
+
+
+def stage(**given):
+    return lambda: Stage(lambda *_: 0, **given)
+
+
+def plant(*given, **named):
+    return lambda: Plant(*given, **named)
+
+
+def rates(of_state, of_flows):
+    return lambda: strict_feedback_rates(np.zeros((of_state, 2)), np.zeros((of_flows, 2)), RIG)
+
+
+def duration(seconds):
+    return lambda: propose(RIG, seconds)
+
+
+def shifted(discount):
+    return lambda: ShiftedReward(None, 1.0, discount)
+
+
+TABLE = {
+    # what is named; what is allowed: the calls
+    ("stiffness = 0.0", "a positive number"): [gains(0.0, 3.0, 35.0)],
+    ("apparent_mass = -3.0", "a positive number"): [gains(2000.0, -3.0, 35.0)],
+    ("viscous = -1.0", "a number >= 0"): [gains(2000.0, 3.0, -1.0)],
+    ("damping = nan", "a positive number"): [gains(2000.0, 3.0, 35.0, NAN)],
+    ("gain_sum = inf", "a positive number"): [gains(2000.0, 3.0, 35.0, 150.0, INF)],
+    ("gain_sum = 150 without a damping", "None"): [gains(2000.0, 3.0, 35.0, None, 150.0)],
+    ("stiffness = ", "more than m_e/s2 = 3 N/m"): [
+        gains(2.5, 3.0, 35.0, 20.0), *(lambda k=k: least_damping(k, 3.0, 35.0) for k in (3.0, 1.5)),
+    ],
+    ("force_first = True", "False with valves = 'one_valve'"): [paper(valves="one_valve", force_first=True)],
+    ("law.frozen_friction = True", "False"): [lambda: LyapunovFunction(BacksteppingController(frozen_friction=True))],
+    ("state has shape (7, 2)", "(8, 2)"): [rates(7, 4)],
+    ("flows has shape (3, 2)", "(4, 2)"): [rates(8, 3)],
+    ("'gain'", "name[gain=60,other=2]"): [lambda: make_controller("pid[gain]", RIG)],
+    ("controller = 'nobody'", "backstepping, "): [lambda: make_controller("nobody[gain=3]", RIG)],
+    ("controller = 'limited:none'", ""): [lambda: make_controller("limited:none", RIG)],
+    ("duration = ", ">= 4 and <= 600 (s)"): [duration(value) for value in (0.0, 3.9, 601.0, NAN)],
+    ("discount = ", "0 or more and less than 1"): [shifted(value) for value in (-0.1, 1.0, 2.0, NAN)],
+    ("", "float64"): [
+        lambda wrong=wrong: Loop(4, [(wrong, 0)], [], [])
+        for wrong in (np.zeros((2, 3)), np.zeros((2, 4), dtype=np.float32), np.zeros((4, 2)).T, np.zeros(4))
+    ],
+    ("tables[0] of a stage is ", "C-contiguous"): [stage(tables=(np.zeros((4, 3)).T,))],
+    ("tables[1] of a stage is ", "C-contiguous"): [stage(tables=(np.zeros(3), np.zeros((1,) * 5)))],
+    ("constants of a stage is ", "C-contiguous"): [stage(constants=np.zeros(4)[::2]), stage(constants=np.zeros(4, np.float32))],
+    ("rows of Memory have shape (3, 3)", "2"): [lambda: Memory(np.zeros((3, 3)))],
+    ("rows of Memory have shape (1, 3)", "2"): [lambda: Memory(np.zeros((1, 3)))],
+    ("rows of History have shape (0, 3)", "1"): [lambda: History(np.zeros((0, 3)))],
+    ("behind follows a group without a size", ""): [lambda: type("Wrong", (History,), {"behind": row("m", "")})],
+    ("size", "other names"): [lambda: type("Wrong", (Rows,), {"size": row("m", "")})],
+    ("(319, 240)", "320 x 240"): [lambda: Renderer(RIG, 319, 240)],
+    **{
+        (f"({x:g}, {y:g}) m is unreachable", "distance 0.3 to 0.7 m from the pivot"): [started(reference=Hold((x, y)))]
+        for x, y in ((0.8, 0.0), (0.25, 0.0), (0.5, 0.4), (0.3, -0.5), (-0.5, 0.0))
+    },
+    ("reference at ", "distance"): [
+        lanes(reference=Circle(radius=(0.24, 0.3))),
+        *(
+            make(reference=path)
+            for make in (env, lanes)
+            for path in (
+                Circle(radius=(0.05, 0.21)), Hold(((0.45, 0.71), 0.0)), Hold((0.5, (-0.5, 0.0))),
+                Hold(((0.295, 0.4), (-0.1, 0.2))), Path((0.5, 0.0), 0.0, (0.05, 0.25)),
+                Path((0.5, 0.0), (-3.0, 3.0), 0.21, ends=2.0),
+            )
+        ),
+    ],
+    ("reference: function(0) = 0.5", "a function of time"): [env(reference=lambda t: 0.5)],
+    ("user_force: function(0, ...) = None", "a function of time"): [started(user_force=lambda t: None)],
+    ("user_force: a function of 2 arguments", "a function of time"): [env(user_force=lambda time, position: (0.0, 0.0))],
+    ("Wrong.knots(rng) = [(0.0, 1.0)]", "(time, Fx, Fy)"): [started(user_force=Wrong())],
+    ("times = (0.0,)", "as many setpoints as times"): [schedule(closed_loop=(2e3, 4e3)), schedule(closed_loop_y=(2e3, 4e3))],
+    ("times = (0.0, 0.0)", "increasing"): [schedule(**{**PHASES, "times": (0.0, 0.0)})],
+    ("times = nan", "finite"): [schedule(**{**PHASES, "times": (0.0, NAN)})],
+    ("stiffness setpoint = ", ">= 0.001"): [
+        schedule(closed_loop=(0.0,)), schedule(closed_loop=((-1.0, 2000.0),)), schedule(pneumatic2=(NAN,)),
+    ],
+    ("closed_loop_xy -3000.0", "below sqrt(Kclx Kcly)"): [schedule(closed_loop_xy=(-3000.0,))],
+    ("contractions = 0", ""): [labour(contractions=0)],
+    ("damping = 0", "more than 0"): [labour(damping=0.0)],
+    ("head_diameter = -0.1", ""): [labour(head_diameter=-0.1)],
+    ("lasts = 60 s", "from 80 s"): [labour(pushes=6)],
+    ("floor_ends = 0.01 m", "more than floor_begins"): [labour(floor_ends=0.01)],
+    ("randomize: some of the rigs drawn are impossible: ", ""): [
+        *(
+            env(randomize=ranges)
+            for ranges in (
+                {"cylinder1.piston_diameter": (0.02, 0.03), "cylinder1.rod_diameter": (0.01, 0.024)},
+                {"cylinder1.piston_diameter": (0.025, 0.045), "chambers.dead_volume": (1e-5, 3e-5)},
+                {"air.supply_pressure": (1.5e5, 7e5), "air.atmospheric_pressure": (1e5, 2e5)},
+            )
+        ),
+        env(
+            parameters=RIG.replace({"friction.law": "coulomb"}),
+            randomize={"mechanics.mass": (2, 5), "cylinder1.coulomb_friction": (5, 40)},
+        ),
+    ],
+    ("mechanics.mas", "mass"): [env(randomize={"mechanics.mas": (2, 5)})],
+    ("motor", "mechanics"): [env(randomize={"motor.mass": (2, 5)})],
+    ("mass", "mechanics"): [env(randomize={"mass": (2, 5)})],
+    ("3", ""): [env(randomize={3: (2, 5)})],
+    ("Mechanics.mass = 0.0", "> 0"): [env(randomize={"mechanics.mass": (0.0, 3.0)})],
+    ("critical_ratio = 0.95", "0.9"): [env(randomize={"valves.critical_ratio": (0.2, 0.95)})],
+    ("friction.law", "numeric"): [env(randomize={"friction.law": ("coulomb", "lugre")})],
+    **{
+        # Drawing what all lanes share would change nothing, or put the end effector beside its target.
+        (f"randomize['{name}']", ""): [env(randomize={name: (0.1, 0.4)})]
+        for name in (
+            *("geometry.k2", "cylinder1.stroke", "cylinder2.stroke"),
+            *("mechanics.impact_speed", "electronics.position_noise"),
+        )
+    },
+    ("randomize['electronics.force_bias']", "other sensors"): [
+        env(sensors="lab", randomize={"electronics.force_bias": (0.0, 5.0)}),
+    ],
+    ("randomize['electronics.control_period']", ""): [
+        env(sensors="honest", randomize={"electronics.control_period": (0.001, 0.002)}),
+    ],
+    ("supply_pressure", ""): [
+        env(parameters=RIG.replace({"air.supply_pressure": 1.5e5}), randomize={"air.atmospheric_pressure": (1.0e5, 1.9e5)}),
+    ],
+    ("seed", ""): [seeded(seed) for seed in ([1, 2], [1, -2, 3], [1, 2.5, 3], ["a", "b", "c"], 1.5, "abc")],
+    ("parameters has 3 entries", "2 lanes"): [plant(parameters=[RIG] * 3, num_envs=2)],
+    ("parameters[1] = 7", "a Parameters"): [plant(parameters=[RIG, 7], num_envs=2)],
+    ("state has shape (17, 2)", "(18, 2)"): [lambda: Plant(num_envs=2).derivatives(np.zeros((17, 2)), *STILL)],
+    ("state[0, 0] = nan", ""): [lambda: Plant(num_envs=2).derivatives(np.full((18, 2), NAN), *STILL)],
+    ("position = (0.5, 9) m is unreachable", ""): [linear(pose=(0.5, 9.0))],
+    ("pose[1] = nan", "finite numbers"): [linear(pose=(0.5, NAN))],
+    ("pressures = ", "101300 to 700000 (Pa"): [linear(pressures=(1e5, 2e5, 3e5, 9e5))],
+    ("leave 204.1 N on piston 2", "what friction holds, at most 19.95 N"): [linear(pressures=HIGH_BELOW)],
+    ("leave 204.1 N on piston 2", ""): [linear(pressures=HIGH_BELOW, friction="sliding")],
+    ("openings = ", "-1 to 1"): [linear(openings=(0.0, 0.0, 0.0, 2.0))],
+    ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
+    ("", "a rig whose options are off"): [linear(parameters=RIG.replace({"chambers.tube_length": 1.0}))],
+    ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
+    ("y1 = 0.2 m", "-0.33 < y1 < 0.17 m"): [lambda: geometry.theta1(np.array([0.0, 0.2]), RIG)],
+    ("y1 = -0.4 m", "-0.33 < y1 < 0.17 m"): [lambda: geometry.theta1(np.array([0.0, -0.4]), RIG)],
+    ("cylinder1 = 25", "an instance of Cylinder"): [lambda: Parameters(cylinder1=25)],
+    **{
+        (f"force_sensor = False with law = '{law}'", ""): [residual(law, force_sensor=False)]
+        for law in (*FORCE_LAWS, "admittance", "admittance[learn=false]")
+    },
+    ("law = 'admittance[gain=60]'", "'backstepping', "): [residual("admittance[gain=60]")],
+    ("impedance = 'variable_kp'", "impedance = 'fixed'"): [residual(impedance="variable_kp", force_sensor=False)],
+    ("force_sensor = ", ""): [make(force_sensor=wrong) for wrong in (1, None, "no") for make in (residual, env)],
+}  # fmt: skip
+CASES = [
+    pytest.param(call, named, allowed, id=f"{named}-{k}")
+    for (named, allowed), calls in TABLE.items()
+    for k, call in enumerate(calls)
+]
+
+
+@pytest.mark.parametrize(("call", "named", "allowed"), CASES)
+def test_a_refused_call_says_what_is_wrong_and_what_is_allowed(call, named, allowed):
+    with pytest.raises((ValueError, TypeError)) as caught:
+        call()
+    before, said, after = str(caught.value).partition("allowed")
+    assert said, caught.value
+    assert named in before, caught.value
+    assert allowed in after, caught.value
+    assert "\n" not in before + after
+
+
+def test_gymnasium_refuses_a_negative_seed():
+    with pytest.raises(gymnasium.error.Error, match="greater or equal to zero"):
+        seeded(-1)()
