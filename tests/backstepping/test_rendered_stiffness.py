@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
+from baselines.bench.probes import POSES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS
 
-POSES = ((0.5, 0.0), (0.4, 0.05), (0.6, 0.05), (0.4, -0.08), (0.62, -0.1))
 SETPOINTS = (1000.0, 2000.0, 4000.0)
 AXES = (0, 1)
 

@@ -125,6 +125,11 @@ def test_a_lane_is_the_environment_alone_through_its_episodes(world):
         observation, rewards, terminated, truncated, infos = env.step(action)
         assert env.observation_space.contains(observation)
         assert np.isfinite(rewards).all()
+        over = terminated | truncated
+        assert ("final_obs" in infos) == ("final_info" in infos) == over.any()
+        if over.any():
+            np.testing.assert_array_equal(infos["_final_obs"], over)
+            assert all((last is not None) == ended for last, ended in zip(infos["final_obs"], over, strict=True))
         for lane, walk in alone.items():
             where = f"lane {lane}, step {step}"
             last, reward, ended, cut, info, after = next(walk)
@@ -137,6 +142,11 @@ def test_a_lane_is_the_environment_alone_through_its_episodes(world):
                 np.testing.assert_array_equal(infos["final_obs"][lane], last, err_msg=where)
                 assert_lane(infos["final_info"], lane, info, where)
                 np.testing.assert_array_equal(observation[lane], after[0], err_msg=where)
+                assert infos["_final_info"][lane], where
+                for name in FIELDS:
+                    np.testing.assert_array_equal(infos[name][lane], after[1][name], err_msg=f"{where} {name}")
+                assert (infos["time"][lane], infos["is_success"][lane]) == (0.0, False), where
+                assert not (ended and info["is_success"]), where
     assert begun >= len(chosen)
 
 

@@ -117,6 +117,11 @@ TABLE = {
     ],
     ("force_first = True", "False with valves = 'one_valve'"): [paper(valves="one_valve", force_first=True)],
     ("law.frozen_friction = True", "False"): [lambda: LyapunovFunction(BacksteppingController(frozen_friction=True))],
+    ("'smoothing'", "law, impedance, "): [
+        lambda: gymnasium.make("BirthSIM/CircleResidual-v1", smoothing=0.3),
+        lambda: gymnasium.make_vec("BirthSIM/CircleResidual-v1", num_envs=3, smoothing=0.3),
+    ],
+    ("'sensor'", "action_mode, valves, sensors, randomize"): [env(sensor="lab")],
     ("state has shape (7, 2)", "(8, 2)"): [rates(7, 4)],
     ("flows has shape (3, 2)", "(4, 2)"): [rates(8, 3)],
     ("'gain'", "name[gain=60,other=2]"): [lambda: make_controller("pid[gain]", RIG)],

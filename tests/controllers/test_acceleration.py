@@ -1,7 +1,5 @@
 """``admittance-adaptive`` on a rig with an acceleration sensor."""
 
-from dataclasses import replace
-
 import gymnasium
 import numpy as np
 import pytest
@@ -9,36 +7,31 @@ import pytest
 from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.haptics.release import measure_release
+from tests.controllers.test_admittance_adaptive import openings
 
 RIG = load_parameters("examples/acceleration_sensor_rig.toml")
 
 
-def openings(sensors="honest", lanes=3, steps=120, believed=RIG, shown=0.0, rig=RIG):
-    """Openings (steps, 4, lanes) of the law in the circle; ``shown``, m/s2, is added to the acceleration."""
-    law = make_controller("admittance-adaptive", believed)
-    env = gymnasium.make_vec(
-        "BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
-    )
-    env.reset(seed=[40 + k for k in range(lanes)])
-    told = []
-    for _ in range(steps):
-        seen = env.measurement
-        felt = shown if seen.acceleration is None else seen.acceleration + shown
-        told.append(law.command(replace(seen, acceleration=np.zeros((2, lanes)) + felt), env.reference))
-        env.step(told[-1].T)
-    env.close()
-    return np.array(told)
+def more(acceleration):
+    """What adds so much, m/s2, to the acceleration that is shown."""
+    return lambda seen: {
+        "acceleration": np.zeros((2, 3)) + (0.0 if seen.acceleration is None else seen.acceleration) + acceleration
+    }
+
+
+def adaptive(sensors="honest", believed=RIG, rig=RIG, by=0.0):
+    return openings("admittance-adaptive", sensors, believed, rig, more(by))
 
 
 def test_a_law_that_believes_in_no_such_sensor_does_not_read_it():
     plain = RIG.replace({"electronics.acceleration_bandwidth": 0.0})
-    without = openings(believed=plain, rig=plain)
-    np.testing.assert_array_equal(openings(believed=plain, shown=5.0), without)
-    assert (openings() != without).any()
+    without = adaptive(believed=plain, rig=plain)
+    np.testing.assert_array_equal(adaptive(believed=plain, by=5.0), without)
+    assert (adaptive() != without).any()
 
 
 def test_exact_speeds_are_not_replaced():
-    np.testing.assert_array_equal(openings("ideal", shown=5.0), openings("ideal"))
+    np.testing.assert_array_equal(adaptive("ideal", by=5.0), adaptive("ideal"))
 
 
 @pytest.mark.parametrize("name", ["admittance-adaptive", "limited:admittance-adaptive"])
@@ -52,7 +45,7 @@ def test_a_law_that_needs_an_acceleration_says_so(name):
 
 def test_an_acceleration_of_another_shape_is_refused():
     with pytest.raises(ValueError, match=r"measurement\.acceleration has shape \(3, 2, 3\); allowed: \(2, 3\)"):
-        openings(shown=np.zeros((3, 2, 3)))
+        adaptive(by=np.zeros((3, 2, 3)))
 
 
 @pytest.mark.slow
@@ -66,7 +59,7 @@ def test_a_pull_that_is_let_go_overshoots_less():
         "force_sensor": True,
     }
     has, plain = (
-        measure_release(rig=RIG.replace({"electronics.acceleration_bandwidth": hertz}).to_dict(), **settings)
+        measure_release(rig=RIG.replace({"electronics.acceleration_bandwidth": hertz}).to_dict(), force_sensor=True, **settings)
         for hertz in (300.0, 0.0)
     )
     assert np.median(has["overshoot_mm"]) < 0.5 * np.median(plain["overshoot_mm"])

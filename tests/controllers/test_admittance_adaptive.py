@@ -14,18 +14,19 @@ from birthsim_env.physics.rig.parameters import Parameters
 from studies.comparison.grid import as_described
 from studies.honest.sensor_floor import circle_floor, probe_floor
 
-NAMES = ("admittance-adaptive", "admittance-sensorless")
+RIG = Parameters()
 
 
-def openings(name, sensors, lanes=3, steps=120, shown=None, **gains):
-    """Openings (steps, 4, lanes) of a law in the circle; ``shown`` changes the hand's force that it is shown."""
-    law = make_controller(name, Parameters(), **gains)
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, sensors=sensors, policy_period=0.001, randomize=True)
-    env.reset(seed=[40 + k for k in range(lanes)])
+def openings(name, sensors, believed=RIG, rig=RIG, shown=lambda seen: {}, **gains):
+    """Openings (120, 4, 3) of a law on the circle; ``shown(seen)`` is what it is shown instead."""
+    law = make_controller(name, believed, **gains)
+    env = gymnasium.make_vec(
+        "BirthSIM/Circle-v1", num_envs=3, sensors=sensors, policy_period=0.001, randomize=True, parameters=rig
+    )
+    env.reset(seed=[40, 41, 42])
     told = []
-    for _ in range(steps):
-        seen = env.measurement if shown is None else replace(env.measurement, user_force=env.measurement.user_force + shown)
-        told.append(law.command(seen, env.reference))
+    for _ in range(120):
+        told.append(law.command(replace(env.measurement, **shown(env.measurement)), env.reference))
         env.step(told[-1].T)
     env.close()
     return np.array(told)
@@ -40,7 +41,8 @@ def test_with_exact_sensors_and_no_rate_it_is_the_law_that_does_not_learn():
 @pytest.mark.parametrize("sensors", ["ideal", "honest"])
 @pytest.mark.parametrize("learn", [True, False])
 def test_without_a_force_sensor_the_hands_force_is_not_read(sensors, learn):
-    found, pushed = (openings("admittance-sensorless", sensors, shown=shown, learn=learn) for shown in (None, 25.0))
+    found = openings("admittance-sensorless", sensors, learn=learn)
+    pushed = openings("admittance-sensorless", sensors, shown=lambda seen: {"user_force": seen.user_force + 25.0}, learn=learn)
     np.testing.assert_array_equal(found, pushed)
     assert np.abs(found).max() > 0.01
 
@@ -102,7 +104,7 @@ def test_a_noisy_late_tracker_makes_no_lasting_swing(seed, most):
 
 def test_large_swings_lower_the_gain_at_once_only_with_sampled_positions_and_a_force_sensor():
     told = {}
-    for name in NAMES:
+    for name in ("admittance-adaptive", "admittance-sensorless"):
         law = make_controller(name, Parameters())
         for sampled in (False, True):
             given = law.law_stages(sampled)[0].constants

@@ -9,7 +9,6 @@ from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 from birthsim_env.info import FIELDS
 from birthsim_env.reward import REWARD_TERMS
 from birthsim_env.vector_env import BirthSIMVectorEnv
-from tests.contracts.test_environments import assert_lane, follow
 
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 
@@ -40,45 +39,6 @@ def test_make_vec_gives_the_native_class_with_batched_spaces():
         assert infos[name].shape == ((5,) if size == 1 else (5, size)), name
     for array in env.step(env.action_space.sample())[1:4]:
         assert array.shape == (5,)
-
-
-def test_lanes_that_end_at_different_times_start_anew_in_the_same_step():
-    arguments = {"randomize": True, "sensors": "lab", "duration": 0.4}
-    env, lanes = make(PROBE, 6, **arguments), range(6)
-    # Lanes 0-3 slam their pistons into the end stops, early and again; 4 and 5 last until the end of time.
-    slam = np.array([[0, 0, 1, -1], [0, 0, -1, 1], [1, -1, 0, 0], [-1, 1, 0, 0], [0, 0, 0, 0], [0.02, 0, 0, 0]], np.float32)
-    walks = [follow(single(PROBE, **arguments), [slam[lane]] * 125, 5 + lane) for lane in lanes]
-    env.reset(seed=5)
-    for walk in walks:
-        next(walk)
-    instants, episodes = [[] for _ in lanes], np.zeros(6, dtype=int)
-    for step in range(125):
-        observation, rewards, terminated, truncated, infos = env.step(slam)
-        ended = terminated | truncated
-        assert ("final_obs" in infos) == ("final_info" in infos) == ended.any()
-        for lane, walk in enumerate(walks):
-            last, reward, dead, cut, info, after = next(walk)
-            assert (rewards[lane], terminated[lane], truncated[lane]) == (reward, dead, cut)
-            if not ended[lane]:
-                np.testing.assert_array_equal(observation[lane], last)
-                assert_lane(infos, lane, info)
-                continue
-            assert all((infos["_final_obs"][lane], infos["_final_info"][lane], infos["final_info"]["_time"][lane]))
-            np.testing.assert_array_equal(infos["final_obs"][lane], last)
-            assert_lane(infos["final_info"], lane, info)
-            np.testing.assert_array_equal(observation[lane], after[0])
-            for name in FIELDS:
-                np.testing.assert_array_equal(infos[name][lane], after[1][name], err_msg=name)
-            assert (infos["time"][lane], infos["is_success"][lane]) == (0.0, False)
-            assert not (dead and info["is_success"])
-            instants[lane].append(step)
-        if ended.any():
-            np.testing.assert_array_equal(infos["_final_obs"], ended)
-            assert all(infos["final_obs"][lane] is None for lane in np.flatnonzero(~ended))
-        episodes += ended
-    assert instants[4] == instants[5] == [39, 79, 119]
-    assert min(episodes[:4]) >= 3
-    assert len({tuple(one) for one in instants[:4]}) == 4
 
 
 def test_a_list_of_seeds_gives_each_lane_its_own_and_none_a_fresh_one():

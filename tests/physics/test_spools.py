@@ -60,19 +60,6 @@ def test_a_worn_plant_moves_as_the_second_model_behind_another_spool():
     assert np.abs(plant.end_effector() - perfect.end_effector())[:2].max() > 1e-3, "it matters"
 
 
-def test_the_loop_moves_as_the_plant_alone():
-    rig = Parameters().replace(WORN)
-    env = gymnasium.make_vec(CIRCLE, num_envs=3, parameters=rig, user_force=lambda time: (0.0, 0.0), policy_period=0.001)
-    env.reset(seed=0)
-    plant, rng = Plant(rig, 3), np.random.default_rng(0)
-    plant.state = env.unwrapped.simulation.plant.state
-    for _ in range(100):
-        action = rng.uniform(-0.3, 0.3, (3, 4)).astype(np.float32)
-        env.step(action)
-        plant.advance(action.T.astype(float), np.zeros((2, 3)), 0.001)
-    np.testing.assert_allclose(env.unwrapped.simulation.plant.state, plant.state, rtol=1e-12, atol=1e-12)
-
-
 def run(lanes, seed, **setting):
     env = gymnasium.make_vec(CIRCLE, num_envs=lanes, **setting)
     found, rng = [env.reset(seed=seed)[0]], np.random.default_rng(0)

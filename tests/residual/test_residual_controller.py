@@ -9,7 +9,6 @@ from agents.policy.controller import ResidualController, observation_size
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.policy.network import PolicyNetwork
 from agents.residual.settings import ResidualSettings
-from baselines.backstepping.controller import BacksteppingController
 from baselines.registry import make_controller
 from birthsim_env import Parameters
 from birthsim_env.observation import SIZE
@@ -139,30 +138,7 @@ class Asked:
 
 
 LAST = slice(SIZE, SIZE + 2)
-SMOOTH, SHARE, MET = slice(SIZE + 2, SIZE + 4), slice(SIZE + 4, SIZE + 6), slice(SIZE + 6, SIZE + 12)
-
-
-def test_a_reset_of_one_lane_forgets_that_lane_alone(steering):
-    env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=3, policy_period=1e-3)
-    policy = Asked(steering)
-    controller, asked = policy.controller, policy.seen
-    env.reset(seed=2)
-    for _ in range(45):
-        env.step(controller.command(env.measurement, env.reference).T)
-    controller.reset(np.array([False, True, False]))
-    untold = BacksteppingController().command(env.measurement, env.reference)
-    openings = controller.command(env.measurement, env.reference)
-    np.testing.assert_array_equal(openings[:, 1], untold[:, 1])
-    assert (openings[:, [0, 2]] != untold[:, [0, 2]]).any(axis=0).all()
-    for _ in range(15):
-        env.step(controller.command(env.measurement, env.reference).T)
-    # The next question to the policy shows its last action, smoothed too: none in that lane.
-    assert len(asked) == 4
-    for part in (LAST, SMOOTH):
-        np.testing.assert_array_equal(asked[-1][1, part], 0)
-        assert (np.abs(asked[-1][[0, 2], part]).max(axis=1) > 0.05).all()
-    # What the pistons met since, it shows.
-    assert np.abs(asked[-1][1, MET]).max() > 0
+SMOOTH, SHARE = slice(SIZE + 2, SIZE + 4), slice(SIZE + 4, SIZE + 6)
 
 
 def test_the_policy_is_asked_once_per_policy_period(steering):

@@ -258,12 +258,6 @@ def test_observations_tell_what_the_pistons_met_as_the_rigs_owner_describes_it(s
     assert np.abs(observation[:, -6:]).max() > 0.05
 
 
-@pytest.mark.parametrize("make", [single, lanes])
-def test_unknown_arguments_are_refused_as_python_does_and_the_residuals_own_are_named(make):
-    with pytest.raises(TypeError, match=r"got an unexpected keyword argument 'smoothing'; allowed: law, impedance, .*sensors"):
-        make(smoothing=0.3)
-
-
 def test_the_largest_settings_are_allowed():
     env = lanes(2, authority=500, time_constant=1, policy_period=1)
     env.reset(seed=0)
@@ -274,18 +268,3 @@ def test_the_largest_settings_are_allowed():
         "force_sensor": True,
     }  # fmt: skip
     assert ResidualSettings(**settings.to_dict()) == settings
-
-
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        ([[0, 0]], r"action has shape \(1, 2\); allowed: \(3, 2\)"),
-        ([[0, 0], [0, 1.01], [0, 0]], r"action\[1\] = 1\.01 in lane 1; allowed: -1 to 1"),
-        ([[0, 0], [0, 0], [np.nan, 0]], r"action\[0\] = nan in lane 2; allowed: -1 to 1"),
-    ],
-)
-def test_wrong_actions_are_refused(action, message):
-    env = lanes(3)
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=message):
-        env.step(np.array(action))

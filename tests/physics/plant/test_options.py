@@ -171,7 +171,10 @@ def test_a_lane_without_options_among_others_has_the_bits_of_a_plain_plant():
         np.testing.assert_array_equal(plants[0].end_effector()[:, lane], alone.end_effector()[:, 0])
 
 
-@pytest.mark.parametrize("changes", EACH.values(), ids=EACH)
+WORN = {"valves.deadband": 0.05, "valves.opening_limit": 0.7}
+
+
+@pytest.mark.parametrize("changes", [*EACH.values(), WORN], ids=[*EACH, "worn valves"])
 def test_the_loop_moves_as_the_plant_alone(changes):
     rig = Parameters().replace({**changes, "valves.hysteresis": 0.02})
     env = gymnasium.make_vec(CIRCLE, num_envs=3, parameters=rig, user_force=lambda time: (5.0, 0.0), policy_period=0.001)
