@@ -6,7 +6,6 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 
 from baselines.bench import evaluation
 from baselines.bench.pieces import controller_settings, file_stem
@@ -283,15 +282,6 @@ def test_the_data_file_has_a_row_per_condition_metric_and_controller(figures):
     assert (other["ratio"], other["lost"], other["episodes"]) == ("0.5", "1", "3")
     assert found["settled_rms", REFERENCE]["ratio"] == ""
     assert {row["controller"] for row in table if row["environment"] == PROBE.environment} == {REFERENCE, "other"}
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures drawn, by name, still open."""
-    found = {}
-    monkeypatch.setattr(comparison_figures, "save", lambda figure, folder, name: found.setdefault(name, figure) and [])
-    yield found
-    plt.close("all")
 
 
 def test_pictures_show_medians_with_intervals_and_name_what_is_lost(figures, drawn, tmp_path):

@@ -12,6 +12,7 @@ from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
 from tests.oracles import rigid_body
 from tests.oracles.closed_loop import FRICTIONLESS
+from tests.parts.test_own_parts import PerLane, spring
 
 PROBE = "BirthSIM/Probe-v2"
 RIG = Parameters()
@@ -127,41 +128,20 @@ def test_below_one_a_strong_law_holds_and_above_it_none_can() -> None:
     assert np.all(lost[1::2] | (error[1::2] > 0.01))
 
 
-def test_looking_ahead_changes_nothing() -> None:
-    one, other = (gymnasium.make_vec("BirthSIM/Descent-v1", num_envs=3, randomize=True) for _ in range(2))
-    one.reset(seed=4), other.reset(seed=4)
-    required_strength_ratio(one)
-    for _ in range(5):
-        np.testing.assert_array_equal(one.step(np.zeros((3, 4)))[0], other.step(np.zeros((3, 4)))[0])
-
-
-class PerLane(UserForce):
-    """One force per lane, as a hand that depends on the position may return it."""
-
-    closed_loop = True
-
-    def force(self, time, position, velocity):
-        return np.stack([5.0 + 100.0 * (0.55 - position[0]), np.zeros(len(position[0]))])
-
-
 def test_a_force_per_lane_is_a_force():
-    env, own = (gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, user_force=hand) for hand in (PerLane(), held))
+    env, own = (gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=3, user_force=hand) for hand in (PerLane(), spring))
     env.reset(seed=0), own.reset(seed=0)
     np.testing.assert_allclose(required_strength_ratio(env), required_strength_ratio(own), rtol=1e-12)
 
 
-def held(time, position, velocity):
-    return 5.0 + 100.0 * (0.55 - position[0]), 0.0
-
-
-def test_looking_ahead_leaves_a_hand_with_a_memory_as_it_was():
-    observations = []
-    for looks in (True, False):
-        env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=2, user_force="guided", duration=2.0)
-        env.reset(seed=1)
-        if looks:
-            required_strength_ratio(env)
-        for _ in range(150):
-            seen = env.step(np.zeros((2, 4)))[0]
-        observations.append(seen)
-    np.testing.assert_array_equal(*observations)
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [("BirthSIM/Descent-v1", {"randomize": True}), ("BirthSIM/Circle-v1", {"user_force": "guided", "duration": 2.0})],
+    ids=["randomised", "a hand with a memory"],
+)
+def test_looking_ahead_changes_nothing(name, arguments):
+    one, other = (gymnasium.make_vec(name, num_envs=2, **arguments) for _ in range(2))
+    one.reset(seed=1), other.reset(seed=1)
+    required_strength_ratio(one)
+    for _ in range(150):
+        np.testing.assert_array_equal(one.step(np.zeros((2, 4)))[0], other.step(np.zeros((2, 4)))[0])

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 
 from baselines.bench.pneumatic_range import pneumatic_range, pneumatic_setpoint
 from baselines.bench.probes import POSES, StiffnessResult
@@ -162,15 +161,6 @@ def test_the_setpoint_lies_inside_both_ranges():
     assert low[0, 0] > 4400
     with pytest.raises(ValueError, match=r"position = \(0.9, 0\) m is unreachable"):
         pneumatic_range(np.array([[0.9], [0.0]]), 0 * force, RIG)
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures drawn, by name, still open."""
-    found = {}
-    monkeypatch.setattr(study_figures, "save", lambda figure, folder, name: found.setdefault(name, figure) and [])
-    yield found
-    plt.close("all")
 
 
 def test_pictures_show_medians_and_ranges_and_name_what_is_lost(drawn, tmp_path):

@@ -202,6 +202,7 @@ TABLE = [
     (partial(training, rollout=65536), "lanes", (65536,), "a product of at most 4194304"),
     *((training, name, (0.0, -0.5, 1.5, NAN, INF, "a"), "a finite number > 0 and <= 1 (-)") for name in (
         "learning_rate", "discount", "gae_lambda")),
+    (training, "until", (0.0, -1.0, NAN), "a finite number > 0 and <= 100 (%)"),
     (training, "log_std", ("low", NAN), "a finite number >= -20 and <= 2 (-)"),
     (training, "hidden", ((), (64, 0), (64.5,), (True,), 64), "1 to 8 whole numbers from 1 to 2048"),
     (training, "privileged", ("yes",), "True, False"),

@@ -8,8 +8,8 @@ import pytest
 
 from baselines.commands.worlds import with_options
 from baselines.registry import known_options, make_controller, split_options
-from birthsim_env import Circle, Parameters
-from birthsim_env.parts.own_parts import hand_of, trajectory_of
+from birthsim_env import Circle, Parameters, UserForce
+from birthsim_env.parts.own_parts import Through, hand_of, trajectory_of
 
 CIRCLE = "BirthSIM/Circle-v1"
 
@@ -43,8 +43,6 @@ def test_a_plain_position_becomes_a_trajectory_with_its_derivatives(from_file, t
 def test_few_points_are_met(count):
     rng = np.random.default_rng(count)
     times, points = np.cumsum(rng.uniform(0.5, 1, count)), rng.uniform(0.4, 0.6, (count, 2))
-    from birthsim_env.parts.own_parts import Through
-
     path = Through(times, points)
     for t, point in zip(times, points, strict=True):
         np.testing.assert_allclose(path.sample(np.array([t]))[:2, 0], point, atol=1e-12)
@@ -66,19 +64,16 @@ def spring(time, position, velocity):
     return 800.0 * (0.55 - position[0]) - 2.0 * velocity[0], 0.0
 
 
-def one_per_lane():
-    from birthsim_env import UserForce
+class PerLane(UserForce):
+    """The same as one force per lane."""
 
-    class Own(UserForce):
-        closed_loop = True
+    closed_loop = True
 
-        def force(self, time, position, velocity):
-            return np.stack([800.0 * (0.55 - position[0]), np.zeros(len(position[0]))])
-
-    return Own
+    def force(self, time, position, velocity):
+        return np.stack(np.broadcast_arrays(*spring(time, position, velocity)))
 
 
-@pytest.mark.parametrize("hand", [pushing, spring, one_per_lane()])
+@pytest.mark.parametrize("hand", [pushing, spring, PerLane])
 def test_a_function_or_a_force_per_lane_is_a_hand(hand):
     env = gymnasium.make_vec(CIRCLE, num_envs=2, user_force=hand)
     _, info = env.reset(seed=0)
@@ -86,12 +81,7 @@ def test_a_function_or_a_force_per_lane_is_a_hand(hand):
         _, _, _, _, info = env.step(np.zeros((2, 4)))
         for lane in range(2):
             given = (info["time"][lane], info["position"][lane], info["velocity"][lane])
-            if hand is pushing:
-                expected = pushing(given[0])
-            elif hand is spring:
-                expected = spring(*given)
-            else:
-                expected = (800.0 * (0.55 - given[1][0]), 0.0)
+            expected = pushing(given[0]) if hand is pushing else spring(*given)
             np.testing.assert_allclose(info["user_force"][lane], expected, rtol=1e-12)
 
 

@@ -160,26 +160,13 @@ def test_a_damaged_checkpoint_is_refused_and_nothing_is_unpickled(tmp_path):
     save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
     content = path.read_bytes()
     wrong = [b"", b"no checkpoint", content[:1000], content[: len(content) // 2], content[:-10], pickle.dumps(Trap(trap))]
-    for damaged in wrong:
+    # Every bit of such a file counts: tests/residual/test_policy_damage.py.
+    for damaged in [*wrong, content[:-1] + bytes([content[-1] ^ 1])]:
         path.write_bytes(damaged)
         assert_damaged(tmp_path, model, env)
     assert not trap.exists()
     pickle.loads(pickle.dumps(Trap(trap)))
     assert trap.exists(), "the trap is a real one"
-
-
-def test_a_flipped_bit_anywhere_is_refused(tmp_path):
-    model, env = learned()
-    save_checkpoint(tmp_path, model, env, SETTINGS, PAST)
-    content, rng = (tmp_path / NAME).read_bytes(), np.random.default_rng(0)
-    for _ in range(300):
-        flipped = bytearray(content)
-        flipped[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
-        (tmp_path / NAME).write_bytes(flipped)
-        said = assert_damaged(tmp_path, model, env)
-        assert "\n" not in said
-    (tmp_path / NAME).write_bytes(content)
-    assert load_checkpoint(tmp_path, model, env, SETTINGS) == PAST
 
 
 def rewritten(folder, change):
