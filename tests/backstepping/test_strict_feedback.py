@@ -33,10 +33,7 @@ def case(request):
         lp, ln = half + y[i], half - y[i]
         force = air[i, 0] * ap - air[i, 1] * an
         x[row : row + 4] = y[i], v[i], force, rig.air.polytropic_index * (air[i, 0] * ap / lp + air[i, 1] * an / ln)
-        u[row // 2 : row // 2 + 2] = (
-            half * (flow[i, 0] / lp - flow[i, 1] / ln),
-            half * (flow[i, 0] / lp + flow[i, 1] / ln),
-        )
+        u[row // 2 : row // 2 + 2] = (half * (flow[i, 0] / lp - flow[i, 1] / ln), half * (flow[i, 0] / lp + flow[i, 1] / ln))
     return rig, y, v, air, flow, x, u
 
 

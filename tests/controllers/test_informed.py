@@ -248,10 +248,7 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
     Targets turn round on the way, and friction with them. Asking changes nothing.
     """
     part, kept = aware(friction_fraction=fraction), aware(friction_fraction=fraction)
-    push, ticks = (
-        np.array([[9.0, -4.0], [-6.0, 7.0]]),
-        np.arange(1, 26),
-    )
+    push, ticks = (np.array([[9.0, -4.0], [-6.0, 7.0]]), np.arange(1, 26))
 
     def both(tick: int) -> tuple[SimpleNamespace, SimpleNamespace]:
         measured, wanted = turning(tick, push)

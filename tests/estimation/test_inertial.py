@@ -80,12 +80,7 @@ def test_the_speed_is_nearly_as_good_as_a_kalman_filter_of_samples_without_delay
     spread, noise, lanes = 0.02, 1e-4, 40
     rng = np.random.default_rng(3)
     truth, found, _ = run(
-        5000,
-        lambda t: (0.0, 0.0),
-        lambda t, n: spread * rng.standard_normal((2, n)),
-        noise=noise,
-        lanes=lanes,
-        old=LATE_ENOUGH,
+        5000, lambda t: (0.0, 0.0), lambda t, n: spread * rng.standard_normal((2, n)), noise=noise, lanes=lanes, old=LATE_ENOUGH
     )
     q, r = spread**2 * PERIOD, noise**2 * EVERY * PERIOD
     best = solve_continuous_are(

@@ -17,15 +17,7 @@ from studies.haptics.impedance import (
     port_damping,
     unnoticed_up_to,
 )
-from studies.haptics.multisine import (
-    FREQUENCIES,
-    FUNDAMENTAL,
-    SECONDS,
-    SETTLING,
-    impedance_felt,
-    measured_part,
-    multisine_hand,
-)
+from studies.haptics.multisine import FREQUENCIES, FUNDAMENTAL, SECONDS, SETTLING, impedance_felt, measured_part, multisine_hand
 from studies.haptics.own_error import declared_offset, error_size, pure_spring_offset
 from studies.haptics.recording import Recording, record
 from studies.haptics.release import PULL, flight, pulling_hand

@@ -116,11 +116,7 @@ number = 3
 MISTAKES = [
     ("reference", "nowhere.csv", r"reference = '.*nowhere\.csv' cannot be read: .*; allowed: a file"),
     ("reference", "own.py:missing", r"has no 'missing'; allowed: a name that it defines: birthsim_env, along, "),
-    (
-        "reference",
-        "own.py:wild",
-        r"reference: function\(0\) fails \(ZeroDivisionError: .*\); allowed: a function of",
-    ),
+    ("reference", "own.py:wild", r"reference: function\(0\) fails \(ZeroDivisionError: .*\); allowed: a function of"),
     ("reference", "own.py:number", r"reference = 3; allowed: None, a birthsim_env\.Trajectory, a function of time"),
     ("reference", "broken.py:x", r"reference file '.*broken\.py': SyntaxError: .* line 1"),
     ("reference", "plain", r"reference = '.*plain'; allowed: a birthsim_env\.Trajectory"),

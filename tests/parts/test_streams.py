@@ -43,10 +43,7 @@ def assert_alike(ours, theirs, calls):
         if method == "uniform":
             arguments[:2] = sorted(arguments[:2])
         if arguments[-1:] == [np.uint64]:
-            drawn, expected = (
-                ours.integers(2**64, dtype=np.uint64),
-                [one.integers(2**64, dtype=np.uint64) for one in theirs],
-            )
+            drawn, expected = (ours.integers(2**64, dtype=np.uint64), [one.integers(2**64, dtype=np.uint64) for one in theirs])
         else:
             drawn = getattr(ours, method)(*arguments)
             expected = [getattr(one, method)(*(arguments[:2]), *([arguments[2]] if arguments[2:] else [])) for one in theirs]

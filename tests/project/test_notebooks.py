@@ -56,10 +56,7 @@ def test_with_an_address_it_installs_from_there_and_colab_and_binder_open_it(not
                 f"https://colab.research.google.com/github/someone/birthsim/blob/gh-pages/notebooks/{name}.ipynb",
                 "Open in Colab",
             ),
-            (
-                f"https://mybinder.org/v2/gh/someone/birthsim/HEAD?labpath=docs%2Ftutorials%2F{name}.ipynb",
-                "Open in Binder",
-            ),
+            (f"https://mybinder.org/v2/gh/someone/birthsim/HEAD?labpath=docs%2Ftutorials%2F{name}.ipynb", "Open in Binder"),
         ]
 
 

@@ -66,11 +66,7 @@ def test_what_is_no_policy_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[chambers]\ntube_length = 1.0\n", "tubes"),
-        ("[mechanics]\nmass = 90.0\n", "mass"),
-    ],
+    ("text", "said"), [("[chambers]\ntube_length = 1.0\n", "tubes"), ("[mechanics]\nmass = 90.0\n", "mass")]
 )
 def test_a_rig_that_the_page_cannot_show_is_refused(text, said, tmp_path, monkeypatch, capsys):
     (tmp_path / "rig.toml").write_text(text)
