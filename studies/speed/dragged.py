@@ -1,6 +1,6 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
-``python -m tests.live.measure_page`` starts a server, drags the end effector around for some seconds, several times, and
+``python -m studies.speed.dragged`` starts a server, drags the end effector around for some seconds, several times, and
 prints a table; ``--controller NAME`` does so with a controller that runs in Python, ``--compare NAME`` with two rigs;
 ``--picture FILE`` also writes the screenshot of docs/live.md.
 """
@@ -9,6 +9,7 @@ import argparse
 import math
 import statistics
 import time
+from typing import Any
 
 from tests.live import browser
 from tests.live.browser import Server, Window
@@ -18,7 +19,7 @@ RADIUS = 45.0  # px
 HEADINGS = ("run", "drawn (1/s)", "real-time factor, least", "behind (s)", "latency (ms): median", "95 %", "most", "moves")
 
 
-def drag(window, seconds):
+def drag(window: Any, seconds: float) -> dict[str, Any]:
     """Drag in circles like a mouse that reports 60 times a second; the page's report, with real-time factors on the way."""
     window.page.locator("body").press("r")
     window.wait("birthsim.frame.real_time !== null && birthsim.frame.pointer === null")
@@ -37,14 +38,14 @@ def drag(window, seconds):
             sampled = now
             factors.append(window.value("birthsim.frame.real_time"))
         time.sleep(max(0.0, 1 / 60 - (time.monotonic() - now)))
-    report = window.value("birthsim.monitor.report()")
+    report: dict[str, Any] = window.value("birthsim.monitor.report()")
     report["behind"] = window.value("birthsim.frame.behind") - behind
     report["factors"] = factors
     window.page.mouse.up()
     return report
 
 
-def row(run, report):
+def row(run: int, report: dict[str, Any]) -> tuple[str, ...]:
     """One line of the table."""
     latencies = sorted(report["latencies"])
     late = latencies[min(math.ceil(0.95 * len(latencies)), len(latencies)) - 1]
@@ -60,7 +61,7 @@ def row(run, report):
     return (str(run), *figures)
 
 
-def picture(window, path):
+def picture(window: Any, path: str) -> None:
     """A screenshot with something to see: two rigs under one hand, a pull, and the plots full."""
     window.page.locator("#guide").select_option("What the force sensor buys")
     window.wait("birthsim.frame.second !== null && birthsim.frame.pointer === null")
@@ -74,8 +75,9 @@ def picture(window, path):
     window.page.mouse.up()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=15.0, help="length of a run (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="how many (default: %(default)s)")
     parser.add_argument("--controller", metavar="NAME", default="admittance-backstepping", help="what drives the rig")
