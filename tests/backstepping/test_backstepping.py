@@ -233,6 +233,16 @@ def test_a_damping_factor_up_to_its_least_is_bit_for_bit_the_law() -> None:
         )
 
 
+def test_nothing_told_is_zero_told() -> None:
+    measured, reference, _ = many(40)
+    nothing = np.zeros((2, 40))
+    for options in OPTIONS.values():
+        law = BacksteppingController(**options)
+        assert np.array_equal(
+            law.command(measured, reference, nothing, nothing, np.zeros(40)), law.command(measured, reference)
+        )
+
+
 def moving_target(time: float, rig: Parameters) -> tuple[Array, Reference]:
     """Sinusoids of both joints, (8, 1), and the reference that asks for them with 2000 N/m on both axes."""
     angles = np.array([3.0, 2.5]) * time + np.array([0.4, 1.0])

@@ -1,5 +1,7 @@
 """Gains for a damping beside the stiffness: their range, and what they render on the whole plant."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -111,6 +113,23 @@ def test_equal_gains_are_the_least_damped() -> None:
     frictionless = equal_gain(2000, 3, 0)
     ratio = closed_loop_damping(*[frictionless] * 3, 3, 0) / (2 * np.sqrt(2000 * 3))
     assert ratio == pytest.approx(4 / 27 * np.sqrt(27), rel=1e-3), "0.77: the limit without couplings and friction"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.0, 3.0, 35.0), "stiffness = 0.0; allowed: a positive number"),
+        ((2000.0, -3.0, 35.0), "apparent_mass = -3.0; allowed: a positive number"),
+        ((2000.0, 3.0, -1.0), "viscous = -1.0; allowed: a number >= 0"),
+        ((2000.0, 3.0, 35.0, np.nan), "damping = nan; allowed: a positive number"),
+        ((2000.0, 3.0, 35.0, 150.0, np.inf), "gain_sum = inf; allowed: a positive number"),
+        ((2000.0, 3.0, 35.0, None, 150.0), "gain_sum = 150 without a damping; allowed: None"),
+        ((2.5, 3.0, 35.0, 20.0), "stiffness = 2.5 N/m; allowed with a damping: more than m_e/s2 = 3 N/m"),
+    ],
+)
+def test_arguments_that_cannot_be_are_refused(arguments: tuple[float, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        gains_for(*arguments)
 
 
 def ramped(law: BacksteppingController, setpoints: Array, axes: Array, poses: Array, speed: Array) -> Array:

@@ -1,5 +1,7 @@
 """Gains beside the limits of what can be rendered, and what is said beyond them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,13 @@ def test_the_least_damping_is_the_least_of_a_fine_search(stiffness: float, visco
     assert gains.least_damping(stiffness, MASS, viscous) == pytest.approx(searched, rel=1e-6)
 
 
+def test_no_damping_goes_with_a_stiffness_of_one_over_the_mass_or_less() -> None:
+    for stiffness in (MASS, 0.5 * MASS):
+        with pytest.raises(ValueError, match=r"allowed with a damping: more than m_e/s2 = 3 N/m"):
+            gains.least_damping(stiffness, MASS, 35.0)
+    assert gains.least_damping(1.001 * MASS, MASS, 35.0) > 0
+
+
 @pytest.mark.parametrize(("stiffness", "viscous"), [(3.3, 0.5), (9.0, 1.0), (60.0, 35.0), (2000.0, 35.0)])
 def test_soft_setpoints_get_their_damping_too(stiffness: float, viscous: float) -> None:
     """There the small terms of the polynomial count."""
@@ -36,6 +45,15 @@ def test_gains_miss_where_they_render_another_damping_by_more_than_a_millionth()
     at = (stiffness, damping, MASS, viscous)
     assert gains.damped_gains_miss(outer * (1 + 1e-8), inner, *at) == 0
     assert gains.damped_gains_miss(outer * (1 + 1e-4), inner, *at) == 1
+
+
+def test_the_refusal_names_both_ratios_of_damping() -> None:
+    least = gains.least_damping(2000.0, MASS, 35.0)
+    critical = 2 * (2000.0 * MASS) ** 0.5
+    wanted = f"(ratio {0.9 * least / critical:.4g}) has no positive gains at 2000 N/m"
+    with pytest.raises(ValueError, match=re.escape(wanted)) as refused:
+        gains.gains_for(2000.0, MASS, 35.0, damping=0.9 * least)
+    assert str(refused.value).endswith(f"allowed: at least {least:.6g} N s/m (ratio {least / critical:.4g})")
 
 
 def test_without_viscous_friction_two_thirds_of_the_mass_is_too_soft() -> None:

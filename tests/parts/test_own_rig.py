@@ -61,8 +61,6 @@ def test_the_dead_volume_follows_the_bore(tmp_path):
     assert rig.chambers.dead_volume == pytest.approx(4 * Parameters().chambers.dead_volume)
     kept = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 3e-5}})
     assert kept.chambers.dead_volume == 3e-5
-    with pytest.raises(ValueError, match=r"dead_volume = 1e-05 is impossible"):
-        Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 1e-5}})
     p = drawn(tmp_path, "[cylinder1]\npiston_diameter = 0.032\n")
     assert np.isfinite(p).all()
 
@@ -79,8 +77,6 @@ def test_the_linkage_has_room_for_any_stroke_of_cylinder_1(stroke):
 
 
 def test_named_lengths_are_kept():
-    with pytest.raises(ValueError, match=r"Geometry\.k1 = 0\.43 with stroke 0\.4"):
-        Parameters.from_dict({"cylinder1": {"stroke": 0.4}, "geometry": {"d3": 0.35}})
     assert Parameters.from_dict({"cylinder2": {"stroke": 1.0}}).geometry.k2 == 0.6
 
 

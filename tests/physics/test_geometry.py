@@ -207,6 +207,12 @@ def test_what_is_well_inside_is_what_the_inverse_model_reaches(rig: Parameters) 
     assert not geometry.well_inside(*corner, column), "on the edge is not well inside"
 
 
+@pytest.mark.parametrize("y1", [0.2, -0.4])
+def test_a_linkage_that_cannot_close_is_refused(y1: float) -> None:
+    with pytest.raises(ValueError, match=rf"y1 = {y1:g} m .* -0\.33 < y1 < 0\.17 m"):
+        geometry.theta1(np.array([0.0, y1]), Parameters())
+
+
 @each_rig
 def test_joint_force_does_the_same_work(rig: Parameters) -> None:
     rng = np.random.default_rng(3)
