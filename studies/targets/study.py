@@ -15,6 +15,15 @@ from baselines.work.files import write_json
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
+from birthsim_build.code.compiler import require_linker, require_llvm
+from birthsim_build.estimate import CYCLES, HOST
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.parameters import Parameters
+from studies.comparison.tables import markdown
+from studies.results import Content
+from studies.study import Study
 from studies.targets.reference import (
     CHAMBERS,
     PERIODS,
@@ -26,15 +35,6 @@ from studies.targets.reference import (
     plant_states,
 )
 from studies.targets.running import EMULATED, ROW, emulated_rows, library_loop, library_rows, node_rows
-from birthsim_build.code.compiler import require_linker, require_llvm
-from birthsim_build.estimate import CYCLES, HOST
-from birthsim_env.parts.scenarios import SCENARIOS
-from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.tables import markdown
-from studies.results import Content
-from studies.study import Study
 
 LAWS, POLICY = ("backstepping", "admittance-backstepping"), "circle"
 LOOPS = (("ideal", "backstepping"), ("lab", "admittance-backstepping"), ("ideal", f"residual:{POLICY}"))

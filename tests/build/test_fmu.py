@@ -24,7 +24,6 @@ from birthsim_env.physics.compiled.lanes import STATE_NAMES, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import load_parameters
 from tests.build.targets import imported, need_linker
-from tests.console import call
 
 fmpy, validate_fmu = imported("fmpy"), imported("fmpy.validation").validate_fmu
 
@@ -310,27 +309,6 @@ def test_several_values_are_set_all_or_none(written, unit):
 def test_impossible_parameters_are_refused(written, unit):
     with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2SetReal"):
         unit(written("--fmi", 2), **{"rig.mechanics.mass": -1.0})
-
-
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (("--out", "x.zip"), "--out 'x.zip'; allowed: a file that ends in .fmu"),
-        (
-            ("--controller", "nonlinear-mpc", "--out", "x.fmu"),
-            "controller = 'nonlinear-mpc'; allowed: a compiled one: backstepping,",
-        ),
-        (("--controller", "pid", "--policy", "circle", "--out", "x.fmu"), "--controller with --policy; allowed: one of them"),
-        (("--env", "BirthSIM/Square-v1", "--out", "x.fmu"), "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v1"),
-    ],
-)
-def test_bad_input_is_refused_in_a_line(options, complaint, monkeypatch, capsys, tmp_path):
-    need_linker()
-    monkeypatch.chdir(tmp_path)
-    status, _, complained = call("export", monkeypatch, capsys, "--to", "fmu", *options)
-    assert status == 2
-    assert complained.startswith(f"birthsim export: error: {complaint}")
-    assert not list(tmp_path.iterdir())
 
 
 def test_units_are_those_of_the_rig():

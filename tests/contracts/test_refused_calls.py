@@ -5,22 +5,20 @@ import math
 import gymnasium
 import numpy as np
 import pytest
+from baselines.backstepping.strict_feedback import strict_feedback_rates
 
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
 from baselines import BacksteppingController
-from baselines.backstepping.gains import gains_for, least_damping
 from baselines.backstepping.lyapunov import LyapunovFunction
-from baselines.backstepping.strict_feedback import strict_feedback_rates
 from baselines.identification.experiment import propose
 from baselines.registry import make_controller
 from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, StiffnessSchedule, linearize
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.stage import Stage
-from birthsim_env.parts.labour.model import Labour
-from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled.records import Rows, row, rows
+from studies.labour.model import Labour
 
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = math.nan, math.inf
@@ -58,10 +56,6 @@ def lanes(**given):
 
 def seeded(seed):
     return lambda: gymnasium.make_vec(CIRCLE, num_envs=3).reset(seed=seed)
-
-
-def gains(*given):
-    return lambda: gains_for(*given)
 
 
 def paper(**given):
@@ -106,15 +100,6 @@ def shifted(discount):
 
 TABLE = {
     # what is named; what is allowed: the calls
-    ("stiffness = 0.0", "a positive number"): [gains(0.0, 3.0, 35.0)],
-    ("apparent_mass = -3.0", "a positive number"): [gains(2000.0, -3.0, 35.0)],
-    ("viscous = -1.0", "a number >= 0"): [gains(2000.0, 3.0, -1.0)],
-    ("damping = nan", "a positive number"): [gains(2000.0, 3.0, 35.0, NAN)],
-    ("gain_sum = inf", "a positive number"): [gains(2000.0, 3.0, 35.0, 150.0, INF)],
-    ("gain_sum = 150 without a damping", "None"): [gains(2000.0, 3.0, 35.0, None, 150.0)],
-    ("stiffness = ", "more than m_e/s2 = 3 N/m"): [
-        gains(2.5, 3.0, 35.0, 20.0), *(lambda k=k: least_damping(k, 3.0, 35.0) for k in (3.0, 1.5)),
-    ],
     ("force_first = True", "False with valves = 'one_valve'"): [paper(valves="one_valve", force_first=True)],
     ("law.frozen_friction = True", "False"): [lambda: LyapunovFunction(BacksteppingController(frozen_friction=True))],
     ("'smoothing'", "law, impedance, "): [
@@ -226,8 +211,15 @@ TABLE = {
     ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
     ("", "a rig whose options are off"): [linear(parameters=RIG.replace({"chambers.tube_length": 1.0}))],
     ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
-    ("y1 = 0.2 m", "-0.33 < y1 < 0.17 m"): [lambda: geometry.theta1(np.array([0.0, 0.2]), RIG)],
-    ("y1 = -0.4 m", "-0.33 < y1 < 0.17 m"): [lambda: geometry.theta1(np.array([0.0, -0.4]), RIG)],
+    ("unknown parameter 'mechanics.weight'", "mass, gravity"): [lambda: RIG.replace({"mechanics.weight": 0.9})],
+    ("unknown parameter section 'motor'", "geometry, cylinder1"): [lambda: RIG.replace({"motor.mass": 0.9})],
+    ("Geometry.k1 = 0.43 with stroke 0.2 is impossible", ""): [lambda: RIG.replace({"geometry.d3": 0.9})],
+    ("Geometry.k1 = 0.43 with stroke 0.4", ""): [
+        lambda: Parameters.from_dict({"cylinder1": {"stroke": 0.4}, "geometry": {"d3": 0.35}}),
+    ],
+    ("dead_volume = 1e-05 is impossible", ""): [
+        lambda: Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 1e-5}}),
+    ],
     ("cylinder1 = 25", "an instance of Cylinder"): [lambda: Parameters(cylinder1=25)],
     **{
         (f"force_sensor = False with law = '{law}'", ""): [residual(law, force_sensor=False)]

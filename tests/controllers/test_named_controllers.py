@@ -33,12 +33,6 @@ class Own:
 
 def made_by_a_function(parameters):
     return Own(parameters, 0.0)
-
-class Wordless:
-    def __init__(self, parameters):
-        pass
-
-number = 3
 """
 
 
@@ -94,32 +88,6 @@ def test_a_short_name_is_its_controller_with_options_and_takes_more(name):
     for one, other in zip(short.law_stages(True), long.law_stages(True), strict=True):
         assert one.function is other.function
         np.testing.assert_array_equal(one.constants, other.constants)
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("own.py", r"controller = '{folder}/own\.py'; allowed: .*path/to/file\.py:Class"),
-        ("missing.py:Own", r"'{folder}/missing\.py' does not exist; allowed: path/to/file\.py:Name"),
-        ("own.py:Missing", r"'{folder}/own\.py' has no 'Missing'; allowed: a name that it defines: "),
-        ("own.py:", r"'{folder}/own\.py' has no ''; allowed: a name"),
-        ("own.py:number", r"'{folder}/own\.py:number' cannot be made \(TypeError: .*\); allowed: a class that takes the rig"),
-        ("own.py:Wordless", r"'{folder}/own\.py:Wordless' is made without command\(\) or reset\(\); allowed: a class that"),
-    ],
-)
-def test_what_is_no_controller_is_refused_with_its_name_and_what_there_is(own, name, message):
-    with pytest.raises(ValueError, match=message.replace("{folder}", str(own.parent))):
-        make_controller(f"{own.parent}/{name}", RIG)
-
-
-def test_a_file_that_does_not_import_is_refused_with_its_line(tmp_path):
-    path = tmp_path / "broken.py"
-    path.write_text("import numpy\nimport no_such_module\n")
-    with pytest.raises(ValueError, match=r"broken\.py', line 2: ModuleNotFoundError: No module named 'no_such_module'"):
-        make_controller(f"{path}:Own", RIG)
-    path.write_text("class Own:\n    pass\n")
-    with pytest.raises(ValueError, match=r"cannot be made \(TypeError: Own\(\) takes no arguments\); allowed: a class"):
-        make_controller(f"{path}:Own", RIG)
 
 
 @pytest.mark.parametrize(

@@ -104,39 +104,6 @@ def test_the_policy_period_follows_the_rigs_own_control_period():
     assert env.step(np.zeros(4))[4]["time"] == pytest.approx(0.012)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[mechanics\n", ("line 1",)),
-        ("[mechanics]\nmass 3.0\n", ("line 2",)),
-        ("[mechanics]\nmass = ", ("end of document",)),
-        ("[mechanics]\nmas = 3.0\n", ("mechanics.mas", "allowed in mechanics", "mass", "gravity")),
-        ("[motor]\nmass = 3.0\n", ("'motor'", "allowed", "mechanics")),
-        ("[mechanics]\nmass = -3.0\n", ("Mechanics.mass = -3.0", "allowed", "> 0 and <= 1e+20 (kg)")),
-        ("[cylinder1]\nrod_diameter = 0.03\n", ("rod_diameter = 0.03", "less than piston_diameter = 0.025")),
-        ("mass = 3\n", ("mass = 3", "allowed", "a section")),
-        ("[mechanics]\nmass = '3'\n", ("Mechanics.mass = '3' is impossible",)),
-        ("mechanics = 3\n", ("mechanics = 3", "allowed", "section")),
-    ],
-)
-def test_a_bad_rig_file_names_itself_and_what_is_wrong_in_it(tmp_path, text, words):
-    path = tmp_path / "our_rig.toml"
-    path.write_text(text, encoding="utf-8")
-    for given in (path, str(path)):
-        message = refusal(lambda given=given: gymnasium.make(CIRCLE, parameters=given))
-        assert all(word in message for word in ("our_rig.toml", *words)), message
-
-
-def test_a_rig_file_that_cannot_be_read_names_itself(tmp_path):
-    for path, words in ((tmp_path / "none.toml", "No such file"), (tmp_path, "directory")):
-        message = refusal(lambda path=path: gymnasium.make(CIRCLE, parameters=path))
-        assert f"parameters = {str(path)!r} cannot be read" in message
-        assert words in message
-    binary = tmp_path / "binary.toml"
-    binary.write_bytes(b"\xff\xfe\x00")
-    assert "binary.toml" in refusal(lambda: gymnasium.make(CIRCLE, parameters=binary))
-
-
 def test_a_good_rig_file_gives_the_same_world_as_its_parameters(tmp_path):
     rig = Parameters().replace({"mechanics.mass": 4.0, "cylinder2.coulomb_friction": 9.0})
     rig.to_toml(tmp_path / "rig.toml")

@@ -1,4 +1,4 @@
-"""birthsim identify as a user runs it: an experiment, its log, the rig; what is wrong in one line; Ctrl-C."""
+"""birthsim identify as a user runs it: an experiment, its log, the rig; Ctrl-C."""
 
 from pathlib import Path
 from typing import Any
@@ -46,37 +46,6 @@ def test_a_rig_from_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     # What is not identified is the owner's.
     assert found.geometry == OWNER.geometry
     assert found.air == OWNER.air
-
-
-BAD: list[tuple[list[str], str]] = [
-    ([], "nothing given; allowed: one of LOG, --propose PLAN, --simulate PLAN"),
-    (["log.csv", "--propose", "plan.csv"], "log and propose given; allowed: one of LOG, --propose PLAN, --simulate PLAN"),
-    (["log.csv"], "--out is missing; allowed: a file that ends in .toml, in a folder that exists"),
-    (["log.csv", "--out", "rig.json"], "rig.json'; allowed: a file that ends in .toml"),
-    (["log.csv", "--out", "none/rig.toml"], "none/rig.toml'; allowed: a file that ends in .toml, in a folder that exists"),
-    (["log.csv", "--out", "rig.toml", "--duration", "5"], "--duration is given; allowed with --propose only"),
-    (["--propose", "plan.csv", "--report", "r"], "--report is given; allowed with LOG only"),
-    (["log.csv", "--out", "rig.toml", "--report", "r"], "log = 'log.csv' cannot be read: No such file or directory"),
-    (["--propose", "plan.csv", "--out", "a.toml"], "--out is given; allowed with LOG or --simulate"),
-    (["--propose", "plan.csv", "--duration", "1"], "duration = 1.0; allowed: a finite number >= 4 and <= 600 (s)"),
-    (["--simulate", "plan.csv", "--out", "a.toml"], "a.toml'; allowed: a file that ends in .csv, .parquet, .mcap"),
-    (["--simulate", "plan.csv", "--out", "a.csv"], "log = 'plan.csv' cannot be read: No such file or directory"),
-    (["log.csv", "--out", "rig.toml"], "log = 'log.csv' cannot be read: No such file or directory"),
-    (["log.csv", "--out", "rig.toml", "--parameters", "no.toml"], "parameters = 'no.toml' cannot be read"),
-]
-
-
-@pytest.mark.parametrize(("given", "words"), BAD, ids=lambda part: " ".join(part) if isinstance(part, list) else "")
-def test_what_is_wrong_is_named_in_one_line(
-    given: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, printed, complained = call("identify", monkeypatch, capsys, *given)
-    assert (status, printed) == (2, "")
-    assert complained.startswith("birthsim identify: error: ")
-    assert complained.count("\n") == 1
-    assert words in complained
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", REMEMBER)

@@ -68,14 +68,41 @@ def test_with_every_error_off_it_is_lab_to_the_last_bit(changes):
         np.testing.assert_array_equal(honest[name], values, err_msg=name)
 
 
-def test_force_noise_is_normal_white_and_of_the_figure():
-    seen = watch(board(**{**EXACT, "force_noise": 0.3}), 4000, 10)["user_force"].reshape(4000, 20) / 0.3
-    count = seen.size
-    assert abs(seen.mean()) < 4.5 / math.sqrt(count)
-    assert abs(seen.std() - 1) < 4.5 / math.sqrt(2 * count)
-    assert abs((seen**4).mean() - 3) < 4.5 * math.sqrt(96 / count)
-    assert np.abs((seen[1:] * seen[:-1]).mean(axis=0)).max() < 5 / math.sqrt(4000)
-    assert np.abs(np.corrcoef(seen.T) - np.eye(20)).max() < 5.2 / math.sqrt(4000)
+SURE = {"acceleration_bias": 0.0, "acceleration_gain_error": 0.0, "acceleration_bandwidth": 300.0}
+NOISES = [
+    # model, what is shown, its figure, that figure, other figures, what is shown without noise
+    (LabSensors, "position", "position_noise", 1e-4, {}, HOME[:, None]),
+    (LabSensors, "pressures", "pressure_noise", 500.0, {}, 3e5),
+    (HonestSensors, "user_force", "force_noise", 0.3, {}, 0.0),
+    *((model, "acceleration", "acceleration_noise", 0.05, SURE, 0.0) for model in (LabSensors, HonestSensors)),
+]
+
+
+@pytest.mark.parametrize(("model", "name", "figure", "deviation", "others", "still"), NOISES)
+def test_noise_is_normal_of_its_figure_and_independent_over_time_channels_and_lanes(
+    model, name, figure, deviation, others, still
+):
+    shown = watch(board(**{**EXACT, **others, figure: deviation}), 4000, 10, model=model, names=(name,))[name]
+    values = ((shown - still) / deviation).reshape(4000, -1)
+    count = values.size
+    assert abs(values.mean()) < 4.5 / math.sqrt(count)
+    assert abs(values.std() - 1) < 4.5 / math.sqrt(2 * count)
+    assert abs((values**3).mean()) < 4.5 * math.sqrt(15 / count)
+    assert abs((values**4).mean() - 3) < 4.5 * math.sqrt(96 / count)
+    # In every channel of every lane as well.
+    assert np.abs(values.std(axis=0) - 1).max() < 5 / math.sqrt(2 * 4000)
+    assert (np.abs(values) > 2).mean() == pytest.approx(0.0455, abs=4.5 * math.sqrt(0.0455 * 0.9545 / count))
+    for lag in (1, 2, 5):
+        assert np.abs((values[lag:] * values[:-lag]).mean(axis=0)).max() < 5 / math.sqrt(4000 - lag)
+    assert np.abs(np.corrcoef(values.T) - np.eye(values.shape[1])).max() < 5.2 / math.sqrt(4000)
+
+
+def assert_uniform(values, most, name=""):
+    """Up to ``most`` either way; of a uniform distribution: mean square 1/3, its deviation sqrt(4/45)."""
+    scaled = values / most
+    assert np.abs(scaled).max() <= 1 + 1e-9, name
+    assert abs(scaled.mean()) < 4.5 * math.sqrt(1 / 3 / len(scaled)), name
+    assert (scaled**2).mean() == pytest.approx(1 / 3, abs=4.5 * math.sqrt(4 / 45 / len(scaled))), name
 
 
 def test_gain_crosstalk_and_bias_belong_to_the_episode_and_are_uniform_up_to_their_figures():
@@ -93,11 +120,7 @@ def test_gain_crosstalk_and_bias_belong_to_the_episode_and_are_uniform_up_to_the
         "force_bias": np.concatenate([own[2], other[2]]),
     }
     for name, values in errors.items():
-        scaled = values / figures[name]
-        assert np.abs(scaled).max() <= 1 + 1e-9, name
-        # Of a uniform distribution: mean square 1/3, its deviation sqrt(4/45).
-        assert abs(scaled.mean()) < 4.5 * math.sqrt(1 / 3 / len(scaled)), name
-        assert (scaled**2).mean() == pytest.approx(1 / 3, abs=4.5 * math.sqrt(4 / 45 / len(scaled))), name
+        assert_uniform(values, figures[name], name)
 
 
 @pytest.mark.parametrize("bandwidth", [30.0, 200.0])

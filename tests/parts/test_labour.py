@@ -143,11 +143,3 @@ def test_one_file_is_reference_and_stiffness(tmp_path):
     env = gymnasium.make("BirthSIM/Probe-v2", reference=file, stiffness=file, user_force=None)
     env.reset(seed=0)
     np.testing.assert_allclose(env.unwrapped.reference.position, (0.42, -0.04))
-
-
-@pytest.mark.parametrize("text", ["0,0.5,0\n1,0.5,0\n", "0,0.5,0,2000\n1,0.5,0\n", "0,0.5,0,-1\n1,0.5,0,2000\n"])
-def test_files_without_stiffness_are_refused(text, tmp_path):
-    file = tmp_path / "own.csv"
-    file.write_text(text)
-    with pytest.raises(ValueError, match="stiffness"):
-        stiffness_of(file)

@@ -56,27 +56,11 @@ def test_what_is_drawn_is_said():
     assert described(Parameters(), {"mechanics.mass": (2, 3)}) == "rigs drawn: mass 2 to 3 kg"
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ('"mechanics.mass" = 3', r"\[randomize\] mechanics\.mass = 3; allowed: "),
-        ('"mechanics.weight" = [1, 2]', r"unknown parameter 'mechanics\.weight'"),
-        ('"mechanics.mass" = [3, 2]', r"randomize\['mechanics\.mass'\] = .*ordered"),
-        ('"cylinder1.stroke" = [0.2, 0.3]', r"randomize\['cylinder1\.stroke'\]: allowed"),
-    ],
-)
-def test_ranges_that_cannot_be(tmp_path, table, message):
-    with pytest.raises(ValueError, match=message):
-        drawn(tmp_path, f"[randomize]\n{table}\n")
-
-
 def test_the_dead_volume_follows_the_bore(tmp_path):
     rig = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}})
     assert rig.chambers.dead_volume == pytest.approx(4 * Parameters().chambers.dead_volume)
     kept = Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 3e-5}})
     assert kept.chambers.dead_volume == 3e-5
-    with pytest.raises(ValueError, match=r"dead_volume = 1e-05 is impossible"):
-        Parameters.from_dict({"cylinder1": {"piston_diameter": 0.05}, "chambers": {"dead_volume": 1e-5}})
     p = drawn(tmp_path, "[cylinder1]\npiston_diameter = 0.032\n")
     assert np.isfinite(p).all()
 
@@ -93,8 +77,6 @@ def test_the_linkage_has_room_for_any_stroke_of_cylinder_1(stroke):
 
 
 def test_named_lengths_are_kept():
-    with pytest.raises(ValueError, match=r"Geometry\.k1 = 0\.43 with stroke 0\.4"):
-        Parameters.from_dict({"cylinder1": {"stroke": 0.4}, "geometry": {"d3": 0.35}})
     assert Parameters.from_dict({"cylinder2": {"stroke": 1.0}}).geometry.k2 == 0.6
 
 

@@ -7,38 +7,15 @@ import numpy as np
 import pytest
 
 from birthsim_env import Parameters
-from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.sensors.sensors import IdealSensors, LabSensors
+from tests.parts.test_honest_sensors import board, swing, watch
 
 CIRCLE = "BirthSIM/Circle-v1"
-SEEN = ("position", "position_time", "velocity", "pressures")
 
 
-def board(**changes):
-    return Parameters().replace({f"electronics.{name}": value for name, value in changes.items()}).electronics
-
-
-def watch(electronics, motion, ticks, lanes=1, seeds=None):
-    """Every measurement of ``ticks`` control periods of lanes that move as ``motion(t)`` -> (4,): (ticks, ..., lanes)."""
-    sensors = LabSensors(electronics, lanes)
-    for lane in range(lanes):
-        sensors.begin(lane, stream(seeds[lane] if seeds else lane, 0, "sensors"))
-    rows, pressures = {name: [] for name in SEEN}, np.full((4, lanes), 3e5)
-    for tick in range(ticks):
-        time = np.full(lanes, tick * electronics.control_period)
-        moved = np.repeat(np.asarray(motion(time[0]), float)[:, None], lanes, axis=1)
-        seen = sensors.measure(np.full(lanes, tick), time, moved, pressures, np.zeros((2, lanes)))
-        for name, values in rows.items():
-            values.append(getattr(seen, name).copy())
-    return {name: np.array(values) for name, values in rows.items()}
-
-
-def still(time):
-    return 0.5, 0.01, 0.0, 0.0
-
-
-def swing(time):
-    return 0.5 + 0.05 * math.sin(3 * time), 0.02 * time, 0.15 * math.cos(3 * time), 0.02
+def lab(electronics, motion, ticks):
+    """What the laboratory's sensors show of one rig, by name: (ticks, ..., 1)."""
+    return watch(electronics, ticks, 1, motion, model=LabSensors)
 
 
 def test_ideal_sensors_are_exact_at_every_instant():
@@ -55,7 +32,7 @@ def test_ideal_sensors_are_exact_at_every_instant():
 
 
 def test_samples_are_taken_240_times_a_second_on_the_control_clock():
-    seen = watch(board(), swing, 10_001)
+    seen = lab(board(), swing, 10_001)
     arrivals = np.unique(seen["position_time"][:, 0])
     ticks = arrivals / 1e-3
     np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
@@ -86,7 +63,7 @@ def test_samples_are_taken_240_times_a_second_on_the_control_clock():
 def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sample_allows(changes):
     electronics = board(position_noise=0.0, **changes)
     period, latency = electronics.control_period, electronics.position_latency
-    seen = watch(electronics, swing, round(0.6 / period))
+    seen = lab(electronics, swing, round(0.6 / period))
     time = period * np.arange(len(seen["position"]))
     taken = seen["position_time"][:, 0]
     assert np.all(np.diff(taken) >= 0)
@@ -99,7 +76,7 @@ def test_what_is_seen_is_late_by_the_latency_and_never_older_than_the_next_sampl
 
 
 def test_the_first_sample_is_there_from_the_start():
-    seen = watch(board(position_noise=0.0), lambda t: (0.5 + t, 0.0, 1.0, 0.0), 8)
+    seen = lab(board(position_noise=0.0), lambda t: (0.5 + t, 0.0, 1.0, 0.0), 8)
     np.testing.assert_array_equal(seen["position_time"][:, 0], 0.0)
     np.testing.assert_array_equal(seen["position"][:, 0, 0], 0.5)
 
@@ -108,47 +85,16 @@ def test_the_shown_velocity_is_a_slow_difference_that_finds_a_constant_speed():
     def jump(time):
         return 0.5 + 0.1 * max(time - 0.1, 0.0), 0.0, 0.1 * (time > 0.1), 0.0
 
-    seen = watch(board(position_noise=0.0), jump, 500)["velocity"][:, 0, 0]
+    seen = lab(board(position_noise=0.0), jump, 500)["velocity"][:, 0, 0]
     np.testing.assert_allclose(seen[:104], 0.0, atol=1e-12)
     assert 0.05 < seen[100 + 4 + 25] < 0.08  # a time constant of 20 ms behind the latency
     assert seen[-1] == pytest.approx(0.1, rel=1e-6)
-    noisy = watch(board(), still, 4000)["velocity"][200:]
+    noisy = lab(board(), None, 4000)["velocity"][200:]
     assert 1e-3 < noisy.std() < 1e-2
 
 
-@pytest.fixture(scope="module")
-def noise():
-    """10 000 control periods of 12 lanes at rest, in standard deviations: positions at their samples, pressures."""
-    seen = watch(board(), still, 10_000, lanes=12)
-    fresh = np.flatnonzero(np.diff(seen["position_time"][:, 0]) > 0) + 1
-    position = (seen["position"][fresh] - np.array([[0.5], [0.01]])) / 1e-4
-    return position.reshape(len(fresh), 24), ((seen["pressures"] - 3e5) / 500.0).reshape(-1, 48)
-
-
-def test_noise_is_normal_with_the_documented_deviation(noise):
-    for values in noise:
-        count = values.size
-        assert abs(values.mean()) < 4.5 / math.sqrt(count)
-        assert abs(values.std() - 1) < 4.5 / math.sqrt(2 * count)
-        assert abs((values**3).mean()) < 4.5 * math.sqrt(15 / count)
-        assert abs((values**4).mean() - 3) < 4.5 * math.sqrt(96 / count)
-        # In every channel of every lane as well.
-        assert np.abs(values.std(axis=0) - 1).max() < 5 / math.sqrt(2 * len(values))
-        fraction = (np.abs(values) > 2).mean()
-        assert fraction == pytest.approx(0.0455, abs=4.5 * math.sqrt(0.0455 * 0.9545 / count))
-
-
-def test_noise_is_independent_over_time_channels_and_lanes(noise):
-    for values in noise:
-        count = len(values)
-        for lag in (1, 2, 5):
-            assert np.abs((values[lag:] * values[:-lag]).mean(axis=0)).max() < 5 / math.sqrt(count - lag)
-        matrix = np.corrcoef(values.T) - np.eye(values.shape[1])
-        assert np.abs(matrix).max() < 5.2 / math.sqrt(count)
-
-
 def test_positions_keep_one_noise_between_samples_and_pressures_change_every_period():
-    seen = watch(board(), still, 400)
+    seen = lab(board(), None, 400)
     same = np.diff(seen["position_time"][:, 0]) == 0
     np.testing.assert_array_equal((np.diff(seen["position"][:, :, 0], axis=0) == 0).all(axis=1), same)
     assert np.abs(np.diff(seen["pressures"][:, :, 0], axis=0)).min() > 0

@@ -301,10 +301,6 @@ def test_gains_that_it_has_not_are_refused() -> None:
     known = ", ".join(NonlinearMPC.TUNABLE)
     with pytest.raises(ValueError, match=rf"stiffness = 1.0 is no gain of NonlinearMPC; allowed: {known}"):
         NonlinearMPC(RIG, stiffness=1.0)
-    for name in NonlinearMPC.TUNABLE:
-        for value in (-1e-3, np.nan, np.inf):
-            with pytest.raises(ValueError, match=rf"{name} = {value}; allowed: .*a positive number"):
-                NonlinearMPC(RIG, **{name: value})
 
 
 @pytest.mark.usefixtures("told")

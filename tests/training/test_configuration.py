@@ -64,46 +64,11 @@ def test_a_file_of_ones_own_says_only_what_differs(tmp_path):
     assert load_configuration("probe")[0].steps != 7
 
 
-REFUSED = [
-    ("[experiment]\nsteps = 3", "table 'experiment'; allowed: training, residual"),
-    ("steps = 3", "table 'steps'; allowed: training, residual"),
-    ("training = 3", "training = 3"),
-    ("[[training]]\nsteps = 3", "training = "),
-    ("residual = [1]", "residual = [1]"),
-    ("[training]\nlaw = 'none'", "law = 'none' is unknown; allowed: environment, "),
-    ("[training]\nhidden = [64, 0]", "hidden = (64, 0); allowed: 1 to 8 whole numbers from 1 to 2048"),
-    ("[residual]\nauthority = 501", "authority = 501; allowed: more than 0, at most 500"),
-    ("[training\nsteps = 3", "is no TOML: "),
-    ("[training]\nsteps = 3\nsteps = 4", "is no TOML: "),
-]
-
-
-def assert_refused(path, message):
-    with pytest.raises(ValueError, match=r"configuration ") as caught:
-        load_configuration(path)
-    assert repr(str(path)) in str(caught.value)
-    assert message in str(caught.value)
-
-
-@pytest.mark.parametrize(("text", "message"), REFUSED)
-def test_what_is_unknown_or_cannot_be_is_refused_with_the_file_and_what_is_allowed(tmp_path, text, message):
-    assert_refused(written(tmp_path, text), message)
-
-
 @pytest.mark.parametrize("name", ["square", "circle.toml", "nowhere/circle", ""])
 def test_a_configuration_that_is_not_there_is_refused_with_those_that_are(name):
     with pytest.raises(ValueError, match=r"is no file; allowed: circle, .*vacuum, or a TOML file") as caught:
         load_configuration(name)
     assert repr(name or ".") in str(caught.value) or repr(name) in str(caught.value)
-
-
-def test_what_is_no_text_is_refused(tmp_path):
-    path = tmp_path / "own.toml"
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ValueError, match="is no TOML: "):
-        load_configuration(path)
-    with pytest.raises(ValueError, match="is no file"):
-        load_configuration(tmp_path)
 
 
 def test_overriding_changes_what_is_named():

@@ -12,7 +12,6 @@ from agents.policy.seeds import SHIPPED, best_policy
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.folder import packed_page, write_page
 from birthsim_live.rig.pack import controller_parts
-from tests.console import call
 from tests.live.rig.worker import run
 
 RIG = Parameters()
@@ -55,26 +54,6 @@ def test_a_policy_that_remembers_has_a_memory_in_the_page() -> None:
     np.testing.assert_array_equal(memory[:, 0], np.zeros(1 + cells))
 
 
-@pytest.mark.parametrize("where", [["--port", "0"], ["--static", "page"]])
-def test_what_is_no_policy_is_refused_in_one_line(
-    where: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    status, _, complained = call("live", monkeypatch, capsys, "--policy", "circle", "nowhere", *where)
-    assert status == 2
-    assert complained.strip().splitlines()[-1].startswith("birthsim live: error: policy = 'nowhere'")
-    assert not (tmp_path / "page").exists()
-
-
-def test_a_rig_that_the_page_cannot_show_is_refused(tmp_path, monkeypatch, capsys):
-    (tmp_path / "rig.toml").write_text("[mechanics]\nmass = 90.0\n")
-    options = ("--static", tmp_path / "page", "--parameters", tmp_path / "rig.toml")
-    status, _, complained = call("live", monkeypatch, capsys, *options)
-    assert status == 2
-    assert "mass" in complained.splitlines()[-1]
-    assert not (tmp_path / "page").exists()
-
-
 def test_a_scenario_that_a_rig_cannot_do_is_no_choice() -> None:
     rig = RIG.replace({"cylinder2.stroke": 0.04})
     choices = {one["name"]: one for one in packed_page(rig).content["hello"]["choices"]["scenario"]}
@@ -91,11 +70,3 @@ def test_a_controller_with_options_is_compiled_too() -> None:
     laws = content["parts"]["controllers"]
     assert laws["pid[bandwidth=30]"] != laws["pid"]
     assert laws["admittance"] == laws["admittance-adaptive"]
-
-
-def test_a_folder_with_something_in_it_is_refused(tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.txt").write_text("mine")
-    status, _, complained = call("live", monkeypatch, capsys, "--static", tmp_path)
-    assert status == 2
-    assert complained.endswith(f"--static '{tmp_path}' is not empty; allowed: a new or empty folder\n")
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

@@ -44,40 +44,14 @@ def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
         assert "pip install 'birthsim[live]'" in complained
 
 
-def test_commands_refuse_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_port_that_is_taken_is_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        port = str(taken.getsockname()[1])
-        for arguments, words in (
-            (["--port", port], f"port = {port} of 127.0.0.1 cannot be served"),
-            (["--host", "0.0.0.0", "--port", "0"], "host = '0.0.0.0' means every address"),
-        ):
-            status, _, complained = call("live", monkeypatch, capsys, *arguments)
-            assert status == 2
-            assert complained.strip().splitlines()[-1].startswith("birthsim live: error: ")
-            assert words in complained
-    status, _, complained = call("live", monkeypatch, capsys, "--port", "0", "--replay", tmp_path / "none.rec")
+        port = taken.getsockname()[1]
+        status, _, complained = call("live", monkeypatch, capsys, "--port", port)
     assert status == 2
-    assert complained.strip().splitlines()[-1].startswith("birthsim live: error: ")
-    assert "none.rec' cannot be read" in complained
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--port", "0", "--compare", "nobody"], "controller = 'nobody'; allowed: backstepping"),
-        (["--static", "page", "--compare", "nobody"], "controller = 'nobody'; allowed: backstepping"),
-        (["--static", "page", "--controller", "shut-valves"], "controller = 'shut-valves'; allowed: backstepping"),
-        (["--port", "0", "--controller", "none.py:Law"], "controller file 'none.py' does not exist"),
-        (["--replay", "a.rec", "--controller", "pid"], "--controller with --replay; allowed: without it"),
-    ],
-)
-def test_a_controller_that_cannot_be_is_refused(
-    options: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("live", monkeypatch, capsys, *options)
-    assert status == 2
-    assert said in complained.splitlines()[-1]
+    assert complained.startswith(f"birthsim live: error: port = {port} of 127.0.0.1 cannot be served")
+    assert complained.count("\n") == 1

@@ -79,19 +79,6 @@ def test_what_is_no_number_is_refused_by_the_name_of_every_field(value: Any) -> 
             assert f"({field.metadata['unit']})" in str(error.value)
 
 
-UNKNOWN = {
-    "mechanics.weight": "unknown parameter 'mechanics.weight'; allowed in mechanics: mass, gravity",
-    "motor.mass": "unknown parameter section 'motor'; allowed: geometry, cylinder1",
-    "geometry.d3": "Geometry.k1 = 0.43 with stroke 0.2 is impossible",  # with d3 = 0.9 m
-}
-
-
-def test_what_is_unknown_and_what_another_figure_makes_impossible_is_named() -> None:
-    for name, message in UNKNOWN.items():
-        with pytest.raises(ValueError, match=re.escape(message)):
-            Parameters().replace({name: 0.9})
-
-
 def test_parts_are_frozen_and_typed() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         Parameters().mechanics.mass = 4.0  # type: ignore[misc]
