@@ -49,13 +49,11 @@ class Recorder:
                 f"user_force = {type(simulation.user_force).__name__}, which feels the rig; allowed: a hand that does not"
             )
         self._simulation, self._made = simulation, object()
-        self._tapes: list[tuple[Array, int, Array]] = []
         simulation.recorder = self
 
     def run(self, periods: int, threads: int) -> int:
         """The simulation's loop, taped."""
-        if self._made is not self._simulation.made:
-            self._assemble()
+        self.prepare()
         tape = self._loop.new_tape(periods)
         missed = self._loop.run_taped(periods, tape, threads)
         self._last = tape, periods
@@ -92,8 +90,11 @@ class Recorder:
 
         return back
 
-    def _assemble(self) -> None:
+    def prepare(self) -> None:
+        """Bring the loop up to the simulation, which has begun an episode."""
         simulation = self._simulation
+        if self._made is simulation.made:
+            return
         parts, places = simulation.parts(), simulation.places()
         named = [(name, one) for name, group in parts.items() for one in group]
         stages = [one for _, one in named if isinstance(one, Stage)]
