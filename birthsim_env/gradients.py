@@ -96,10 +96,11 @@ class Recorder:
         if self._made is simulation.made:
             return
         parts, places = simulation.parts(), simulation.places()
-        named = [(name, one) for name, group in parts.items() for one in group]
-        stages = [one for _, one in named if isinstance(one, Stage)]
-        if len(stages) < len(named):
-            raise ValueError(f"{[one for _, one in named if not isinstance(one, Stage)]}: allowed: compiled stages")
+        own = [one for group in parts.values() for one in group if not isinstance(one, Stage)]
+        if own:
+            raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
+        named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
+        stages = [one for _, one in named]
         self._loop = TapedLoop(simulation.plant.num_envs, *places, stages, simulation.closing)
         memories, self._extras = self._loop.memories, self._loop.rows
         pieces: list[tuple[int, Traced | None]] = []

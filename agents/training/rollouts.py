@@ -23,9 +23,11 @@ from birthsim_env.gradients import Recorder
 
 
 class Now(NamedTuple):
-    """N lanes after a policy step: ``observation`` (N, D), ``reward`` (N,), ``motion`` (4, N) of the end effector, x, y (m), vx,
-    vy (m/s), ``state`` (18, N), SI units, and ``ended`` (N,), whose lanes are at the beginning of an episode; ``carried``
-    (C, N) only hands gradients on."""
+    """N lanes after a policy step: ``observation`` (N, D), ``reward`` (N,), ``motion`` (4, N) of the end effector, x, y (m),
+    vx, vy (m/s), ``state`` (18, N), SI units, and ``ended`` (N,), whose lanes are at the beginning of an episode.
+
+    ``carried`` (C, N) only hands gradients on.
+    """
 
     carried: Tensor
     observation: Tensor
@@ -41,14 +43,14 @@ class Now(NamedTuple):
 
 class _Step(torch.autograd.Function):
     @staticmethod
-    def forward(context: Any, carried: Tensor, action: Tensor, worlds: Worlds) -> tuple[Tensor, ...]:  # type: ignore[override]
+    def forward(context: Any, carried: Tensor, action: Tensor, worlds: Worlds) -> tuple[Tensor, ...]:
         now = worlds.advance(action.detach().numpy())
         context.back, context.lives = worlds.recorder.taken(), ~now.ended.numpy()
         context.mark_non_differentiable(now.ended)
         return tuple(now)
 
     @staticmethod
-    def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:  # type: ignore[override]
+    def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:
         carried, observation, reward, motion, state = (one.numpy() for one in gradients[:5])
         lives = context.lives
         late, action = context.back(
@@ -59,7 +61,7 @@ class _Step(torch.autograd.Function):
 
 
 class Worlds:
-    """The lanes of ``env``, a vector environment with same-step autoreset. ``ValueError`` for one that cannot be differentiated."""
+    """The lanes of ``env``, a vector environment with same-step autoreset; ``ValueError`` where it has no gradients."""
 
     def __init__(self, env: Any) -> None:
         if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
@@ -70,6 +72,10 @@ class Worlds:
     def reset(self, seed: Any = None, options: dict[str, Any] | None = None) -> Now:
         """Start all lanes."""
         observation, _ = self.env.reset(seed=seed, options=options)
+        return self.now(observation)
+
+    def now(self, observation: Any) -> Now:
+        """The lanes as they are, where episodes begin or go on from a state of the environment that was kept."""
         self.recorder.prepare()
         return self._now(observation, np.zeros(self.env.num_envs), np.ones(self.env.num_envs, dtype=np.bool_))
 
