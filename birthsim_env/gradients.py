@@ -49,13 +49,11 @@ class Recorder:
                 f"user_force = {type(simulation.user_force).__name__}, which feels the rig; allowed: a hand that does not"
             )
         self._simulation, self._made = simulation, object()
-        self._tapes: list[tuple[Array, int, Array]] = []
         simulation.recorder = self
 
     def run(self, periods: int, threads: int) -> int:
         """The simulation's loop, taped."""
-        if self._made is not self._simulation.made:
-            self._assemble()
+        self.prepare()
         tape = self._loop.new_tape(periods)
         missed = self._loop.run_taped(periods, tape, threads)
         self._last = tape, periods
@@ -92,13 +90,17 @@ class Recorder:
 
         return back
 
-    def _assemble(self) -> None:
+    def prepare(self) -> None:
+        """Bring the loop up to the simulation, which has begun an episode."""
         simulation = self._simulation
+        if self._made is simulation.made:
+            return
         parts, places = simulation.parts(), simulation.places()
-        named = [(name, one) for name, group in parts.items() for one in group]
-        stages = [one for _, one in named if isinstance(one, Stage)]
-        if len(stages) < len(named):
-            raise ValueError(f"{[one for _, one in named if not isinstance(one, Stage)]}: allowed: compiled stages")
+        own = [one for group in parts.values() for one in group if not isinstance(one, Stage)]
+        if own:
+            raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
+        named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
+        stages = [one for _, one in named]
         self._loop = TapedLoop(simulation.plant.num_envs, *places, stages, simulation.closing)
         memories, self._extras = self._loop.memories, self._loop.rows
         pieces: list[tuple[int, Traced | None]] = []

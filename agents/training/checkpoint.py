@@ -6,6 +6,7 @@ Arrays and JSON with a checksum of every byte (``agents.policy.sealed``): nothin
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,11 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
             model.action_space.np_random.bit_generator.state,
         ],
     }
+    write_checkpoint(folder, settings, content)
+
+
+def write_checkpoint(folder: Path, settings: dict[str, Any], content: dict[str, Any]) -> None:
+    """Write ``content``, JSON with arrays and tensors at any depth, and the settings of the training that it is of."""
     arrays: Arrays = {}
     about = {"format": FORMAT, "settings": settings, "content": _flat("", content, arrays)}
     with whole_file(folder / NAME) as file:
@@ -53,6 +59,16 @@ def save_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
 
 def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[str, Any]) -> dict[str, Any] | None:
     """Put model, environment and random states back where they were and return the past; None where there is no checkpoint.
+
+    Raises ``ValueError`` as ``read_checkpoint`` does.
+    """
+    return read_checkpoint(folder, settings, lambda content: _restore(content, model, env))
+
+
+def read_checkpoint(
+    folder: Path, settings: dict[str, Any], restore: Callable[[dict[str, Any]], dict[str, Any]]
+) -> dict[str, Any] | None:  # fmt: skip
+    """What ``restore`` makes of the content of a checkpoint, with arrays for tensors; None where there is no checkpoint.
 
     Raises ``ValueError`` for a damaged one and for one of a training with other settings.
     """
@@ -72,14 +88,14 @@ def load_checkpoint(folder: Path, model: Any, env: VecNormalize, settings: dict[
             f"{str(path)!r} is of a training with other {', '.join(other)}; allowed: the same settings, or a folder of its own"
         )
     try:
-        return _restore(_nested(about["content"], arrays), model, env)
+        return restore(_nested(about["content"], arrays))
     except (LookupError, TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError) as error:
         raise ValueError(f"{str(path)!r} does not fit this version ({problem(error)}); {allowed}") from error
 
 
 def _restore(content: dict[str, Any], model: Any, env: VecNormalize) -> dict[str, Any]:
-    model.set_parameters(_tensors(content["parameters"]), exact_match=True, device="cpu")
-    model.average.load_state_dict(_tensors(content["average"]))
+    model.set_parameters(tensors(content["parameters"]), exact_match=True, device="cpu")
+    model.average.load_state_dict(tensors(content["average"]))
     if content["entropy"] is not None:
         with torch.no_grad():
             model.log_ent_coef.copy_(torch.from_numpy(content["entropy"]))
@@ -145,9 +161,10 @@ def _nested(value: Any, arrays: Arrays) -> Any:
     return arrays[value["array"]] if "array" in value else {key: _nested(one, arrays) for key, one in value["dict"]}
 
 
-def _tensors(value: Any) -> Any:
+def tensors(value: Any) -> Any:
+    """``value`` with tensors for the arrays that it holds at any depth."""
     if isinstance(value, dict):
-        return {key: _tensors(one) for key, one in value.items()}
+        return {key: tensors(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [_tensors(one) for one in value]
+        return [tensors(one) for one in value]
     return torch.from_numpy(value) if isinstance(value, np.ndarray) else value

@@ -13,7 +13,7 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, shown
 
-ALGORITHMS = ("ppo", "sac", "tqc")
+ALGORITHMS = ("ppo", "sac", "tqc", "apg")
 
 COUNTS = {
     "steps": (1, 10**10), "seed": (0, 2**32 - 1), "lanes": (1, 2**16), "rollout": (1, 2**16), "batch": (2, 2**20),
@@ -37,7 +37,8 @@ S = TypeVar("S", "TrainingSettings", ResidualSettings)
 class TrainingSettings:
     """An experiment and its algorithm.
 
-    PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes. The learning
+    PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes; the analytic
+    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount`` alone. The learning
     rate falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
     ``until`` percent below that of the paper's law; with 100 it never ends early. A
     ``privileged`` policy is told the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
@@ -84,7 +85,12 @@ class TrainingSettings:
         whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
         if not (whole and 1 <= len(widths) <= LAYERS):
             raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
-        if self.algorithm == "ppo" and self.lanes * self.rollout > COLLECTED:
+        if self.algorithm == "apg" and (self.privileged or self.sensors != "ideal"):
+            raise ValueError(
+                f"algorithm = 'apg' with sensors = {self.sensors!r}, privileged = {self.privileged}; allowed: 'ideal' and "
+                "False, whose gradients are known"
+            )
+        if self.algorithm in ("ppo", "apg") and self.lanes * self.rollout > COLLECTED:
             raise ValueError(
                 f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "
                 "between two updates"

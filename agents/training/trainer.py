@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium
 import torch
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.vec_env import VecNormalize
+from tqdm import tqdm
 
 from agents.policy.files import WEIGHTS
 from agents.residual.settings import LAWS, ResidualSettings
-from agents.training.algorithms import make_model, unchecked_distributions
 from agents.training.checkpoint import NAME as CHECKPOINT
-from agents.training.checkpoint import load_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS, events_in
-from agents.training.monitor import Monitor, described
-from agents.training.privileged import Privileged
-from agents.training.sb3_adapter import SB3VecEnv
-from agents.training.shifted_reward import ShiftedReward
-from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from agents.training.policy_gradient import PolicyGradient
+from agents.training.reached import Reached, described
+from agents.training.stable_baselines import StableBaselines
 
-__all__ = ["train"]
+
+class Learner(Protocol):
+    """What learns in the lanes of ``env``."""
+
+    def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None: ...
+
+    @property
+    def steps(self) -> int:
+        """Policy steps so far, of all lanes."""
+
+    def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
+        """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
+
+    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
+        """Learn to the end, with a validation and a checkpoint at equal intervals; ``began`` is when it was made, s."""
 
 
 def train(
@@ -48,35 +59,37 @@ def train(
         "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }  # fmt: skip
-    env = SB3VecEnv(gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments), staggered=True)
-    checks = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
+    env = gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments)
+    checks: Any = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
     paper = None
     if settings.until < 100:
         law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
         paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
-    seen = Privileged(env) if settings.privileged else env
-    # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
-    paid = ShiftedReward(seen, residual.policy_period / 0.01, settings.discount) if settings.discount < 1 else seen
-    normalized = VecNormalize(paid, gamma=settings.discount)
-    model = make_model(settings, normalized, str(folder / EVENTS))
-    normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
-    past = load_checkpoint(folder, model, normalized, described(settings, residual, env.env.simulation.parameters))
-    done = model.num_timesteps
+    about = described(settings, residual, checks.simulation.parameters)
+    kind: type[Learner] = PolicyGradient if settings.algorithm == "apg" else StableBaselines
+    learner = kind(settings, env, folder)
+    began = time.perf_counter()
+    past = learner.load(about)
     if past is not None:
-        print(f"seed {settings.seed}: {min(done, settings.steps):,} of {settings.steps:,} steps are there and are kept")
-    callback = Monitor(settings, residual, checks, folder, past, env, position, paper)
+        done = min(learner.steps, settings.steps)
+        print(f"seed {settings.seed}: {done:,} of {settings.steps:,} steps are there and are kept")
+    bar = tqdm(
+        total=settings.steps, initial=min(learner.steps, settings.steps), desc=f"seed {settings.seed}", unit=" steps",
+        unit_scale=True, position=position,
+    )  # fmt: skip
     try:
-        if done < settings.steps and not callback.enough:
-            with events_in(folder / EVENTS), unchecked_distributions():
-                model.learn(settings.steps - done, callback=callback, reset_num_timesteps=past is None, tb_log_name="run")
+        reached = Reached(settings, residual, checks, folder, past, paper)
+        if learner.steps < settings.steps and not reached.enough:
+            with events_in(folder / EVENTS):
+                learner.learn(reached, past is not None, bar, began)
     except KeyboardInterrupt:
         if (folder / CHECKPOINT).exists():
-            callback.keep()
-            print(f"interrupted after {model.num_timesteps} steps: policy and checkpoint are kept in {folder}/")
+            reached.keep()
+            print(f"interrupted after {learner.steps} steps: policy and checkpoint are kept in {folder}/")
         raise
     finally:
-        callback.close()
+        bar.close()
         for worlds in (env, checks, paper):
             if worlds is not None:
                 worlds.close()
-    return callback.reached()
+    return reached.result()

@@ -30,10 +30,11 @@ def _keep(space: Array, reads: Whole, first: int, count: int, tape: Array, n: in
 
 @kernel
 def _forward(
-    moves: Whole, stages: Whole, kept: Whole, reads: Whole, rows: int, lanes: int, periods: int, first: int, last: int, tape: Array
+    moves: Whole, stages: Whole, kept: Whole, reads: Whole, rows: int, lanes: int, periods: int, first: int, last: int,
+    tape: Array,
 ) -> int:  # fmt: skip
-    """``moves`` and ``stages`` as in ``loop._run``. ``kept`` (K, 4): the stage, 1 where it is after it, and where its rows stand in
-    ``reads`` and how many they are. ``tape`` (blocks, rows, BLOCK)."""
+    """``moves`` and ``stages`` as in ``loop._run``. ``kept`` (K, 4): a stage, 1 for after it, and where its rows stand
+    in ``reads`` and how many they are. ``tape`` (blocks, rows, BLOCK)."""
     space, missed = np.empty((rows, BLOCK)), 0
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):
@@ -92,10 +93,9 @@ def _backward(
                     for k in range(entries[e, 4]):
                         for i in range(n):
                             given[k, i] = space[touched[entries[e, 3] + k], i]
-                    call_stage(
-                        entries[e, 0], np.int64(tape[start // BLOCK, place:].ctypes.data), np.int64(given.ctypes.data),
-                        np.int64(result.ctypes.data), np.int64(p.ctypes.data), entries[e, 1], start, n,
-                    )  # fmt: skip
+                    there = tape[start // BLOCK, place:]
+                    places = there.ctypes.data, given.ctypes.data, result.ctypes.data, p.ctypes.data
+                    call_stage(entries[e, 0], *places, entries[e, 1], start, n)
                     for k in range(entries[e, 4]):
                         for i in range(n):
                             space[touched[entries[e, 3] + k], i] = result[k, i]

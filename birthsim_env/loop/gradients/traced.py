@@ -48,8 +48,10 @@ def adjoint(tape, bars, out, rig, constants, lane, n):
 
 @dataclass
 class Adjoint:
-    """How the bars of a stage go back: ``address`` of its code, the rows of the space that are kept on the tape before the stage
-    (``after`` it where that is True), and the rows whose bars it takes and gives."""
+    """How the bars of a stage go back: ``address`` of its code, and the rows whose bars it takes and gives.
+
+    The rows that it ``reads`` of the space are kept on the tape before the stage, or ``after`` it.
+    """
 
     address: int
     reads: list[int]
@@ -60,8 +62,10 @@ class Adjoint:
 
 @dataclass
 class Traced:
-    """A stage as a graph: values read (``inputs``) and written (``outputs``) by row of the space; ``extras`` are those written to
-    tables, by their rows."""
+    """A stage as a graph: values read (``inputs``) and written (``outputs``) by row of the space.
+
+    ``extras`` are those written to tables, by their rows.
+    """
 
     name: str
     graph: Graph
@@ -119,7 +123,8 @@ class _Tables:
     """The tables of a stage, of one lane: rows that are written are outputs, and nothing is read before."""
 
     def __init__(self, tables: tuple[Any, ...]) -> None:
-        self._tables, self.made = tables, dict[int, Any]()
+        self._tables = tables
+        self.made: dict[int, Any] = {}
 
     def get(self, k: int, lanes_first: bool) -> Any:
         if k not in self.made:
@@ -133,13 +138,19 @@ def _block(place: _Place, rows: int) -> Any:
     return place.rows[:rows]
 
 
-tracing.INSTEAD.update({
-    stages.scratch: tracing.empty,
-    stages.block: _block,
-    stages.numbers: _block,
-    **{kind: lambda tables, k: tables.get(k, False) for kind in (stages.table1, stages.table2, stages.table3, stages.table4)},
-    stages.singles: lambda tables, k: tables.get(k, True),
-})  # fmt: skip
+def _table(tables: _Tables, k: int) -> Any:
+    return tables.get(k, False)
+
+
+def _singles(tables: _Tables, k: int) -> Any:
+    return tables.get(k, True)
+
+
+tracing.INSTEAD[stages.scratch] = tracing.empty
+tracing.INSTEAD[stages.block] = tracing.INSTEAD[stages.numbers] = _block
+tracing.INSTEAD[stages.singles] = _singles
+for _kind in (stages.table1, stages.table2, stages.table3, stages.table4):
+    tracing.INSTEAD[_kind] = _table
 
 
 def trace(stage: Stage, memory: int, extra: int = 0, wanted: Callable[[int, int], bool] = lambda table, row: False) -> Traced:
@@ -164,10 +175,12 @@ def trace(stage: Stage, memory: int, extra: int = 0, wanted: Callable[[int, int]
     try:
         tracing.rewritten(getattr(stage.function, "py_func", stage.function))(*arguments)
     except (UntraceableError, TypeError, AttributeError, IndexError, ValueError, KeyError) as error:
-        raise ValueError(f"stage {name} cannot be differentiated ({error}); allowed: ideal sensors and compiled laws") from error
+        raise ValueError(
+            f"stage {name} cannot be differentiated ({error}); allowed: ideal sensors and compiled laws"
+        ) from error
     now = {firsts[of] + row: blocks[of][row, 0] for of, rows in sizes.items() for row in range(rows)}
     outputs = {row: value for row, value in now.items() if value is not inputs[row]}
-    extras = {}
+    extras: dict[int, Scalar] = {}
     for k, made in sorted(tables.made.items()):
         for row, value in enumerate(made.reshape(-1)):
             if wanted(k, row) and value is not None:

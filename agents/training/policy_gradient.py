@@ -1,0 +1,169 @@
+"""Analytic policy gradient: the reward of a short horizon is differentiated through the closed loop, and Adam climbs it.
+
+As in SHAC (Xu et al., "Accelerated policy learning with parallel differentiable simulation", ICLR 2022), but without a critic:
+the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/explanation/gradients.md`).
+"""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
+
+from agents.policy.network import CLIP, EPSILON, PolicyNetwork
+from agents.training.checkpoint import read_checkpoint, tensors, write_checkpoint
+from agents.training.configuration import TrainingSettings
+from agents.training.events import EVENTS
+from agents.training.reached import Reached
+from agents.training.rollouts import Worlds
+from agents.training.time_split import split
+from agents.training.validation import SEED_SPACING, TRAINING_SEED
+
+LEAST_RATE = 0.01
+"""Fraction of the learning rate at the end, to which it falls linearly."""
+
+BEGINNING = 0.01
+"""Standard deviation of the weights of the last layer at the beginning."""
+
+MOMENTS = (0.9, 0.99)
+"""Of Adam; an update is a gradient of length one, so that one bad horizon moves no more than another."""
+
+
+class Normalized:
+    """Running mean and variance (D,) of observations."""
+
+    def __init__(self, size: int) -> None:
+        self.mean, self.variance, self.count = np.zeros(size), np.ones(size), EPSILON
+
+    def __call__(self, observation: Tensor) -> Tensor:
+        """Observations (N, D) in standard deviations, as ``PolicyNetwork`` takes them."""
+        mean, deviation = torch.from_numpy(self.mean), torch.from_numpy(np.sqrt(self.variance + EPSILON))
+        return ((observation - mean) / deviation).clamp(-CLIP, CLIP).float()
+
+    def add(self, seen: Any) -> None:
+        """Count observations (M, D)."""
+        count, mean = self.count + len(seen), seen.mean(axis=0)
+        off, share = mean - self.mean, len(seen) / count
+        self.variance = (1 - share) * self.variance + share * seen.var(axis=0) + share * (1 - share) * off * off
+        self.mean, self.count = self.mean + share * off, count
+
+
+class PolicyGradient:
+    """Learns in the lanes of ``env``, ``settings.rollout`` policy steps at a time; the policy begins with hardly any action."""
+
+    def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None:
+        self._settings, self._folder, self.steps = settings, folder, 0
+        torch.manual_seed(settings.seed)
+        self._worlds = Worlds(env)
+        inputs, outputs = env.single_observation_space.shape[0], env.single_action_space.shape[0]
+        widths = (inputs, *settings.hidden, outputs)
+        layers = [torch.nn.Linear(width, wide) for width, wide in pairwise(widths)]
+        # Nearly zero, as other trainings begin: at zero itself valves have no slope.
+        torch.nn.init.normal_(layers[-1].weight, std=BEGINNING)
+        torch.nn.init.zeros_(layers[-1].bias)
+        self._policy = torch.nn.Sequential(*(part for layer in layers for part in (layer, torch.nn.Tanh())))
+        self._adam = torch.optim.Adam(self._policy.parameters(), lr=settings.learning_rate, betas=MOMENTS)
+        self._normalized = Normalized(inputs)
+        seed = TRAINING_SEED + SEED_SPACING * settings.seed
+        self._now = self._worlds.reset(seed=[seed + lane for lane in range(settings.lanes)], options={"staggered": True})
+
+    def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
+        """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
+        return read_checkpoint(self._folder, settings, self._restore)
+
+    def _restore(self, content: dict[str, Any]) -> dict[str, Any]:
+        self._policy.load_state_dict(tensors(content["policy"]))
+        self._adam.load_state_dict(tensors(content["adam"]))
+        running, self.steps = self._normalized, int(content["steps"])
+        running.mean, running.variance, running.count = content["observations"]
+        self._worlds.env.set_state(content["lanes"])
+        self._now = self._worlds.now(content["last"])
+        past: dict[str, Any] = content["past"]
+        return past
+
+    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
+        """Learn to the end."""
+        settings, validating, stepping = self._settings, 0.0, 0.0
+        writer = SummaryWriter(str(self._folder / EVENTS / "run"), purge_step=self.steps if goes_on else None)
+        before, skipped = reached.seconds, goes_on
+        if not goes_on:
+            validating = time.perf_counter() - began
+        while True:
+            # A checkpoint is written right after a validation, which need not be repeated.
+            ends = self.steps >= settings.steps
+            if not skipped and (reached.is_due(self.steps) or ends):
+                started, network = time.perf_counter(), self.network()
+                figures = reached.validate(network)
+                validating += time.perf_counter() - started
+                seconds = time.perf_counter() - began
+                about = self._about(before + seconds, stepping, max(seconds - validating, 1e-9))
+                best = reached.add(network, figures, about)
+                for name, value in reached.events(figures).items():
+                    writer.add_scalar(name, value, self.steps)
+                bar.set_postfix_str(reached.words(figures))
+                self._save(reached)
+                if best:
+                    reached.keep()
+            if ends or reached.enough:
+                break
+            skipped = False
+            stepping += self._update()
+            bar.update(min(self.steps, settings.steps) - bar.n)
+        writer.close()
+
+    def _about(self, seconds: float, stepping: float, training: float) -> dict[str, Any]:
+        stepped = self.steps // self._settings.lanes
+        parts = split(self._worlds.env.simulation, stepping / stepped) if stepping else {}
+        return {"steps": self.steps, "seconds": seconds, "environment_fraction": stepping / training, "split": parts}
+
+    def _update(self) -> float:
+        """One horizon forward and back; returns the time in the environment, s."""
+        settings, stepping, seen = self._settings, 0.0, []
+        now, loss = self._now.detached(), torch.zeros((), dtype=torch.float64)
+        for k in range(settings.rollout):
+            seen.append(now.observation.detach().numpy().astype(np.float64))
+            action = self._policy(self._normalized(now.observation))
+            started = time.perf_counter()
+            now = self._worlds.step(now, action)
+            stepping += time.perf_counter() - started
+            loss = loss - settings.discount**k * now.reward.mean()
+        self._now = now
+        self._adam.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        weights = [weight.grad for weight in self._policy.parameters() if weight.grad is not None]
+        size = torch.sqrt(sum((gradient * gradient).sum() for gradient in weights))  # type: ignore[arg-type]
+        self.steps += settings.rollout * settings.lanes
+        # A horizon in which something collides may have no finite gradient; it teaches nothing.
+        if torch.isfinite(size) and size > 0:
+            for gradient in weights:
+                gradient /= size
+            left = max(0.0, 1.0 - self.steps / settings.steps)
+            self._adam.param_groups[0]["lr"] = settings.learning_rate * (LEAST_RATE + (1 - LEAST_RATE) * left)
+            self._adam.step()
+        self._normalized.add(np.concatenate(seen))
+        return stepping
+
+    def network(self) -> PolicyNetwork:
+        """The policy as plain arrays, a copy."""
+        layers = tuple(
+            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
+            for layer in self._policy
+            if isinstance(layer, torch.nn.Linear)
+        )
+        return PolicyNetwork(self._normalized.mean.copy(), self._normalized.variance.copy(), layers, squashed=True)
+
+    def _save(self, reached: Reached) -> None:
+        running = self._normalized
+        content = {
+            "past": reached.past(), "policy": self._policy.state_dict(), "adam": self._adam.state_dict(), "steps": self.steps,
+            "observations": [running.mean, running.variance, float(running.count)], "lanes": self._worlds.env.get_state(),
+            "last": self._now.observation.detach(),
+        }  # fmt: skip
+        write_checkpoint(self._folder, reached.describe(), content)

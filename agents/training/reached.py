@@ -1,0 +1,124 @@
+"""What a training has reached: validation on held-out worlds against the law, the best policy, and when it is enough."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.policy.files import Policy, policy_content, save_policy
+from agents.policy.network import PolicyNetwork
+from agents.residual.privileged import acting
+from agents.residual.settings import ResidualSettings
+from agents.training.configuration import TrainingSettings
+from agents.training.validation import merit, validate
+from birthsim_env.physics.rig.parameters import Parameters
+
+LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
+"""Figures of a validation that TensorBoard shows."""
+
+
+class Reached:
+    """Validates policies at equal intervals in the worlds of ``env``, and keeps the best one in ``folder``.
+
+    ``past`` is what an earlier one of the same training had written to its checkpoint. ``paper`` has the same worlds under the
+    paper's law, where the training shall end once it is far enough below that law's error.
+    """
+
+    def __init__(
+        self, settings: TrainingSettings, residual: ResidualSettings, env: Any, folder: Path, past: dict[str, Any] | None,
+        paper: Any = None,
+    ) -> None:  # fmt: skip
+        self._settings, self._residual, self.env, self._folder = settings, residual, env, folder
+        if past is None:
+            self.figures: dict[str, Any] = {"law": _without_policy(env), "policy": None, "curve": []}
+            self.figures["paper"] = _without_policy(paper) if paper is not None else None
+            self._due, self._best = 0.0, b""
+            if self.figures["law"]["infeasible"] == env.num_envs:
+                raise ValueError(
+                    f"all {env.num_envs} validation worlds ask for more than the rig's strength, so that no policy could be "
+                    "told from another; allowed: a stronger rig, milder randomization, or another environment"
+                )
+        else:
+            self.figures, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
+            self.keep()
+        curve = self.figures["curve"]
+        self.seconds: float = curve[-1]["seconds"] if curve else 0.0
+
+    def is_due(self, steps: int) -> bool:
+        """Whether ``steps`` have come to the next validation, which then is one interval further."""
+        if steps < self._due:
+            return False
+        every = self._settings.steps / self._settings.validations
+        self._due = min(max(self._due, 0.0) + every, float(self._settings.steps))
+        return True
+
+    @property
+    def enough(self) -> bool:
+        """Whether the best policy is as far below the paper's law as the training shall get."""
+        paper, best = self.figures["paper"], self.figures["policy"]
+        if paper is None or best is None:
+            return False
+        return bool(best["pooled_mm"] <= (1 - self._settings.until / 100) * paper["pooled_mm"])
+
+    def validate(self, network: PolicyNetwork) -> dict[str, float]:
+        """Figures of a policy."""
+        return validate(self.env, acting(network.acting(), self.env, self._settings.privileged)).to_dict()
+
+    def add(self, network: PolicyNetwork, figures: dict[str, float], about: dict[str, Any]) -> bool:
+        """Add to the curve; returns whether the policy is the best so far, for ``keep`` once a checkpoint holds it."""
+        self.figures["curve"].append({**about, **figures})
+        best = self.figures["policy"]
+        if best is not None and merit(figures) >= merit(best):
+            return False
+        self.figures["policy"] = figures
+        training = {**self._settings.to_dict(), "law": self.figures["law"], "reached": figures}
+        self._best = policy_content(Policy(network, self._settings.environment, self._residual, training))
+        return True
+
+    def past(self) -> dict[str, Any]:
+        """What a checkpoint holds of it, with the best policy: the file that follows is the same or is written anew after a
+        kill."""
+        return {"reached": self.figures, "due": self._due, "best": np.frombuffer(self._best, dtype=np.uint8)}
+
+    def keep(self) -> None:
+        """Write the best policy so far."""
+        save_policy(self._best, self._folder)
+
+    def events(self, figures: dict[str, float]) -> dict[str, float]:
+        """What TensorBoard shows of a validation."""
+        law, shown = self.figures["law"], [name for name in LOGGED if np.isfinite(figures[name])]
+        return {
+            **{f"validation/{name}": figures[name] for name in shown},
+            **{f"validation/{name}_law": law[name] for name in shown},
+            "validation/better_than_law_percent": self.better(figures),
+        }
+
+    def better(self, figures: dict[str, float]) -> float:
+        """How far a pooled error is below the law's, %."""
+        return float(100 * (1 - figures["pooled_mm"] / self.figures["law"]["pooled_mm"]))
+
+    def words(self, figures: dict[str, float]) -> str:
+        """A validation beside a progress bar."""
+        law = self.figures["law"]["pooled_mm"]
+        return f"error {figures['pooled_mm']:.2f} mm, law {law:.2f} mm, {self.better(figures):+.0f} % better"
+
+    def describe(self) -> dict[str, Any]:
+        """The settings that a checkpoint must share."""
+        return described(self._settings, self._residual, self.env.simulation.parameters)
+
+    def result(self) -> dict[str, Any]:
+        """Validation figures of the law and of the kept policy, and the learning curve."""
+        return {"settings": self.describe(), **self.figures}
+
+
+def _without_policy(env: Any) -> dict[str, float]:
+    """Validation figures of the law alone: actions of zero."""
+    zero = np.zeros((env.num_envs, *env.single_action_space.shape), dtype=np.float32)
+    return validate(env, lambda _: zero).to_dict()
+
+
+def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:
+    """All settings of a training, as JSON takes them."""
+    return {**settings.to_dict(), **residual.to_dict(), "rig": rig.to_dict()}

@@ -1,0 +1,95 @@
+"""Worlds that PyTorch differentiates: ``loss.backward()`` goes through the closed loop of N lanes.
+
+    worlds = Worlds(gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=256, autoreset_mode="SameStep"))
+    now = worlds.reset(seed=0)
+    for _ in range(10):
+        now = worlds.step(now, policy(now.observation))
+        loss = loss - now.reward.mean()
+    loss.backward()
+
+Gradients are those of ``birthsim_env.gradients``, one-sided at kinks. What ends an episode cuts them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from gymnasium.vector import AutoresetMode
+from torch import Tensor
+
+from birthsim_env.gradients import Recorder
+
+
+class Now(NamedTuple):
+    """N lanes after a policy step: ``observation`` (N, D), ``reward`` (N,), ``motion`` (4, N) of the end effector, x, y (m),
+    vx, vy (m/s), ``state`` (18, N), SI units, and ``ended`` (N,), whose lanes are at the beginning of an episode.
+
+    ``carried`` (C, N) only hands gradients on.
+    """
+
+    carried: Tensor
+    observation: Tensor
+    reward: Tensor
+    motion: Tensor
+    state: Tensor
+    ended: Tensor
+
+    def detached(self) -> Now:
+        """The same, from where gradients begin anew."""
+        return Now(*(one.detach() for one in self))
+
+
+class _Step(torch.autograd.Function):
+    @staticmethod
+    def forward(context: Any, carried: Tensor, action: Tensor, worlds: Worlds) -> tuple[Tensor, ...]:
+        now = worlds.advance(action.detach().numpy())
+        context.back, context.lives = worlds.recorder.taken(), ~now.ended.numpy()
+        context.mark_non_differentiable(now.ended)
+        return tuple(now)
+
+    @staticmethod
+    def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:
+        carried, observation, reward, motion, state = (one.numpy() for one in gradients[:5])
+        lives = context.lives
+        late, action = context.back(
+            carried=carried * lives, observation=observation * lives[:, None], reward=reward, motion=motion * lives,
+            state=state * lives,
+        )  # fmt: skip
+        return torch.from_numpy(late), torch.from_numpy(action.T.astype(np.float32)), None
+
+
+class Worlds:
+    """The lanes of ``env``, a vector environment with same-step autoreset; ``ValueError`` where it has no gradients."""
+
+    def __init__(self, env: Any) -> None:
+        if env.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
+            raise ValueError(f"env = {env!r}; allowed: one made with autoreset_mode='SameStep'")
+        self.env = env.unwrapped
+        self.recorder = Recorder(self.env.simulation)
+
+    def reset(self, seed: Any = None, options: dict[str, Any] | None = None) -> Now:
+        """Start all lanes."""
+        observation, _ = self.env.reset(seed=seed, options=options)
+        return self.now(observation)
+
+    def now(self, observation: Any) -> Now:
+        """The lanes as they are, where episodes begin or go on from a state of the environment that was kept."""
+        self.recorder.prepare()
+        return self._now(observation, np.zeros(self.env.num_envs), np.ones(self.env.num_envs, dtype=np.bool_))
+
+    def step(self, now: Now, action: Tensor) -> Now:
+        """A policy step under actions (N, size) in [-1, 1]."""
+        return Now(*_Step.apply(now.carried, action, self))  # type: ignore[no-untyped-call]
+
+    def advance(self, action: Any) -> Now:
+        """``step`` without gradients."""
+        observation, reward, terminated, truncated, _ = self.env.step(action)
+        return self._now(observation, reward, terminated | truncated)
+
+    def _now(self, observation: Any, reward: Any, ended: Any) -> Now:
+        simulation = self.env.simulation
+        arrays = (observation, reward, simulation.motion, simulation.plant.state.copy(), ended)
+        carried = torch.zeros((len(self.recorder.carried), self.env.num_envs), dtype=torch.float64)
+        return Now(carried, *(torch.from_numpy(np.asarray(array)) for array in arrays))

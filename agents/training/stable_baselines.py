@@ -1,0 +1,53 @@
+"""Learning by Stable-Baselines3."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3.common.vec_env import VecNormalize
+from tqdm import tqdm
+
+from agents.training.algorithms import make_model, unchecked_distributions
+from agents.training.checkpoint import load_checkpoint
+from agents.training.configuration import TrainingSettings
+from agents.training.events import EVENTS
+from agents.training.monitor import Monitor
+from agents.training.privileged import Privileged
+from agents.training.reached import Reached
+from agents.training.sb3_adapter import SB3VecEnv
+from agents.training.shifted_reward import ShiftedReward
+from agents.training.validation import SEED_SPACING, TRAINING_SEED
+
+
+class StableBaselines:
+    """PPO, SAC or TQC in the lanes of ``env``."""
+
+    def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None:
+        self._env, self._folder = SB3VecEnv(env, staggered=True), folder
+        self._settings = settings
+        seen = Privileged(self._env) if settings.privileged else self._env
+        # Survival is paid one per 10 ms; without a discount below one there is no value to shift.
+        simulation = env.unwrapped.simulation
+        per_step = simulation.periods * simulation.period / 0.01
+        paid = ShiftedReward(seen, per_step, settings.discount) if settings.discount < 1 else seen
+        self._normalized = VecNormalize(paid, gamma=settings.discount)
+        self._model = make_model(settings, self._normalized, str(folder / EVENTS))
+        self._normalized.seed(TRAINING_SEED + SEED_SPACING * settings.seed)
+
+    @property
+    def steps(self) -> int:
+        """Policy steps so far."""
+        return int(self._model.num_timesteps)
+
+    def load(self, settings: dict[str, Any]) -> dict[str, Any] | None:
+        """Go on from a checkpoint of these ``settings`` and return its past; None where there is none."""
+        return load_checkpoint(self._folder, self._model, self._normalized, settings)
+
+    def learn(self, reached: Reached, goes_on: bool, bar: tqdm[Any], began: float) -> None:
+        """Learn to the end."""
+        callback = Monitor(reached, self._folder, goes_on, self._env, bar, began)
+        with unchecked_distributions():
+            self._model.learn(
+                self._settings.steps - self.steps, callback=callback, reset_num_timesteps=not goes_on, tb_log_name="run"
+            )

@@ -1,0 +1,56 @@
+"""PyTorch through the closed loop: a loss of one's own, the end of an episode, and a policy that learns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
+
+from agents.training.rollouts import Worlds  # noqa: E402
+
+
+def worlds_of(lanes: int, **arguments: Any) -> Worlds:
+    return Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=lanes, autoreset_mode="SameStep", **arguments))
+
+
+def test_a_loss_of_ones_own_goes_back_through_the_loop() -> None:
+    """The place after three steps, by openings before them, is the difference of two runs."""
+
+    def place(openings: Any) -> Any:
+        worlds = worlds_of(3)
+        now = worlds.reset(seed=1)
+        for _ in range(3):
+            now = worlds.step(now, openings)
+        return now.motion[0].sum() * 1e3
+
+    openings = torch.full((3, 4), 0.05, requires_grad=True)
+    place(openings).backward()
+    way = np.random.default_rng(0).standard_normal((3, 4)).astype(np.float32)
+    ends = [float(place(openings.detach() + size * torch.from_numpy(way))) for size in (1e-3, -1e-3)]
+    assert float((openings.grad * torch.from_numpy(way)).sum()) == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-3)
+
+
+def test_the_end_of_an_episode_cuts_gradients() -> None:
+    """A new episode owes nothing to the actions of the one before; the last reward of that one does."""
+    worlds = worlds_of(2, duration=0.02)
+    now = worlds.reset(seed=1)
+    actions = [torch.full((2, 4), 0.05, requires_grad=True) for _ in range(3)]
+    for k, action in enumerate(actions):
+        now = worlds.step(now, action)
+        assert bool(now.ended.all()) == (k == 1)
+        if k == 1:
+            last = now.reward.sum()
+    now.motion.sum().backward(retain_graph=True)
+    assert float(actions[1].grad.abs().max()) == 0.0
+    assert float(actions[2].grad.abs().max()) > 0.0
+    last.backward()
+    assert float(actions[1].grad.abs().max()) > 0.0
+
+
+def test_worlds_that_end_otherwise_are_refused() -> None:
+    with pytest.raises(ValueError, match="SameStep"):
+        Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))

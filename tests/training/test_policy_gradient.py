@@ -1,0 +1,64 @@
+"""``--algorithm apg``: a policy that learns from scratch in seconds, and a training that goes on with the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from agents.policy.files import WEIGHTS, load_policy
+from agents.residual.settings import ResidualSettings
+from agents.training import policy_gradient
+from agents.training.configuration import TrainingSettings, load_configuration
+from agents.training.trainer import train
+
+SHORT = TrainingSettings(
+    environment="BirthSIM/ProbeResidual-v2", algorithm="apg", steps=40_960, lanes=64, rollout=8, learning_rate=5e-3,
+    discount=1.0, hidden=(32, 32), validation_lanes=8, validations=2,
+)  # fmt: skip
+PURE = ResidualSettings(law="none", policy_period=0.02)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:  # type: ignore[type-arg]
+    folder = tmp_path_factory.mktemp("apg")
+    return folder, train(SHORT, PURE, folder)
+
+
+def test_a_policy_from_scratch_is_far_better_than_shut_valves(whole: tuple[Path, dict]) -> None:  # type: ignore[type-arg]
+    folder, reached = whole
+    assert reached["policy"]["pooled_mm"] < 0.2 * reached["law"]["pooled_mm"]
+    assert reached["policy"]["lost"] == 0
+    policy = load_policy(folder)
+    assert policy.network.squashed
+    assert policy.training["algorithm"] == "apg"
+
+
+def test_a_killed_training_ends_with_the_same_policy(
+    whole: tuple[Path, dict],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,  # type: ignore[type-arg]
+) -> None:
+    updates, update = [], policy_gradient.PolicyGradient._update
+
+    def killed(self: policy_gradient.PolicyGradient) -> float:
+        updates.append(self.steps)
+        if len(updates) == 60:
+            raise KeyboardInterrupt
+        return update(self)
+
+    monkeypatch.setattr(policy_gradient.PolicyGradient, "_update", killed)
+    with pytest.raises(KeyboardInterrupt):
+        train(SHORT, PURE, tmp_path)
+    train(SHORT, PURE, tmp_path)
+    # It went on from the validation half way.
+    assert updates[60] == SHORT.steps // 2
+    assert (tmp_path / WEIGHTS).read_bytes() == (whole[0] / WEIGHTS).read_bytes()
+
+
+def test_what_it_cannot_differentiate_is_refused() -> None:
+    for other in ({"sensors": "lab"}, {"privileged": True}):
+        with pytest.raises(ValueError, match=r"apg.*allowed"):
+            replace(SHORT, **other)
+    assert load_configuration("circle_apg")[0].algorithm == "apg"
