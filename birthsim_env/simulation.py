@@ -167,7 +167,7 @@ class Simulation:
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now."""
-        return measurement_of(self._seen, self._sampled, self._sampled and self._feels)
+        return measurement_of(self._seen, self._sampled, self._sampled and self._has_acceleration)
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
@@ -208,16 +208,16 @@ class Simulation:
         self._motion[:] = self.plant.end_effector()
         self._assemble()
         self._samples = self._samples[:0]
-        felt = self._seen[ACCELERATION:PRESSURE]
-        felt[:] = np.nan
+        acceleration = self._seen[ACCELERATION:PRESSURE]
+        acceleration[:] = np.nan
         self._run(self._look, 1)
-        untold = np.isnan(felt)
-        if self._sampled and self._feels and untold.any():
+        missing = np.isnan(acceleration)
+        if self._sampled and self._has_acceleration and missing.any():
             raise ValueError(
                 f"sensors {type(self.sensors).__name__} tell no acceleration; allowed: (2, {len(lanes)}) m/s2, "
                 f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
-        felt[untold] = 0.0
+        acceleration[missing] = 0.0
         if hasattr(self.actuation, "check"):
             self.actuation.check(self.measurement)
 
@@ -365,7 +365,7 @@ class Simulation:
         self._sampled = now.sampled
 
     @property
-    def _feels(self) -> bool:
+    def _has_acceleration(self) -> bool:
         """Whether the head has an acceleration sensor, which exact sensors do without."""
         return self.parameters.electronics.acceleration_bandwidth > 0.0
 

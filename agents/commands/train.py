@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from agents.residual.settings import IMPEDANCES, LAWS, ResidualSettings
 from agents.training.configuration import ALGORITHMS, TrainingSettings, configuration_names, load_configuration, override
-from agents.training.time_split import told
+from agents.training.time_split import shares
 from baselines.commands.settings import PROCESSES, RANDOMIZE, Env, Randomize, RigFile, Seed, Sensors, whole
 from baselines.commands.worlds import check_environment, check_world
 from baselines.work.files import make_folder, own_folder, write_json
@@ -132,4 +132,4 @@ def _report(
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
     print(f"{seconds} s per seed with validation; of the rest")
     for seed, result in zip(seeds, results, strict=True):
-        print(f"seed {seed}: {told(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")
+        print(f"seed {seed}: {shares(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")

@@ -40,7 +40,7 @@ class TrainingSettings:
     PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes. The learning
     rate falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
     ``until`` percent below that of the paper's law; with 100 it never ends early. A
-    ``privileged`` policy is told the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
+    ``privileged`` policy observes the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """
 
