@@ -35,17 +35,9 @@ _PLACES = {
 """Public name -> where it lives; it is imported, and PyTorch with it where that is needed, when it is first used."""
 
 __all__ = [
-    "Policy",
-    "ResidualController",
-    "ResidualSettings",
-    "SB3VecEnv",
-    "ShiftedReward",
-    "TrainingSettings",
-    "export_onnx",
-    "load_policy",
-    "save_policy",
-    "train",
-]
+    "Policy", "ResidualController", "ResidualSettings", "SB3VecEnv", "ShiftedReward", "TrainingSettings", "export_onnx",
+    "load_policy", "save_policy", "train",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -28,16 +28,9 @@ _PLACES = {
 """Public name -> where it lives; it is imported when it is first used."""
 
 __all__ = [
-    "AdmittanceController",
-    "BacksteppingController",
-    "CartesianBackstepping",
-    "Controller",
-    "Evaluation",
-    "LyapunovFunction",
-    "controller_names",
-    "evaluate",
-    "make_controller",
-]
+    "AdmittanceController", "BacksteppingController", "CartesianBackstepping", "Controller", "Evaluation",
+    "LyapunovFunction", "controller_names", "evaluate", "make_controller",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

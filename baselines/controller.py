@@ -75,21 +75,21 @@ def feedforward_rows(
 ) -> Array:
     """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
     rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
-    told = np.zeros((5, lanes))
-    for name, rows, given in (
-        (COMMAND_OPTIONS[0], told[:2], force),
-        (COMMAND_OPTIONS[1], told[2:4], rate),
-        (COMMAND_OPTIONS[2], told[4], factor),
+    given = np.zeros((5, lanes))
+    for name, rows, one in (
+        (COMMAND_OPTIONS[0], given[:2], force),
+        (COMMAND_OPTIONS[1], given[2:4], rate),
+        (COMMAND_OPTIONS[2], given[4], factor),
     ):
-        if given is not None:
+        if one is not None:
             if name not in taken:
                 raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
-            if np.shape(given) != rows.shape:
+            if np.shape(one) != rows.shape:
                 raise ValueError(
-                    f"{name} has shape {np.shape(given)}; allowed: {rows.shape}, with the lanes of measurement.position"
+                    f"{name} has shape {np.shape(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
                 )
-            rows[:] = given
-    return told
+            rows[:] = one
+    return given
 
 
 class Tunable(Protocol):

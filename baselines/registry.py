@@ -134,7 +134,7 @@ def _factory(name: str) -> Factory:
     names = controller_names()
     asked = near(plain, names)
     allowed = "a registered name" if asked else ", ".join(names)
-    raise ValueError(f"controller = {shown(name)}{asked}; allowed: {allowed}, or path/to/file.py:Class")
+    raise ValueError(f"controller = {shown(split_options(name)[0])}{asked}; allowed: {allowed}, or path/to/file.py:Class")
 
 
 def known_options(name: str) -> list[str] | None:

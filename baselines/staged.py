@@ -36,7 +36,7 @@ class LawStage:
     function: Callable[..., int]
     constants: Array
     fresh: Array
-    feels: bool = False
+    reads_acceleration: bool = False
 
 
 class StagedController:
@@ -49,7 +49,7 @@ class StagedController:
     """What ``command`` takes besides the signals."""
 
     asks: ClassVar[bool] = False
-    """Whether the stages themselves say what the law is asked for and told."""
+    """Whether the stages themselves say what the law is asked for, and the forces that it is to believe in."""
 
     def __init__(self, parameters: Parameters | str | Path | None = None) -> None:
         self.parameters = load_parameters(parameters)
@@ -93,7 +93,7 @@ class StagedController:
 
     def require_acceleration(self, measurement: Measurement) -> None:
         """Raise ``ValueError`` without an acceleration where the law, once prepared, needs one."""
-        if measurement.acceleration is None and any(one.feels for one in self._made):
+        if measurement.acceleration is None and any(one.reads_acceleration for one in self._made):
             raise ValueError(
                 f"measurement.acceleration = None; allowed: (2, {self._lanes}) m/s2, since this controller believes in a "
                 f"sensor: electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
@@ -124,14 +124,14 @@ class StagedController:
         """
         if measurement.position.ndim == 1:
             given = (feedforward_force, feedforward_rate, damping_factor)
-            told = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
-            return self.command(*one_lane(measurement, reference), *told)[:, 0]
+            options = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
+            return self.command(*one_lane(measurement, reference), *options)[:, 0]
         if self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor)):
             self.explain(measurement, reference)
         return self._openings.copy()
 
     def run_stages(
-        self, measurement: Measurement, reference: Reference, told: Sequence[Array | None] = (), commanded: Array | None = None
+        self, measurement: Measurement, reference: Reference, given: Sequence[Array | None] = (), commanded: Array | None = None
     ) -> int:
         """One control period over N lanes, with the arguments of ``command``; returns how many a stage could not serve.
 
@@ -147,7 +147,7 @@ class StagedController:
             unchanged.flags.writeable = False
             placed = [(unchanged, 0), (self._asked, ASKED), (self._openings, OPENING), *self.more_rows(lanes)]
             self._loop = Loop(lanes, [], placed, self.stages())
-        self._asked[REFERENCES:] = feedforward_rows(lanes, *told, taken=self.COMMAND_OPTIONS)
+        self._asked[REFERENCES:] = feedforward_rows(lanes, *given, taken=self.COMMAND_OPTIONS)
         fill_measurement(self._seen, measurement)
         self._seen[REFERENCE:] = reference.rows
         if commanded is not None:
@@ -161,7 +161,7 @@ class StagedController:
 
 @kernel
 def ask(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: int, n: int) -> int:
-    """A law without a residual is asked for the reference; what it is told besides stays as it was set."""
+    """A law without a residual is asked for the reference; forces that it is to believe in stay as they were set."""
     for i in range(n):
         for k in range(Reference.size):
             seen.asked.rows[k, i] = seen.reference.rows[k, i]
@@ -171,15 +171,15 @@ def ask(world: int, seen: Seen, memory: int, constants: int, tables: int, lane: 
 class Driving(Forgetful):
     """A controller as an actuation, called back once per control period. A policy step has no action.
 
-    With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``told`` are options of
+    With a ``name`` it raises ``ValueError`` where the controller returns anything but openings. ``options`` are those of
     ``command``. ``spent`` has the time of each call, us per lane.
     """
 
     size, every_period = 0, True
     names: tuple[str, ...] = ()
 
-    def __init__(self, controller: Controller, name: str | None, told: dict[str, Array]) -> None:
-        self.controller, self._name, self._told, self.spent = controller, name, told, list[float]()
+    def __init__(self, controller: Controller, name: str | None, options: dict[str, Array]) -> None:
+        self.controller, self._name, self._options, self.spent = controller, name, options, list[float]()
 
     def begin(self, lanes: Mask) -> None:
         self.controller.reset(None if lanes.all() else lanes)
@@ -189,7 +189,7 @@ class Driving(Forgetful):
 
     def openings(self, plant: Plant, measurement: Measurement, reference: Reference) -> Array:
         started = time.perf_counter()
-        command = self.controller.command(measurement, reference, **self._told)
+        command = self.controller.command(measurement, reference, **self._options)
         self.spent.append((time.perf_counter() - started) * 1e6 / plant.num_envs)
         return command if self._name is None else checked_command(self._name, command, plant.num_envs)
 
@@ -209,7 +209,7 @@ class CompiledDriving(Driving):
         own = self.controller.more_rows(lanes)
         if self.controller.asks:
             return own
-        force, rate, factor = map(self._told.get, COMMAND_OPTIONS)
+        force, rate, factor = map(self._options.get, COMMAND_OPTIONS)
         return [(feedforward_rows(lanes, force, rate, factor, taken=self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
@@ -221,7 +221,7 @@ class CompiledDriving(Driving):
         self.controller.require_acceleration(measurement)
 
 
-def driving(controller: Controller, name: str | None, told: dict[str, Array] | None = None) -> Driving:
+def driving(controller: Controller, name: str | None, options: dict[str, Array] | None = None) -> Driving:
     """What lets a controller drive a ``Simulation``: compiled where it can be, unless a class of a user's own commands."""
     compiled = isinstance(controller, StagedController) and controller.is_compiled()
-    return (CompiledDriving if compiled else Driving)(controller, name, told or {})
+    return (CompiledDriving if compiled else Driving)(controller, name, options or {})

@@ -18,23 +18,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.scores import normalized_score, reference_scores
 
 __all__ = [
-    "Circle",
-    "ForceProfile",
-    "Hold",
-    "LinearModel",
-    "Measurement",
-    "Parameters",
-    "Path",
-    "Plant",
-    "Reference",
-    "StiffnessSchedule",
-    "Trajectory",
-    "UserForce",
-    "balanced_pressures",
-    "linearize",
-    "normalized_score",
+    "Circle", "ForceProfile", "Hold", "LinearModel", "Measurement", "Parameters", "Path", "Plant", "Reference",
+    "StiffnessSchedule", "Trajectory", "UserForce", "balanced_pressures", "linearize", "normalized_score",
     "reference_scores",
-]
+]  # fmt: skip
 
 __version__ = "0.1.0"
 

@@ -13,27 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from birthsim_env.loop import rows as at
 from birthsim_env.loop.loop import MixedLoop, Place
-from birthsim_env.loop.rows import (
-    ACCELERATION,
-    ACTION,
-    ASKED,
-    FORCE,
-    IMPACT,
-    MOTION,
-    OPENING,
-    PRESSURE,
-    REFERENCE,
-    SEEN,
-    SHOWN,
-    SINCE_JUMP,
-    STATE,
-    TICK,
-    TIME,
-    WORLD,
-    fill_measurement,
-    measurement_of,
-)
+from birthsim_env.loop.rows import fill_measurement, measurement_of
 from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
@@ -117,7 +99,7 @@ class Simulation:
         self.impacts: Array = np.zeros((2, num_envs))
         self._openings: Array = np.zeros((4, num_envs))
         self._wanted: Array = np.zeros((4, num_envs))
-        self._seen: Array = np.zeros((ASKED, num_envs))
+        self._seen: Array = np.zeros((at.ASKED, num_envs))
         self._samples: Array = np.zeros((0, 2, num_envs))
         self._sample = 0
         self._ranges = {name: ranges[name] for name in ranges if name not in of_sensors}
@@ -140,7 +122,7 @@ class Simulation:
     @property
     def time(self) -> Array:
         """s since each lane's episode began, (N,)."""
-        return np.array(self._seen[TIME])
+        return np.array(self._seen[at.TIME])
 
     @property
     def ticks(self) -> NDArray[np.int64]:
@@ -170,12 +152,12 @@ class Simulation:
     @property
     def reference(self) -> Reference:
         """What is asked for now."""
-        return Reference(self._seen[REFERENCE:ASKED].copy())
+        return Reference(self._seen[at.REFERENCE : at.ASKED].copy())
 
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now."""
-        return measurement_of(self._seen, self._sampled, self._sampled and self._feels)
+        return measurement_of(self._seen, self._sampled, self._sampled and self._has_acceleration)
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None
@@ -195,7 +177,7 @@ class Simulation:
             begin(self.stiffness, block, streams["stiffness"])
             begin(self.sensors, block, streams["sensors"])
         self.actuation.begin(lanes)
-        self._tick[:, lanes], self._seen[TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
+        self._tick[:, lanes], self._seen[at.TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
         self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
         rows = checked_start(
             self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters, self.nominal
@@ -216,16 +198,16 @@ class Simulation:
         self._motion[:] = self.plant.end_effector()
         self._assemble()
         self._samples = self._samples[:0]
-        felt = self._seen[ACCELERATION:PRESSURE]
-        felt[:] = np.nan
+        acceleration = self._seen[at.ACCELERATION : at.PRESSURE]
+        acceleration[:] = np.nan
         self._run(self._look, 1)
-        untold = np.isnan(felt)
-        if self._sampled and self._feels and untold.any():
+        missing = np.isnan(acceleration)
+        if self._sampled and self._has_acceleration and missing.any():
             raise ValueError(
                 f"sensors {type(self.sensors).__name__} tell no acceleration; allowed: (2, {len(lanes)}) m/s2, "
                 f"since electronics.acceleration_bandwidth = {self.parameters.electronics.acceleration_bandwidth!r}"
             )
-        felt[untold] = 0.0
+        acceleration[missing] = 0.0
         if hasattr(self.actuation, "check"):
             self.actuation.check(self.measurement)
 
@@ -261,16 +243,16 @@ class Simulation:
         self._opens, self._sampled = actuation, self.sensors.sampled
         if len(self.action) != actuation.size:
             self.action = np.zeros((actuation.size, lanes))
-        world = [(plant.lane_parameters, 0), (plant.state, STATE), (self.impacts, IMPACT), (self._motion, MOTION)]
-        world += [(self._force, FORCE), (self._since, SINCE_JUMP), (self._tick, TICK)]
-        seen = [(self._seen, 0), (self.action, ACTION), (self._openings, OPENING)]
+        world = [(plant.lane_parameters, 0), (plant.state, at.STATE), (self.impacts, at.IMPACT), (self._motion, at.MOTION)]
+        world += [(self._force, at.FORCE), (self._since, at.SINCE_JUMP), (self._tick, at.TICK)]
+        seen = [(self._seen, 0), (self.action, at.ACTION), (self._openings, at.OPENING)]
         if actuation.memory_names:
             # A user's own actuation is asked what it shows; a compiled one writes it.
             own = getattr(actuation, "shown", None)
             self._shown = np.zeros((len(actuation.memory_names), lanes)) if own is None else own
             if own is None:
                 self._shown[:] = actuation.memory()
-            seen.append((self._shown, SHOWN))
+            seen.append((self._shown, at.SHOWN))
         more = actuation.more_rows(lanes) if hasattr(actuation, "more_rows") else []
         return world, [*seen, *more]
 
@@ -285,7 +267,7 @@ class Simulation:
 
     def rows(self) -> tuple[Array, Array]:
         """Copies of the rows of the world and of what is seen now, (WORLD, N) and (SEEN, N)."""
-        world, seen = (np.zeros((count, self.plant.num_envs)) for count in (WORLD, SEEN))
+        world, seen = (np.zeros((count, self.plant.num_envs)) for count in (at.WORLD, at.SEEN))
         for rows, places in zip((world, seen), self.places(), strict=True):
             for array, row in places:
                 rows[row : row + len(array)] = array
@@ -352,10 +334,10 @@ class Simulation:
         self._openings[:] = put_out(self.sensors, self.ticks, self._openings)
 
     def _follow(self, _: int) -> None:
-        self._seen[REFERENCE : REFERENCE + 8] = self.trajectory.sample(self.time)
+        self._seen[at.REFERENCE : at.REFERENCE + 8] = self.trajectory.sample(self.time)
 
     def _set(self, _: int) -> None:
-        self._seen[REFERENCE + 8 : ASKED] = self.stiffness.sample(self.time)
+        self._seen[at.REFERENCE + 8 : at.ASKED] = self.stiffness.sample(self.time)
 
     def _push(self, _: int) -> None:
         self._sample += 1
@@ -373,7 +355,7 @@ class Simulation:
         self._sampled = now.sampled
 
     @property
-    def _feels(self) -> bool:
+    def _has_acceleration(self) -> bool:
         """Whether the head has an acceleration sensor, which exact sensors do without."""
         return self.parameters.electronics.acceleration_bandwidth > 0.0
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.configuration import TrainingSettings, load_configuration, override
-from agents.training.time_split import told
+from agents.training.time_split import shares
 from baselines.commands.settings import RANDOMIZE
 from baselines.commands.train import Settings
 from baselines.commands.worlds import check_environment, check_world
@@ -94,4 +94,4 @@ def _report(
     seconds = ", ".join(f"{point['seconds']:.0f}" for point in last)
     print(f"{seconds} s per seed with validation; of the rest")
     for seed, result in zip(seeds, results, strict=True):
-        print(f"seed {seed}: {told(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")
+        print(f"seed {seed}: {shares(result['curve'][-1]['split'], result['curve'][-1]['environment_fraction'])}")

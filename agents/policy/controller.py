@@ -82,23 +82,23 @@ class ResidualController(ResidualLaw):
             self._cells, self._before = np.zeros((0, lanes)), [] if self.settings.force_sensor else [no_force_stage()]
             if self._network is not None:
                 shown = len(memory_names(self.settings))
-                told = policy_stage(self._network, self._periods, self.settings.size, shown, self._p, lanes)
-                assert told.memory is not None
-                self._before, self._cells = [*self._before, told], told.memory[1:]
+                own = policy_stage(self._network, self._periods, self.settings.size, shown, self._p, lanes)
+                assert own.memory is not None
+                self._before, self._cells = [*self._before, own], own.memory[1:]
         super().prepare(lanes, sampled)
 
     def policy_stages(self) -> list[Stage]:
         """The policy, and before it what it must not see."""
         return self._before
 
-    def command(self, measurement: Measurement, reference: Reference, *told: Any) -> Array:
+    def command(self, measurement: Measurement, reference: Reference, *options: Any) -> Array:
         """Spool openings of one control period: (4, N) for signals over N lanes, (4,) for one rig without lanes."""
         if self._function is not None and measurement.position.ndim > 1:
             self.prepare(measurement.position.shape[1], measurement.sampled)
             if self._calls % self._periods == 0:
                 self._ask(self._function, measurement, reference)
             self._calls += 1
-        return super().command(measurement, reference, *told)
+        return super().command(measurement, reference, *options)
 
     def _ask(self, function: PolicyFunction, measurement: Measurement, reference: Reference) -> None:
         if not self.settings.force_sensor:

@@ -1,4 +1,4 @@
-"""The law with a residual: a policy tells it about forces on the pistons that it does not know of, and how stiff to work.
+"""The law with a residual: a policy corrects the forces on the pistons that it believes in, and how stiff to work.
 
 An action in [-1, 1] passes a first-order low-pass at the control rate, z' = (a - z)/T. Its first two entries, times the
 authority in N, are added to what the law believes acts on the pistons; the law knows their rate too. Where the impedance is
@@ -192,7 +192,7 @@ class ResidualLaw(StagedController):
     def __init__(self, parameters: Parameters, settings: ResidualSettings) -> None:
         super().__init__(parameters)
         self.settings = settings
-        # Whichever law it is can be told of forces; those that have an impedance also of a damping factor.
+        # Every law takes forces to believe in; those that have an impedance also a damping factor.
         self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
         self.action: Array = np.zeros((settings.size, 0))
         self.shown: Array = np.zeros((settings.size + len(UNEXPLAINED) + 2, 0))
@@ -247,8 +247,8 @@ class ResidualLaw(StagedController):
         return Reference(self._asked[:REFERENCES].copy())
 
     @property
-    def told(self) -> Array:
-        """What it was told besides: forces along the cylinders, N, their rates, N/s, and a damping factor; (5, N)."""
+    def feedforward(self) -> Array:
+        """What it was to believe besides: forces along the cylinders, N, their rates, N/s, and a damping factor; (5, N)."""
         return self._asked[REFERENCES:].copy()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:

@@ -1,4 +1,4 @@
-"""What a privileged policy is told besides: the true figures of the rig that was drawn, and what its sensors do wrong.
+"""What a privileged policy observes besides: the true figures of the rig that was drawn, and what its sensors do wrong.
 
 No controller can know them. A policy that does says what is left to be learned by one that guesses them from measurements.
 """
@@ -22,10 +22,10 @@ DRAWN = (at.MASS, at.FC1, at.FC2, at.FV1, at.FV2, at.TAU, at.DEAD_VOLUME, at.H_W
 """Rows of the parameters that randomisation of a rig draws; friction: Coulomb and viscous, of cylinders 1 and 2."""
 
 PRESSURE_UNIT, PLACE_UNIT = 2000.0, 1e-3
-"""Pa and m that are told as 1: the default bias of a pressure cell, and the default distortion of the tracker."""
+"""Pa and m that are observed as 1: the default bias of a pressure cell, and the default distortion of the tracker."""
 
 FIGURES = len(DRAWN) + 6
-"""How many numbers are told."""
+"""How many numbers these are."""
 
 
 def true_figures(env: Any) -> NDArray[np.float32]:
@@ -43,11 +43,12 @@ def true_figures(env: Any) -> NDArray[np.float32]:
     return figures.T.astype(np.float32)
 
 
-def told(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+def with_figures(env: Any, observations: NDArray[np.float32]) -> NDArray[np.float32]:
     """Observations (N, D) of a vector environment with its ``true_figures``, (N, D + FIGURES)."""
     return np.concatenate([observations, true_figures(env)], axis=1)
 
 
 def acting(policy: PolicyFunction, env: Any, privileged: bool) -> PolicyFunction:
-    """What a ``policy`` does in ``env``: observations (N, D) -> actions (N, size); a ``privileged`` one is ``told``."""
-    return (lambda seen: policy(told(env, seen))) if privileged else policy
+    """What a ``policy`` does in ``env``: observations (N, D) -> actions (N, size); a ``privileged`` one observes
+    the true figures too."""
+    return (lambda seen: policy(with_figures(env, seen))) if privileged else policy

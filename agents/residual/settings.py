@@ -15,7 +15,7 @@ LAWS = (
     *("admittance-backstepping", "admittance-adaptive", "admittance-sensorless"),
     NO_LAW,
 )
-"""Laws that can be told of a force, the paper's first; and none, where a policy drives the valves by itself."""
+"""Laws that take forces to believe in, the paper's first; and none, where a policy drives the valves by itself."""
 
 FORCE_LAWS = ("admittance-backstepping", "admittance-adaptive")
 """Those that read the hand's force."""

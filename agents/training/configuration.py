@@ -41,7 +41,7 @@ class TrainingSettings:
     policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount`` alone. The learning
     rate falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
     ``until`` percent below that of the paper's law; with 100 it never ends early. A
-    ``privileged`` policy is told the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
+    ``privileged`` policy observes the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """
 

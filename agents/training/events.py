@@ -19,11 +19,11 @@ def events_in(folder: Path) -> Iterator[None]:
     """
     before = threading.excepthook
 
-    def told(raised: threading.ExceptHookArgs) -> None:
+    def noted(raised: threading.ExceptHookArgs) -> None:
         if not (isinstance(raised.exc_value, OSError) and type(raised.thread).__module__.startswith("tensorboard.")):
             before(raised)
 
-    threading.excepthook = told
+    threading.excepthook = noted
     try:
         yield
     except OSError as error:

@@ -8,12 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from agents.residual.privileged import FIGURES, told, true_figures
+from agents.residual.privileged import FIGURES, true_figures, with_figures
 from agents.training.sb3_adapter import SB3VecEnv
 
 
 class Privileged(VecEnvWrapper):
-    """``venv`` with ``told`` observations. The last observation of an episode has the figures of the step before."""
+    """``venv`` whose observations have the true figures. The last observation of an episode has those of
+    the step before."""
 
     def __init__(self, venv: SB3VecEnv) -> None:
         own: Any = venv.observation_space
@@ -23,7 +24,7 @@ class Privileged(VecEnvWrapper):
 
     def reset(self) -> Any:
         """As ``venv``."""
-        return told(self._lanes, np.asarray(self.venv.reset()))
+        return with_figures(self._lanes, np.asarray(self.venv.reset()))
 
     def step_wait(self) -> Any:
         """As ``venv``."""
@@ -31,4 +32,4 @@ class Privileged(VecEnvWrapper):
         observations, rewards, ended, infos = self.venv.step_wait()
         for lane in np.flatnonzero(ended):
             infos[lane]["terminal_observation"] = np.append(infos[lane]["terminal_observation"], before[lane])
-        return told(self._lanes, np.asarray(observations)), rewards, ended, infos
+        return with_figures(self._lanes, np.asarray(observations)), rewards, ended, infos

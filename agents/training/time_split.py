@@ -30,7 +30,7 @@ def split(simulation: Simulation, seconds: float) -> dict[str, float]:
     return {**found, "glue": max(0.0, 1.0 - sum(found.values()))}
 
 
-def told(split: dict[str, float], environment: float) -> str:
+def shares(split: dict[str, float], environment: float) -> str:
     """The fractions of a training in words: ``split`` of what the ``environment`` takes, and the learner the rest."""
     parts: dict[str, Any] = {name: environment * part for name, part in split.items()}
     parts["learner"] = 1.0 - environment

@@ -96,14 +96,14 @@ def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed:
     lanes = env.num_envs
     metrics = EpisodeMetrics(lanes, env.simulation.period * env.simulation.periods)
     alive: NDArray[np.bool_] = np.ones(lanes, dtype=np.bool_)
-    felt, counts = np.zeros((2, lanes))
+    rendered, counts = np.zeros((2, lanes))
     for _ in range(env.steps):
         metrics.add(info, env.simulation.openings, alive)
         size = np.hypot(*info["user_force"].T)
         given = info["compliant_target"] - info["target"]
         along = np.abs((info["tracking_error"] * info["user_force"]).sum(axis=1)) / np.maximum(size, PUSHED)
         counted = alive & (info["since_jump"] >= SETTLED) & (size >= PUSHED)
-        felt += np.where(counted, along / np.maximum(np.hypot(*given.T), 1e-6), 0.0)
+        rendered += np.where(counted, along / np.maximum(np.hypot(*given.T), 1e-6), 0.0)
         counts += counted
         observation, _, terminated, _, info = env.step(act(observation))
         alive &= ~terminated
@@ -111,7 +111,7 @@ def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed:
     with np.errstate(invalid="ignore"):
         return Score(
             penalize_lost(result["settled_rms"], ~alive, True, LOST_ERROR),
-            100 * felt / np.where(counts > 0, counts, np.nan),
+            100 * rendered / np.where(counts > 0, counts, np.nan),
             np.fmax(result["hunting_x"], result["hunting_y"]),
             result["saturation"],
             asked,

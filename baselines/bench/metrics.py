@@ -30,26 +30,11 @@ NORMAL_DENSITY = 1.293
 """kg/m3 of dry air at 0 C and 1.01325 bar: normal litres."""
 
 UNITS = {
-    "error_rms_x": "mm",
-    "error_rms_y": "mm",
-    "error_max_x": "mm",
-    "error_max_y": "mm",
-    "settled_rms_x": "mm",
-    "settled_rms_y": "mm",
-    "settled_rms": "mm",
-    "settled_max_x": "mm",
-    "settled_max_y": "mm",
-    "stiffness_error": "%",
-    "cross_motion": "mm",
-    "unrest": "mm",
-    "hunting_x": "mm",
-    "hunting_y": "mm",
-    "restarts": "1/s",
-    "pneumatic_rms_1": "%",
-    "pneumatic_rms_2": "%",
-    "air": "l/min",
-    "saturation": "%",
-}
+    "error_rms_x": "mm", "error_rms_y": "mm", "error_max_x": "mm", "error_max_y": "mm", "settled_rms_x": "mm",
+    "settled_rms_y": "mm", "settled_rms": "mm", "settled_max_x": "mm", "settled_max_y": "mm", "stiffness_error": "%",
+    "cross_motion": "mm", "unrest": "mm", "hunting_x": "mm", "hunting_y": "mm", "restarts": "1/s",
+    "pneumatic_rms_1": "%", "pneumatic_rms_2": "%", "air": "l/min", "saturation": "%",
+}  # fmt: skip
 """Metric -> unit. ``settled_rms`` is that of sqrt(ex^2 + ey^2). ``stiffness_error`` is rendered over asked-for stiffness
 along the push, less one; ``cross_motion`` the displacement across the push beyond the one asked for; both from the compliant
 target. ``unrest`` is the motion, peak to peak, in the ``WINDOW`` before the push. All three say something only where the

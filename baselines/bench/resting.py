@@ -28,18 +28,18 @@ class RestingRigs(Simulation):
 
     ``sensors`` is the name of a sensor model; lane i seeds it with ``seed`` + i. With ``force_sensor`` False the controller
     sees a force of zero. ``moved`` are the rigs that move, where they are others than those that are balanced. With a ``name``
-    a controller's openings are checked; ``told`` is what it is told besides the signals. Raises ``ValueError`` for a target
-    outside the workspace. ``asked`` (15, N), ``pushed`` (2, N), N, and ``opened`` (4, N) may be written while the loop runs:
-    what is asked for, the hand's force, and the openings.
+    a controller's openings are checked; ``options`` are what its ``command`` takes besides the signals. Raises ``ValueError``
+    for a target outside the workspace. ``asked`` (15, N), ``pushed`` (2, N), N, and ``opened`` (4, N) may be written while the
+    loop runs: what is asked for, the hand's force, and the openings.
     """
 
     def __init__(
         self, rigs: Sequence[Parameters], reference: Reference, controller: Controller, sensors: str = "ideal", seed: int = 0,
         force_sensor: bool = True, moved: Sequence[Parameters] | None = None, name: str | None = None,
-        told: dict[str, Array] | None = None,
+        options: dict[str, Array] | None = None,
     ) -> None:  # fmt: skip
         lanes, still = len(rigs), (Trajectory(), UserForce(), StiffnessSchedule())
-        law = driving(controller, name, told)
+        law = driving(controller, name, options)
         super().__init__(lanes, rigs[0], {}, *still, sensors, law, 1, available_threads(), force_sensor)
         self.plant = Plant(moved or rigs, lanes)
         piston = inverse_geometry(reference.position, rigs[0])

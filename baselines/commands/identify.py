@@ -96,7 +96,7 @@ def _from_log(settings: Settings, log: Path, owner: Parameters) -> None:
         found = identify(trial, owner, settings.seed, tick=tick)
     found.write(out, log.name)
     print("\n".join(found.words()))
-    print(f"written to {out}: {sum(row.told for row in found.rows)} of {len(found.rows)} parameters are from the log")
+    print(f"written to {out}: {sum(row.determined for row in found.rows)} of {len(found.rows)} parameters are from the log")
     if folder is not None:
         # pyplot takes half a second to load.
         from baselines.figures.identification import intervals_figure, residuals_figure

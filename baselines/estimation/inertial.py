@@ -1,6 +1,6 @@
 """Motion of the end effector from its acceleration between position samples that are rare, noisy and late.
 
-On each axis, with the acceleration a that a sensor feels and its bias b,
+On each axis, with the acceleration a that a sensor measures and its bias b,
     x' = v,  v' = a - b,  b' = 0
 runs at the control rate. It needs neither forces nor a mass, so friction that turns, pressures and the hand leave it alone.
 A position sample corrects it as in ``observers``, by the difference to what was believed when that sample was taken:
@@ -117,4 +117,4 @@ def law_stage(rig: Parameters) -> LawStage:
     periods = int((board.position_latency + 1 / board.position_rate) / board.control_period) + 4
     fresh = Memory.lane(fresh=1.0, past=np.zeros(2 * periods))
     about = Gains.numbers(period=board.control_period, bandwidth=BANDWIDTH, rows_of_memory=len(fresh))
-    return LawStage(stage, about, fresh, feels=True)
+    return LawStage(stage, about, fresh, reads_acceleration=True)

@@ -69,7 +69,7 @@ def intervals_figure(found: Identified, folder: Path) -> list[Path]:
         figure, axes = plt.subplots(figsize=(8, 0.32 * len(found.rows) + 1.2), layout="constrained")
         for place, row in enumerate(reversed(found.rows)):
             known = row.owner or row.value or 1.0  # a latency of zero is not divided by
-            _interval(axes, place, row.low / known, row.value / known, row.high / known, row.told)
+            _interval(axes, place, row.low / known, row.value / known, row.high / known, row.determined)
         axes.axvline(1.0, color="black", lw=0.8, ls=":")
         axes.set(xscale="log", xlabel="value over the owner's (-)", yticks=range(len(found.rows)))
         axes.set_yticklabels([row.name for row in reversed(found.rows)])
@@ -79,7 +79,7 @@ def intervals_figure(found: Identified, folder: Path) -> list[Path]:
         return save(figure, folder, "intervals")
 
 
-def _interval(axes: Axes, place: int, low: float, middle: float, high: float, told: bool) -> None:
-    colour = DARK if told else MIDDLE
+def _interval(axes: Axes, place: int, low: float, middle: float, high: float, determined: bool) -> None:
+    colour = DARK if determined else MIDDLE
     axes.plot([max(low, 1e-3), high], [place, place], color=colour, lw=1.5)
-    axes.plot(middle, place, "o", color=colour, mfc=colour if told else "white", ms=5)
+    axes.plot(middle, place, "o", color=colour, mfc=colour if determined else "white", ms=5)

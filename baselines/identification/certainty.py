@@ -35,13 +35,13 @@ class Direction:
 
 @dataclass(frozen=True)
 class Certainty:
-    """Standard deviations ``noise``, ``windows`` and ``deviation``, the larger, of coordinates (Q,); whether the log ``tells``
-    a parameter (Q,); the ``weakest`` directions, worst first."""
+    """Standard deviations ``noise``, ``windows`` and ``deviation``, the larger, of coordinates (Q,); whether the log has
+    ``determined`` a parameter (Q,); the ``weakest`` directions, worst first."""
 
     noise: Array
     windows: Array
     deviation: Array
-    tells: NDArray[np.bool_]
+    determined: NDArray[np.bool_]
     weakest: tuple[Direction, ...]
 
 

@@ -19,7 +19,7 @@ from birthsim_env.physics.rig.parameters import Parameters, field_of
 
 @dataclass(frozen=True)
 class Row:
-    """A parameter: the owner's value, the estimate with its 95 % interval, and whether the log tells it.
+    """A parameter: the owner's value, the estimate with its 95 % interval, and whether the log determines it.
 
     Where the log does not tell it, ``value`` is the owner's, and the interval is what log and owner know together.
     """
@@ -29,14 +29,14 @@ class Row:
     value: float
     low: float
     high: float
-    told: bool
+    determined: bool
 
     def words(self) -> str:
         """One line: name, value, interval, unit."""
         unit = field_of(self.name).metadata["unit"]
         value = f"{self.name} = {self.value:.5g}{'' if unit == '-' else f' {unit}'}"
         interval = f"{self.low:.5g} to {self.high:.5g}"
-        if self.told:
+        if self.determined:
             return f"{value}, 95 % interval {interval}; was {self.owner:.5g}"
         return f"{value}, KEPT: the log cannot tell it, it may be {interval}"
 
@@ -89,7 +89,7 @@ REMEMBER = ("valves.hysteresis", "chambers.tube_length", "air.supply_conductance
 def identify(
     trial: Trial, owner: Parameters, seed: int = 0, quantities: tuple[Quantity, ...] = QUANTITIES, tick: Tick = lambda: None
 ) -> Identified:
-    """The rig of a trial, as far as the trial tells it; all else is the owner's.
+    """The rig of a trial, as far as the trial determines it; all else is the owner's.
 
     Parameters that the trial does not tell take the owner's value, and the others are fitted anew. Their intervals are those
     of the fit of all, which knows how far the owner may be wrong. ``ValueError`` for an owner's rig with options that
@@ -100,19 +100,19 @@ def identify(
         raise ValueError(f"{given[0]} = {value_of(owner, given[0])!r}; allowed for an identification: 0, {', '.join(REMEMBER)}")
     whole = fit(trial, owner, seed, quantities, tick)
     certainty = certainty_of(whole)
-    told = tuple(one for one, tells in zip(quantities, certainty.tells, strict=True) if tells)
-    last = whole if len(told) == len(quantities) or not told else refine(trial, whole, owner, told, tick)
-    rig = last.rig if told else owner
+    found = tuple(one for one, known in zip(quantities, certainty.determined, strict=True) if known)
+    last = whole if len(found) == len(quantities) or not found else refine(trial, whole, owner, found, tick)
+    rig = last.rig if found else owner
     rows = []
-    for one, theta, deviation, tells in zip(quantities, whole.theta, certainty.deviation, certainty.tells, strict=True):
+    for one, theta, deviation, known in zip(quantities, whole.theta, certainty.deviation, certainty.determined, strict=True):
         value = value_of(rig, one.name)
-        middle, reach = (one.coordinate(value) if tells else float(theta)), NORMAL * float(deviation)
-        if one.name == LATENCY and tells:
+        middle, reach = (one.coordinate(value) if known else float(theta)), NORMAL * float(deviation)
+        if one.name == LATENCY and known:
             value, middle, reach = _latency(one, trial.period, middle, float(deviation))
         low, high = one.value(middle - reach), one.value(middle + reach)
         low = max(low, field_of(one.name).metadata["least"])
-        rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(tells)))
-    changes = {row.name: row.value for row in rows if row.told}
+        rows.append(Row(one.name, value_of(owner, one.name), value, low, high, bool(known)))
+    changes = {row.name: row.value for row in rows if row.determined}
     noise = {"electronics.pressure_noise": last.noise.pressure, "electronics.position_noise": last.noise.position}
     return Identified(tuple(rows), owner.replace({**changes, **noise}), last, certainty, last.noise, guessed_noise(trial))
 

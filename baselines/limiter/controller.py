@@ -260,14 +260,14 @@ class PortLimiter(StagedController):
         self.law.reset(lanes)
         super().reset(lanes)
 
-    def command(self, measurement: Measurement, reference: Reference, *told: Any, **options: Any) -> Array:
+    def command(self, measurement: Measurement, reference: Reference, *feedforward: Any, **options: Any) -> Array:
         """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
 
         ``options`` are those of the law, see ``COMMAND_OPTIONS``. Raises what the law raises; ``ValueError`` for openings
         that are none.
         """
         if self._stages is not None:
-            return super().command(measurement, reference, *told, **options)
+            return super().command(measurement, reference, *feedforward, **options)
         if measurement.position.ndim == 1:
             options = {name: np.asarray(given)[..., None] for name, given in options.items()}
             return self.command(*one_lane(measurement, reference), **options)[:, 0]

@@ -17,8 +17,8 @@ def slots_of(period: float) -> int:
 
 
 @helper
-def recall(kept: Array, newest: Array, slots: int, late: float, signals: Array, told: Array, i: int) -> None:
-    """Takes the ``signals`` (S, N) of now in lane ``i``, and writes those of ``late`` control periods ago into ``told`` (S, N).
+def recall(kept: Array, newest: Array, slots: int, late: float, signals: Array, then: Array, i: int) -> None:
+    """Takes the ``signals`` (S, N) of now in lane ``i``, and writes those of ``late`` control periods ago into ``then`` (S, N).
 
     ``kept`` (``slots`` S, N) is a ring, whose ``newest`` (N,) period is the last; NaN before the first one, which then counts
     as all that were before."""
@@ -34,5 +34,5 @@ def recall(kept: Array, newest: Array, slots: int, late: float, signals: Array, 
                 kept[slot * count + k, i] = signals[k, i]
         kept[head * count + k, i] = signals[k, i]
         later = kept[newer * count + k, i]
-        told[k, i] = later + (place - whole) * (kept[older * count + k, i] - later)
+        then[k, i] = later + (place - whole) * (kept[older * count + k, i] - later)
     newest[i] = head

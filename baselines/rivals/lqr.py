@@ -143,22 +143,14 @@ class LinearQuadratic(TrackingController):
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
-            "integral_tolerance": 1.828e-05,
-            "position_tolerance": 0.001036,
-            "speed_tolerance": 0.3138,
-            "force_tolerance": 5.517,
-            "friction_fraction": 0.865,
-            "dead_zone": 0.0,
+            "integral_tolerance": 1.828e-05, "position_tolerance": 0.001036, "speed_tolerance": 0.3138,
+            "force_tolerance": 5.517, "friction_fraction": 0.865, "dead_zone": 0.0,
         },
         "lab": {
-            "integral_tolerance": 2.639e-05,
-            "position_tolerance": 0.0003,
-            "speed_tolerance": 0.2182,
-            "force_tolerance": 1.6,
-            "friction_fraction": 0.9396,
-            "dead_zone": 0.0001245,
+            "integral_tolerance": 2.639e-05, "position_tolerance": 0.0003, "speed_tolerance": 0.2182,
+            "force_tolerance": 1.6, "friction_fraction": 0.9396, "dead_zone": 0.0001245,
         },
-    }
+    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, Any]:
         mass, tolerances = self.parameters.mechanics.mass, np.array([gains[name] for name in list(self.TUNABLE)[:4]])

@@ -111,22 +111,14 @@ class PositionPID(TrackingController):
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
-            "bandwidth": 73.04,
-            "damping": 0.4617,
-            "integral_rate": 30.0,
-            "pressure_gain": 395.6,
-            "friction_fraction": 0.8704,
-            "dead_zone": 0.0,
+            "bandwidth": 73.04, "damping": 0.4617, "integral_rate": 30.0, "pressure_gain": 395.6,
+            "friction_fraction": 0.8704, "dead_zone": 0.0,
         },
         "lab": {
-            "bandwidth": 44.27,
-            "damping": 0.5684,
-            "integral_rate": 9.951,
-            "pressure_gain": 340.8,
-            "friction_fraction": 0.8328,
-            "dead_zone": 7.737e-06,
+            "bandwidth": 44.27, "damping": 0.5684, "integral_rate": 9.951, "pressure_gain": 340.8,
+            "friction_fraction": 0.8328, "dead_zone": 7.737e-06,
         },
-    }
+    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
         return {name: gains[name] for name in Constants.groups if name in gains}

@@ -101,21 +101,14 @@ class NonlinearMPC:
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
-            "speed_tolerance": 0.002222,
-            "stiffness_tolerance": 598.6,
-            "flow_tolerance": 0.00262,
-            "bandwidth": 58.08,
-            "friction_fraction": 0.9648,
+            "speed_tolerance": 0.002222, "stiffness_tolerance": 598.6, "flow_tolerance": 0.00262,
+            "bandwidth": 58.08, "friction_fraction": 0.9648,
         },
         "lab": {
-            "speed_tolerance": 0.002222,
-            "stiffness_tolerance": 598.6,
-            "flow_tolerance": 0.00262,
-            "bandwidth": 58.08,
-            "pressure_bandwidth": 208.0,
-            "friction_fraction": 0.9648,
+            "speed_tolerance": 0.002222, "stiffness_tolerance": 598.6, "flow_tolerance": 0.00262,
+            "bandwidth": 58.08, "pressure_bandwidth": 208.0, "friction_fraction": 0.9648,
         },
-    }
+    }  # fmt: skip
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)

@@ -92,20 +92,14 @@ class SlidingMode(TrackingController):
     }
     TUNED: ClassVar[dict[str, dict[str, float]]] = {
         "ideal": {
-            "surface_rate": 72.36,
-            "reaching_rate": 2607.0,
-            "layer_rate": 14.79,
-            "friction_fraction": 0.2856,
+            "surface_rate": 72.36, "reaching_rate": 2607.0, "layer_rate": 14.79, "friction_fraction": 0.2856,
             "dead_zone": 1.763e-05,
         },
         "lab": {
-            "surface_rate": 28.38,
-            "reaching_rate": 955.9,
-            "layer_rate": 46.51,
-            "friction_fraction": 0.7042,
+            "surface_rate": 28.38, "reaching_rate": 955.9, "layer_rate": 46.51, "friction_fraction": 0.7042,
             "dead_zone": 0.0002013,
         },
-    }
+    }  # fmt: skip
 
     def _design(self, gains: dict[str, float]) -> dict[str, float]:
         return {"pneumatic_gain": PNEUMATIC_GAIN, **{name: gains[name] for name in Constants.groups if name in gains}}

@@ -77,10 +77,10 @@ def fill_measurement(rows: Array, measurement: Measurement) -> None:
         seen.acceleration[:] = measurement.acceleration
 
 
-def measurement_of(rows: Array, sampled: bool, feels: bool) -> Measurement:
-    """The measurement in a copy of the rows of ``Signals``, with an acceleration where a sensor ``feels`` it."""
+def measurement_of(rows: Array, sampled: bool, has_acceleration: bool) -> Measurement:
+    """The measurement in a copy of the rows of ``Signals``, with an acceleration where a sensor measures it."""
     seen = Signals(rows.copy())
     return Measurement(
         seen.time, seen.position, seen.position_time, seen.velocity, seen.pressure, seen.user_force, sampled,
-        seen.acceleration if feels else None,
+        seen.acceleration if has_acceleration else None,
     )  # fmt: skip

@@ -39,8 +39,8 @@ def from_file(kind: str, text: str) -> Any:
     """
     place, _, attribute = text.rpartition(":")
     path = Path(place)
-    # No package has a path for a name, whatever the file is called.
-    spec = importlib.util.spec_from_file_location(str(path.resolve()), path)
+    # No package has a path for a name, whatever the file is called; what stands before a dot would be a package, to pickle.
+    spec = importlib.util.spec_from_file_location(str(path.resolve()).replace(".", "_"), path)
     if not path.is_file() or spec is None or spec.loader is None:
         raise ValueError(f"{kind} file {str(path)!r} does not exist; allowed: path/to/file.py:Name")
     module = importlib.util.module_from_spec(spec)

@@ -59,7 +59,7 @@ WITHOUT = "only with birthsim live"
 """What the page says of a controller that is not compiled."""
 
 DAMPED = (BacksteppingController, AdmittanceController, TrackingController)
-"""Laws that can be told to damp more."""
+"""Laws whose damping can be raised."""
 
 INFO = {
     "joints": "piston_position", "position": "position", "velocity": "velocity", "target": "target",

@@ -101,5 +101,6 @@ def openings(law: Controller, name: str, rig: Parameters, numbers: Any) -> bytes
     if numbers.shape != (1 + ASKED,):
         raise ValueError(f"{numbers.size} numbers; allowed: {1 + ASKED}")
     sampled, rows = bool(numbers[0]), numbers[1:, None].copy()
-    feels = sampled and rig.electronics.acceleration_bandwidth > 0.0
-    return checked_command(name, law.command(measurement_of(rows, sampled, feels), Reference(rows[REFERENCE:])), 1).tobytes()
+    has_acceleration = sampled and rig.electronics.acceleration_bandwidth > 0.0
+    measurement = measurement_of(rows, sampled, has_acceleration)
+    return checked_command(name, law.command(measurement, Reference(rows[REFERENCE:])), 1).tobytes()

@@ -63,7 +63,7 @@ def recover(seed: int, duration: float, experiment: str) -> Result:
     found = identify(trial, owner, seed)
     rows = {
         row.name: {
-            "true": value_of(rig, row.name), "value": row.value, "low": row.low, "high": row.high, "told": row.told,
+            "true": value_of(rig, row.name), "value": row.value, "low": row.low, "high": row.high, "told": row.determined,
         } for row in found.rows
     }  # fmt: skip
     return {"rows": rows, "misfit": list(found.misfit)}

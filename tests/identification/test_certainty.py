@@ -64,4 +64,4 @@ def test_the_weakest_direction_is_named() -> None:
     assert sorted(name for name, _ in known.weakest[0].parts) == sorted(names)
     parts = dict(known.weakest[0].parts)
     assert parts[names[0]] * parts[names[1]] == pytest.approx(-0.5, abs=0.01)
-    assert known.tells.tolist() == [False, False, True]
+    assert known.determined.tolist() == [False, False, True]

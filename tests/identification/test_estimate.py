@@ -109,7 +109,7 @@ def test_with_noise_the_rig_is_within_its_intervals() -> None:
     rows = {row.name: row for row in found.rows}
     late = rows.pop(LATENCY)
     assert abs(late.value - (TRUE.electronics.position_latency - 0.5e-3)) < 5e-4  # 6 ms is shown in the sixth row
-    told = [row for row in rows.values() if row.told]
+    told = [row for row in rows.values() if row.determined]
     assert len(told) >= 12
     # Fifteen intervals of 95 %, and not a far miss.
     outside = [row.name for row in told if not row.low <= value_of(TRUE, row.name) <= row.high]
@@ -137,10 +137,10 @@ def test_what_the_log_cannot_tell_keeps_the_owners_value(tmp_path: Path) -> None
     found = identify(noisier(part(trial(), 500, 3000), 4e4, 1e-2), OWNER, 0)
     rows = {row.name: row for row in found.rows}
     kept = rows["friction.bristle_stiffness"]
-    assert not kept.told
+    assert not kept.determined
     assert kept.value == OWNER.friction.bristle_stiffness == found.rig.friction.bristle_stiffness
     assert kept.low < kept.value < kept.high
-    assert rows["valves.sonic_conductance"].told
+    assert rows["valves.sonic_conductance"].determined
     found.write(tmp_path / "rig.toml", "shaken.csv")
     text = (tmp_path / "rig.toml").read_text()
     assert "# friction.bristle_stiffness = 50000 N/m, KEPT: the log cannot tell it, it may be " in text

@@ -163,8 +163,8 @@ def test_the_last_entry_raises_the_damping_up_to_twice_and_lowers_it_never() -> 
     for _ in range(200):
         for law in laws:
             law.command(seen, wanted)
-        factors.append(laws[0].told[4])
-        assert not laws[1].told[4].any(), "a fixed impedance tells of no factor"
+        factors.append(laws[0].feedforward[4])
+        assert not laws[1].feedforward[4].any(), "a fixed impedance tells of no factor"
     fraction = 1 - np.exp(-np.arange(200) / 50)[:, None]
     np.testing.assert_allclose(factors, 2.0 ** np.maximum(fraction * actions[4], 0), rtol=1e-6)
     assert MOST_DAMPING == 2.0

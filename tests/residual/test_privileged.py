@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.residual.privileged import FIGURES, acting, told, true_figures
+from agents.residual.privileged import FIGURES, acting, true_figures, with_figures
 from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -62,4 +62,4 @@ def test_only_a_privileged_policy_is_told(make):
     seen = np.zeros((LANES, 4), np.float32)
     for privileged, length in ((False, 4), (True, 4 + FIGURES)):
         assert acting(np.shape, env, privileged)(seen) == (LANES, length)
-    np.testing.assert_array_equal(told(env, seen)[:, 4:], true_figures(env))
+    np.testing.assert_array_equal(with_figures(env, seen)[:, 4:], true_figures(env))

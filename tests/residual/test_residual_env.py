@@ -148,8 +148,8 @@ def told(monkeypatch):
 
     def spied(self, measurement, reference):
         openings = command(self, measurement, reference)
-        assert not self.told[4].any()
-        beliefs.append(self.told[:4])
+        assert not self.feedforward[4].any()
+        beliefs.append(self.feedforward[:4])
         return openings
 
     monkeypatch.setattr(ResidualActuation, "stages", None)

@@ -1,7 +1,7 @@
 """An acceleration sensor at the end effector, on two axes.
 
-It feels the mean acceleration of the control period that has just ended, behind a first-order low-pass. Gravity is taken off:
-the angles of the rig are known to a few mrad from its positions, and what that leaves, 10 m/s2 times those, counts as bias.
+It measures the mean acceleration of the control period that has just ended, behind a first-order low-pass. Gravity is taken
+off: positions give the angles of the rig to a few mrad, and what that leaves, 10 m/s2 times those, counts as bias.
 """
 
 from __future__ import annotations
