@@ -12,6 +12,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE)]
 
 import _generate  # noqa: E402
 from _generate import notebooks  # noqa: E402
+from _generate.figure import figure_role  # noqa: E402
 
 import birthsim_env  # noqa: E402
 from birthsim_live.rig.folder import packed_page, write_page  # noqa: E402
@@ -110,6 +111,7 @@ def build_rig(app, exception):
 
 def setup(app):
     """Write the generated parts before any page is read."""
+    app.add_role("figure", figure_role)
     app.connect("source-read", seen_from_the_site)
     app.connect("html-page-context", with_data)
     app.connect("html-page-context", with_rig)

@@ -27,6 +27,7 @@ STUDIES = {
     "fuzz": Entry("fuzz.command", "", "odd input to everything that is read or called"),
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
+    "learned": Entry("learned.study", "STUDY", "what the shipped policies take off their controllers' errors"),
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
     "mutation": Entry("mutation.command", "", "how many small changes of the code tests notice"),
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),

@@ -16,6 +16,9 @@ from baselines.work.sources import ROOT, hashes
 RESULTS = ROOT / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
+ENGINE = ("baselines/work/", "baselines/commands/", "studies/study.py", "studies/results.py")
+"""What reads options and keeps pieces, and decides no figure: a change of it makes no result stale."""
+
 Content = dict[str, Any]
 """What a file holds: ``command``, ``commit``, ``dirty``, ``date``, ``seconds``, ``pieces``, how many of them were there
 before, ``processor``, ``versions``, ``settings``, seeds among them, ``units``, ``figures``, and hashes of ``sources``."""
@@ -45,9 +48,10 @@ def read_result(name: str, folder: Path = RESULTS) -> Content | None:
 
 
 def changed(content: Content, modules: tuple[str, ...]) -> list[str]:
-    """Sources of ``modules`` that changed, came or went since a result was measured."""
+    """Sources of ``modules`` that changed, came or went since a result was measured, but for ``ENGINE``."""
     then, now = content["sources"], hashes(*modules)
-    return sorted(path for path in then.keys() | now.keys() if then.get(path) != now.get(path))
+    paths = (path for path in then.keys() | now.keys() if not path.startswith(ENGINE))
+    return sorted(path for path in paths if then.get(path) != now.get(path))
 
 
 def _lines(content: Any, indent: str = "\n") -> str:

@@ -19,6 +19,7 @@ from baselines.commands.settings import Configured
 from baselines.work.files import write_text
 from baselines.work.sources import ROOT
 from studies.door import OWN, STUDIES
+from studies.figures import figure
 from studies.results import changed, read_result
 from studies.study import Study
 
@@ -26,6 +27,7 @@ DATA, README = ROOT / "docs" / "data", ROOT / "README.md"
 ELSEWHERE = {"reference_scores.json": ROOT / "birthsim_env" / "scores.json"}
 """Texts that do not stand in ``DATA``."""
 
+_QUOTED = re.compile(r"(<!-- figure ([^>]+) -->)(.*?)(<!-- end -->)")
 _MARKED = re.compile(r"(<!-- results of (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -85,7 +87,8 @@ def rendered() -> dict[Path, str]:
     found = {path: text for name in names() for path, text in texts(name)}
     tables = {path.stem: text for path, text in found.items() if path.suffix == ".md"}
     readme = README.read_text(encoding="utf-8")
-    return found | {README: _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", readme)}
+    readme = _MARKED.sub(lambda mark: f"{mark[1]}{tables[mark[2]]}{mark[4]}", readme)
+    return found | {README: _QUOTED.sub(lambda mark: f"{mark[1]}{figure(mark[2])}{mark[4]}", readme)}
 
 
 def render() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from agents.policy.files import WEIGHTS, load_policy
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, number, penalize_lost, quantile
+from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile
 from birthsim_env.physics.compiled.lanes import Array
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
@@ -19,6 +20,10 @@ SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 
 SHOWN = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hunting_x", "hunting_y", "saturation", "air")
 """Metrics of the table over seeds, where an episode says something about them."""
+
+
+COLUMNS = ("metric", "unit", "statistic", "law", "residual", "low", "high")
+"""Of ``seed_figures``; low and high are the residual's interval."""
 
 
 def shipped_names() -> list[str]:
@@ -72,40 +77,33 @@ def pooled(values: Array) -> float:
 
 
 def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
-    """A Markdown table of law and residual over training seeds, on the episodes that the rig's strength suffices for.
+    """A Markdown table of ``seed_figures``."""
+    return as_table(seed_figures(law, residuals))
 
-    Interquartile means with 95 % bootstrap intervals over seeds and episodes, what the residual takes off the law's error,
-    and the pooled error of each seed.
+
+def seed_figures(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, Any]:
+    """Law and residual over training seeds, on the episodes that the rig's strength suffices for, as JSON takes it.
+
+    ``rows`` have ``COLUMNS``: interquartile means with 95 % bootstrap intervals over seeds and episodes, what the residual
+    takes off the law's error (None where most episodes are lost), and the pooled error of each seed.
     """
     feasible = np.asarray(law.required_strength_ratio) < 1.0
-    lines = [
-        f"{int(feasible.sum())} of {len(feasible)} episodes are within the rig's strength; {len(residuals)} training seeds.",
-        "",
-        f"| metric | unit | statistic | {law.controller} | residual | 95 % interval over seeds and episodes |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows: list[list[Any]] = []
 
     def sizes(evaluation: Evaluation, metric: str) -> Array:
         return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost))
 
-    def rows(metric: str, name: str, statistic: Callable[[Array], float]) -> None:
+    def add(metric: str, name: str, statistic: Callable[[Array], float]) -> None:
         matrix = np.stack([sizes(one, metric) for one in residuals])[:, feasible]
-        if np.isnan(matrix).all():
-            return
-        figures = [statistic(sizes(law, metric)[feasible]), statistic(matrix)]
-        low, high = (number(bound) for bound in crossed_interval(statistic, matrix))
-        shown = " | ".join(number(figure) for figure in figures)
-        lines.append(f"| {metric} | {UNITS[metric]} | {name} | {shown} | {low} to {high} |")
+        if not np.isnan(matrix).all():
+            figures = [statistic(sizes(law, metric)[feasible]), statistic(matrix)]
+            rows.append([metric, UNITS[metric], name, *figures, *crossed_interval(statistic, matrix)])
 
     for metric in SHOWN:
-        rows(metric, "interquartile mean", interquartile_mean)
-    for name, statistic in (
-        ("pooled RMS", pooled),
-        ("median", _fraction(0.5)),
-        ("95 %", _fraction(0.95)),
-        ("max", _fraction(1.0)),
-    ):
-        rows("settled_rms", name, statistic)
+        add(metric, "interquartile mean", interquartile_mean)
+    fractions = (("median", 0.5), ("95 %", 0.95), ("max", 1.0))
+    for name, statistic in (("pooled RMS", pooled), *((name, _fraction(part)) for name, part in fractions)):
+        add("settled_rms", name, statistic)
     base = sizes(law, "settled_rms")
     matrix = np.stack([sizes(one, "settled_rms") for one in residuals])
     both = np.stack([np.broadcast_to(base, matrix.shape), matrix], axis=-1)
@@ -114,20 +112,38 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
         def less(values: Array, statistic: Callable[[Array], float] = statistic) -> float:
             return 100 * (1 - statistic(values[..., 1]) / statistic(values[..., 0]))
 
-        off, interval = less(both[:, feasible]), ""
-        if np.isfinite(off):
-            low, high = crossed_interval(less, both[:, feasible])
-            interval = f"{low:.1f} to {high:.1f}"
-        shown = f"{off:.1f}" if interval else "most episodes are lost"
-        lines.append(f"| settled_rms | % | less, {name} | | {shown} | {interval} |")
-    each = ", ".join(number(pooled(row[feasible])) for row in matrix)
-    lost = ", ".join(str(sum(one.lost)) for one in residuals)
-    whole = f"pooled RMS of all {len(feasible)} episodes"
-    lines += [
-        f"| settled_rms | mm | pooled RMS of each seed | | {each} | |",
-        f"| settled_rms | mm | {whole} | {number(pooled(base))} | {number(pooled(matrix))} | |",
-        f"| lost | | episodes; {LOST_ERROR:g} mm in a pooled RMS | {sum(law.lost)} | {lost} | |",
+        off = less(both[:, feasible])
+        said = [off, *crossed_interval(less, both[:, feasible])] if np.isfinite(off) else [None] * 3
+        rows.append(["settled_rms", "%", f"less, {name}", None, *said])
+    each, lost = [pooled(row[feasible]) for row in matrix], [int(sum(one.lost)) for one in residuals]
+    rows += [
+        ["settled_rms", "mm", "pooled RMS of each seed", None, each, None, None],
+        ["settled_rms", "mm", f"pooled RMS of all {len(feasible)} episodes", pooled(base), pooled(matrix), None, None],
+        ["lost", "", f"episodes; {LOST_ERROR:g} mm in a pooled RMS", int(sum(law.lost)), lost, None, None],
     ]
+    counts = {"within": int(feasible.sum()), "episodes": len(feasible), "seeds": len(residuals)}
+    found: dict[str, Any] = jsonable({**counts, "law": law.controller, "columns": list(COLUMNS), "rows": rows})
+    return found
+
+
+def as_table(found: dict[str, Any]) -> str:
+    """Markdown of what ``seed_figures`` gives."""
+    lines = [
+        f"{found['within']} of {found['episodes']} episodes are within the rig's strength; {found['seeds']} training seeds.",
+        "",
+        f"| metric | unit | statistic | {found['law']} | residual | 95 % interval over seeds and episodes |",
+        "|---|---|---|---|---|---|",
+    ]
+    for metric, unit, name, law, residual, low, high in found["rows"]:
+
+        def text(value: Any, digits: str = ".1f" if name.startswith("less") else ".3g") -> str:
+            if isinstance(value, list):
+                return ", ".join(map(text, value))
+            return "" if value is None else str(value) if isinstance(value, int | str) else f"{value:{digits}}"
+
+        interval = "" if low is None else f"{text(low)} to {text(high)}"
+        shown = "most episodes are lost" if residual is None else text(residual)
+        lines.append(f"| {metric} | {unit} | {name} | {text(law)} | {shown} | {interval} |".replace("|  |", "| |"))
     return "\n".join(lines)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import math
 import os
 import shutil
 import signal
-import socket
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,30 +16,24 @@ from typing import Any, BinaryIO
 from filelock import FileLock, Timeout
 
 _PARTIAL = ".partial"
-LEFTOVERS = f".*{_PARTIAL}"
-"""Pattern of the names of what is not complete."""
+"""Ending of the hidden names of what is not complete."""
 
 _ENDING = [signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if name in signal.Signals.__members__]
-_HOST = socket.gethostname().replace("-", "_")
 
 
 def make_folder(path: Path) -> Path:
-    """The folder ``path``, made if it is missing, without what killed processes left; ``ValueError`` where that cannot be."""
+    """The folder ``path``, made if it is missing, without hidden files that killed processes left; ``ValueError`` where that
+    cannot be."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise ValueError(f"--out {str(path)!r} is a file; allowed: a folder, or a name for a new one") from None
     except OSError as error:
         raise ValueError(f"--out {str(path)!r} cannot be made ({error.strerror}); allowed: a folder to write to") from error
-    remove_leftovers(path.rglob(LEFTOVERS))
-    return path
-
-
-def remove_leftovers(found: Iterable[Path]) -> None:
-    """Remove hidden files and folders that killed processes left; those of a process that may still run stay."""
-    for leftover in found:
+    for leftover in path.rglob(f".*{_PARTIAL}"):
         if not _is_written(leftover):
             shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
+    return path
 
 
 @contextmanager
@@ -55,17 +47,15 @@ def own_folder(path: Path) -> Iterator[Path]:
         with FileLock(path / ".lock", timeout=0):
             yield path
     except Timeout:
-        raise ValueError(
-            f"--out {str(path)!r} is in use by another process; allowed: to wait for it, or another folder"
-        ) from None
+        said = f"--out {str(path)!r} is in use by another process; allowed: to wait for it, or another folder"
+        raise ValueError(said) from None
 
 
 @contextmanager
-def whole_file(path: Path, new: bool = False) -> Iterator[BinaryIO]:
+def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A binary file to write to, which becomes ``path`` at the end; nothing of it stays where something is raised.
 
     It is on the disk before it has its name. A process that is killed leaves a hidden file, which ``make_folder`` removes.
-    A ``new`` file replaces none: ``FileExistsError`` where there is one.
     """
     partial = _partial(path)
     try:
@@ -73,7 +63,7 @@ def whole_file(path: Path, new: bool = False) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        _link(partial, path) if new else partial.replace(path)
+        partial.replace(path)
     except OSError as error:
         if error.errno is not None:
             # A full disk does not say which file it had no room for, and others say the hidden name.
@@ -139,28 +129,14 @@ def finite(content: Any) -> Any:
 
 def _partial(path: Path) -> Path:
     """The hidden name of what this process writes and ``path`` will be."""
-    return path.with_name(f".{path.name}.{_HOST}-{os.getpid()}{_PARTIAL}")
-
-
-def _link(partial: Path, path: Path) -> None:
-    """Give a file the name ``path``; ``FileExistsError`` where another one has it."""
-    try:
-        os.link(partial, path)
-    except FileExistsError:
-        raise
-    except OSError:  # a disk without hard links
-        if path.exists():
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
-        partial.replace(path)
+    return path.with_name(f".{path.name}.{os.getpid()}{_PARTIAL}")
 
 
 def _is_written(partial: Path) -> bool:
-    """Whether the process that writes a hidden file may still run: one of another host always may."""
-    host, _, process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2].rpartition("-")
+    """Whether the process that writes a hidden file may still run."""
+    process = partial.name.removesuffix(_PARTIAL).rpartition(".")[2]
     try:
-        os.kill(int(process) if host == _HOST and process.isdecimal() else os.getpid(), 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # it is another user's
-        return True
+        os.kill(int(process) if process.isdecimal() else os.getpid(), 0)
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)  # it may be another user's
     return True

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from optuna.storages import JournalStorage
-
-
-class _NoLock:
-    """Instead of Optuna's lock file, which outlives a process that is killed: the folder has one owner already."""
-
-    def acquire(self) -> bool:
-        return True
-
-    def release(self) -> None:
-        pass
 
 
 def open_journal(path: Path) -> JournalStorage:
@@ -25,9 +17,6 @@ def open_journal(path: Path) -> JournalStorage:
     from optuna.storages.journal import JournalFileBackend
 
     if path.exists():
-        content = path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            with path.open("r+b") as file:
-                file.truncate(whole)
-    return JournalStorage(JournalFileBackend(str(path), cast(Any, _NoLock())))
+        os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
+    # Optuna's own lock file outlives a process that is killed: the folder has one owner already.
+    return JournalStorage(JournalFileBackend(str(path), cast(Any, threading.Lock())))

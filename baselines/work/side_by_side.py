@@ -59,10 +59,9 @@ def _in_processes(work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], job
         # joblib says how many pieces an early end cancels.
         stack.enter_context(warnings.catch_warnings(action="ignore", category=UserWarning))
         stack.enter_context(parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1, **own))
-        # Trackers of semaphores begin before any worker: to begin one takes the mask away.
-        with _unheard(), _without_warnings():
-            resource_tracker.ensure_running()
-        with _unheard(), _without_warnings():
+        with _unheard(quiet=True):
+            resource_tracker.ensure_running()  # before any worker: to begin one takes the mask away
+        with _unheard(quiet=True):
             parallel = stack.enter_context(Parallel(return_as="generator_unordered", batch_size=1))
         with _unheard():
             outcomes = stack.enter_context(closing(parallel(calls)))
@@ -73,28 +72,19 @@ def _in_processes(work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], job
 
 
 @contextmanager
-def _unheard() -> Iterator[None]:
-    """Processes that begin here begin without hearing ``_PARENTS``.
+def _unheard(quiet: bool = False) -> Iterator[None]:
+    """Processes that begin here begin without hearing ``_PARENTS``; ``quiet`` ones do not warn of a killed parent's traces.
 
     A worker imports for seconds, in which Ctrl-C would make it complain; joblib's tracker of semaphores would die of SIGHUP.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS)
+    mask, warned = signal.pthread_sigmask(signal.SIG_BLOCK, _PARENTS), os.environ.get("PYTHONWARNINGS")
+    os.environ |= {"PYTHONWARNINGS": "ignore"} if quiet else {}
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """A tracker that begins here removes what a killed parent has left, and says nothing of it."""
-    before = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = "ignore"
-    try:
-        yield
-    finally:
-        del os.environ["PYTHONWARNINGS"]
-        os.environ |= {} if before is None else {"PYTHONWARNINGS": before}
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        os.environ.pop("PYTHONWARNINGS", None)
+        os.environ |= {} if warned is None else {"PYTHONWARNINGS": warned}
 
 
 def _begin_worker(parent: int) -> None:

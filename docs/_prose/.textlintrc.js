@@ -15,7 +15,7 @@ module.exports = {
   filters: { comments: true },
   rules: {
     terminology: { defaultTerms: false, terms },
-    // About 35 words.
-    "sentence-length": { max: 200 },
+    // About 35 words; the name of a quoted figure is none of them.
+    "sentence-length": { max: 200, skipPatterns: ["/\\{figure\\}`[^`]*`/", "/<!-- .*? -->/"] },
   },
 };

@@ -1,0 +1,1 @@
+"""Policies of all training seeds beside their controllers."""

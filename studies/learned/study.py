@@ -1,0 +1,135 @@
+"""What the shipped policies take off their controllers' errors, on worlds that no training used."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from agents.commands.evaluate import evaluate_learned
+from agents.policy.files import WEIGHTS
+from agents.policy.seeds import as_table, policy_folders, seed_figures
+from baselines.bench.evaluation import merged
+from baselines.bench.evaluation_data import DATA, data
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
+from baselines.work.sources import ROOT
+from baselines.work.tasks import Task
+from birthsim_env.physics.rig.parameters import load_parameters
+from studies.results import Content
+from studies.study import Found, Options, Study
+
+
+class Run(NamedTuple):
+    """Where the seeds of a policy run beside controllers."""
+
+    environment: str
+    episodes: int
+    seed: int
+    controllers: tuple[str, ...] = ("backstepping", "backstepping-force-first")
+    sensors: str = "ideal"
+    rig: str | None = None
+
+
+RUNS = {
+    "circle": Run("BirthSIM/Circle-v1", 256, 20000),
+    "probe": Run("BirthSIM/Probe-v2", 128, 20000),
+    "descent": Run("BirthSIM/Descent-v1", 64, 20000),
+    "forceps": Run("BirthSIM/Forceps-v1", 128, 20000),
+    "dystocia": Run("BirthSIM/Dystocia-v1", 128, 20000),
+    "circle_lab": Run("BirthSIM/Circle-v1", 256, 20000, ("admittance-backstepping",), "lab"),
+    "circle_pure": Run("BirthSIM/Circle-v1", 64, 20000, ("backstepping",)),
+    "circle_honest_student": Run(
+        "BirthSIM/Circle-v1", 128, 170000, ("admittance-sensorless", "backstepping-force-first"), "honest",
+        "examples/honest_sensors_rig.toml",
+    ),
+}  # fmt: skip
+"""Policy -> its run; seeds were never used for training or design."""
+
+
+def _pieces(policy: str) -> dict[str, list[Task]]:
+    """Controller or seed -> its pieces."""
+    run = RUNS[policy]
+    rig = load_parameters(ROOT / run.rig if run.rig else None)
+    world, span = {"sensors": run.sensors, "randomize": True}, (run.episodes, run.seed)
+    found = {
+        name: evaluation_tasks(f"{policy}-{name}", controller_settings(name, rig), run.environment, world, *span)
+        for name in run.controllers
+    }  # fmt: skip
+    for place in policy_folders(policy):
+        network = file_hash(str(place / WEIGHTS))
+        own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
+        found[place.name] = evaluation_tasks(f"{policy}-{place.name}", own, run.environment, world, *span, evaluate_learned)
+    return found
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    every = [(policy, who, pieces) for policy in options.policy for who, pieces in _pieces(policy).items()]
+    return {(policy, who, k): task for policy, who, pieces in every for k, task in enumerate(pieces)}
+
+
+def _kept(options: Options, found: Found) -> Any:
+    kept = {}
+    for policy in options.policy:
+        names = dict.fromkeys(who for one, who, _ in found if one == policy)
+        every = {
+            who: gathered(who, [result for (one, own, _), result in found.items() if (one, own) == (policy, who)])
+            for who in names
+        }  # fmt: skip
+        controllers, seeds = (
+            [one for who, one in every.items() if (who in RUNS[policy].controllers) == classical] for classical in (True, False)
+        )
+        together = [*controllers, merged(seeds, f"residual, {len(seeds)} seeds")]
+        kept[policy] = {
+            "beside": {one.controller: seed_figures(one, seeds) for one in controllers},
+            "metrics": {"columns": list(DATA), "rows": list(csv.reader(io.StringIO(data(together))))[1:]},
+        }
+    return kept
+
+
+def _shown(content: Content) -> dict[str, str]:
+    parts, rows = [], [["policy", *DATA]]
+    for policy, found in content["figures"].items():
+        run = RUNS[policy]
+        world = f"{run.environment}, {run.episodes} episodes from seed {run.seed}, {run.sensors} sensors, randomised rigs."
+        parts += [f"## {policy}", world, *map(as_table, found["beside"].values())]
+        rows += [[policy, *row] for row in found["metrics"]["rows"]]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    figures = content["figures"]
+    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": _summary(figures)}
+
+
+def _summary(figures: dict[str, Any]) -> str:
+    """Pooled errors of each scenario's policy beside its controllers."""
+    head = ["scenario", "paper's law, mm", "controller underneath, mm", "with the residual, mm", "less than the paper's law, %"]
+    lines = [head, ["---"] * len(head)]
+    for policy in ("circle", "probe", "forceps", "dystocia", "descent"):
+        if policy in figures:
+            own = {name: _row(found, "pooled RMS") for name, found in figures[policy]["beside"].items()}
+            paper, under = (own[name] for name in RUNS[policy].controllers)
+            less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
+            off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
+            lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
+    """The row of the settled error's ``statistic``."""
+    return next(row for row in found["rows"] if row[0] == "settled_rms" and row[2] == statistic)
+
+
+def _pictures(content: Content, folder: Path) -> list[Path]:
+    # pyplot takes half a second to load.
+    from agents.reports.learning_curves import draw_learning_curves, learning_curves
+
+    draw_learning_curves(learning_curves(policy_folders("circle")), folder)
+    return [folder / "learning_curves.png"]
+
+
+STUDY = Study(
+    ("agents.commands.evaluate", "studies.learned.study"), {"policy": tuple(RUNS)}, _tasks, _kept,
+    {"settled_rms": "mm", "stiffness_error": "%", "air": "l/min", "saturation": "%"}, _shown, _pictures,
+    allowed={"policy": tuple(RUNS)}, words={"policy": "shipped policies, each in its own worlds"},
+)  # fmt: skip
