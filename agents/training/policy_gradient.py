@@ -29,9 +29,6 @@ from agents.training.validation import SEED_SPACING, TRAINING_SEED
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
 
-BEGINNING = 0.01
-"""Standard deviation of the weights of the last layer at the beginning."""
-
 MOMENTS = (0.9, 0.99)
 """Of Adam; an update is a gradient of length one, so that one bad horizon moves no more than another."""
 
@@ -56,7 +53,7 @@ class Normalized:
 
 
 class PolicyGradient:
-    """Learns in the lanes of ``env``, ``settings.rollout`` policy steps at a time; the policy begins with hardly any action."""
+    """Learns in the lanes of ``env``, ``settings.rollout`` policy steps at a time; the policy begins with actions of zero."""
 
     def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None:
         self._settings, self._folder, self.steps = settings, folder, 0
@@ -65,8 +62,7 @@ class PolicyGradient:
         inputs, outputs = env.single_observation_space.shape[0], env.single_action_space.shape[0]
         widths = (inputs, *settings.hidden, outputs)
         layers = [torch.nn.Linear(width, wide) for width, wide in pairwise(widths)]
-        # Nearly zero, as other trainings begin: at zero itself valves have no slope.
-        torch.nn.init.normal_(layers[-1].weight, std=BEGINNING)
+        torch.nn.init.zeros_(layers[-1].weight)
         torch.nn.init.zeros_(layers[-1].bias)
         self._policy = torch.nn.Sequential(*(part for layer in layers for part in (layer, torch.nn.Tanh())))
         self._adam = torch.optim.Adam(self._policy.parameters(), lr=settings.learning_rate, betas=MOMENTS)

@@ -79,7 +79,7 @@ def test_observations_state_and_motion_have_gradients() -> None:
     """Openings drive pistons: what an observed error, the true place and a piston say of it is the same."""
     env = lanes_of("valves")
     recorder = Recorder(env.simulation)
-    env.step(np.full((LANES, 4), 0.05))
+    env.step(np.zeros((LANES, 4)))
     back = recorder.taken()
     seen, motion = np.zeros(env.observation_space.shape), np.zeros((4, LANES))
     seen[:, 0], motion[0] = 0.01, 1.0

@@ -1,7 +1,7 @@
 """Reverse and forward mode on a graph: the operations of a vector-Jacobian or a Jacobian-vector product are appended to it.
 
-At kinks derivatives are one-sided: of a tie in ``max(a, b)`` or ``min(a, b)`` they are those of ``b``, of ``abs(0)`` that of
-its negative side; the square root of 0 has slope 0.
+At kinks derivatives are one-sided: of a tie in ``max(a, b)`` or ``min(a, b)`` they are those of ``a``, of ``abs(0)`` that of
+its negative side; the square root of 0 has slope 0. So a spool at zero opens both of its orifices, either of which it can.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ RULES: dict[str, Callable[..., list[Term]]] = {
     "neg": lambda graph, y, a, g: [(a, -g)],
     "sqrt": lambda graph, y, a, g: [(a, graph.select(y > 0.0, 0.5 * g / y, 0.0))],
     "abs": lambda graph, y, a, g: [(a, graph.select(a > 0.0, g, -g))],
-    "max": lambda graph, y, a, b, g: _larger(graph, a > b, a, b, g),
-    "min": lambda graph, y, a, b, g: _larger(graph, a < b, a, b, g),
+    "max": lambda graph, y, a, b, g: _larger(graph, a >= b, a, b, g),
+    "min": lambda graph, y, a, b, g: _larger(graph, a <= b, a, b, g),
     "where": _chosen,
     "copysign": lambda graph, y, a, b, g: [(a, graph.select(a == y, g, -g))],
     "exp": lambda graph, y, a, g: [(a, g * y)],
@@ -96,7 +96,7 @@ def forward(graph: Graph, outputs: Iterable[Scalar], seeds: Mapping[Value, Scala
             operation, *arguments = graph.nodes[k]
             if operation in ("where", "max", "min"):
                 a, b = arguments[-2:]
-                condition = arguments[0] if operation == "where" else a > b if operation == "max" else a < b
+                condition = arguments[0] if operation == "where" else a >= b if operation == "max" else a <= b
                 dots[k] = graph.select(condition, of(a), of(b))
             else:
                 parts = [of(a) if slope is ONE else slope * of(a) for a, slope in _terms(graph, k, ONE, active)]
