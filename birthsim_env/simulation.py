@@ -230,7 +230,7 @@ class Simulation:
             self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
 
     def _places(self) -> tuple[list[Place], list[Place]]:
-        """Where the arrays of this class stand in a block: in the world, and in what is seen."""
+        """Where the arrays of this class stand in a block: in ``World`` and in ``Seen``."""
         plant, lanes, actuation = self.plant, self.plant.num_envs, self.actuation
         self._opens, self._sampled = actuation, self.sensors.sampled
         if len(self.action) != actuation.size:
@@ -258,7 +258,7 @@ class Simulation:
         return [self._put_out] if hasattr(self.sensors, "put_out") else []
 
     def rows(self) -> tuple[Array, Array]:
-        """Copies of the rows of the world and of what is seen now, (WORLD, N) and (SEEN, N)."""
+        """Copies of the rows of ``World`` and ``Seen`` now, (WORLD, N) and (SEEN, N)."""
         world, seen = (np.zeros((count, self.plant.num_envs)) for count in (at.WORLD, at.SEEN))
         for rows, places in zip((world, seen), self._places(), strict=True):
             for array, row in places:

@@ -108,7 +108,7 @@ def crossed_interval(statistic: Callable[[Array], float], values: ArrayLike, res
 
 
 def paired_ratios(mine: ArrayLike, reference: ArrayLike) -> Array:
-    """Sizes of ``mine`` (N,) over those of ``reference`` (N,), episode by episode.
+    """Magnitudes of ``mine`` (N,) over those of ``reference`` (N,), episode by episode.
 
     Equal ones give 1, two lost episodes and two zeros among them; NaN where either says nothing.
     """
