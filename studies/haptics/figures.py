@@ -11,8 +11,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
+from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
+from studies.figures import label_of, log_ticks, look
 from studies.haptics import coupled
 from studies.haptics.coupled import stable_up_to
 from studies.haptics.release import PULL, STIFFNESS

@@ -1,7 +1,5 @@
 """Statistics of episodes: lost ones, quantiles, bootstrap intervals against exact distributions, paired ratios."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import product
@@ -10,19 +8,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from baselines.bench import statistics
 from baselines.bench.statistics import (
     LEVEL,
     LOST_ERROR,
     jsonable,
-    median_interval,
     number,
-    paired_ratios,
     penalize_lost,
     quantile,
     summarize,
-    summary_with_interval,
 )
+from studies.comparison import paired
+from studies.comparison.paired import median_interval, paired_ratios, summary_with_interval
 
 INF, NAN = math.inf, math.nan
 
@@ -82,24 +78,8 @@ def test_bootstrap_interval_is_that_of_the_exact_bootstrap_distribution(count):
 def test_of_an_even_number_the_resampled_median_is_the_mean_of_the_middle_two(monkeypatch):
     values = (0.0, 1.0, 3.0, 7.0)
     medians = np.sort([np.median(chosen) for chosen in product(values, repeat=4)])
-    monkeypatch.setattr(statistics, "LEVEL", 0.5)
+    monkeypatch.setattr(paired, "LEVEL", 0.5)
     assert median_interval(values) == (medians[64], medians[191])
-
-
-def test_bootstrap_interval_is_scipys():
-    values = np.random.default_rng(8).exponential(size=32)
-    theirs = stats.bootstrap((values,), np.median, n_resamples=9999, method="percentile", rng=np.random.default_rng(1))
-    assert median_interval(values) == pytest.approx(tuple(theirs.confidence_interval), rel=0.05)
-
-
-def test_bootstrap_interval_covers_the_true_median_as_often_as_it_says():
-    rng = np.random.default_rng(0)
-    inside = 0
-    for _ in range(1000):
-        low, high = median_interval(rng.exponential(size=32))
-        inside += low <= math.log(2) <= high
-    # Three standard errors of 1000 trials are 2 %; the percentile bootstrap is known to be a little narrow.
-    assert 0.92 < inside / 1000 < 0.975
 
 
 def test_the_interval_is_the_same_at_every_call_whatever_the_order_and_ignores_what_says_nothing():
