@@ -17,7 +17,7 @@ from birthsim_env.physics.compiled.lanes import Array
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""
 
-METRICS = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hunting_x", "hunting_y", "saturation", "air")
+SHOWN = ("settled_rms", "settled_rms_x", "settled_rms_y", "stiffness_error", "hunting_x", "hunting_y", "saturation", "air")
 """Metrics of the table over seeds, where an episode says something about them."""
 
 
@@ -97,7 +97,7 @@ def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
         shown = " | ".join(number(figure) for figure in figures)
         lines.append(f"| {metric} | {UNITS[metric]} | {name} | {shown} | {low} to {high} |")
 
-    for metric in METRICS:
+    for metric in SHOWN:
         rows(metric, "interquartile mean", interquartile_mean)
     for name, statistic in (
         ("pooled RMS", pooled),

@@ -13,7 +13,7 @@ from matplotlib import pyplot as plt
 from baselines.figures.runs import DARK, MIDDLE, STYLE, legend_below, save
 from studies.comparison.grid import known
 from studies.comparison.tables import CIRCLE, Figures, controllers_of
-from studies.figures import label_of, log_ticks, look
+from studies.looks import label_of, log_ticks, look
 
 CONDITIONS = {
     ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},

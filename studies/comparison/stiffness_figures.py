@@ -15,7 +15,7 @@ from matplotlib.ticker import NullFormatter
 
 from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
-from studies.figures import label_of, look
+from studies.looks import label_of, look
 
 Study = Mapping[str, dict[str, Any]]
 """Label of a controller -> its result, as ``studies.comparison.stiffness`` returns it."""

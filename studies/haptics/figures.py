@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 
 from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
-from studies.figures import label_of, log_ticks, look
 from studies.haptics import coupled
 from studies.haptics.coupled import stable_up_to
 from studies.haptics.release import PULL, STIFFNESS
 from studies.haptics.rendering import PEAKS
 from studies.haptics.tables import PEAK
+from studies.looks import label_of, log_ticks, look
 from studies.stability.figure import stability_figure
 
 Runs = Sequence[dict[str, Any]]

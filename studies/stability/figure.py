@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.figures.runs import ACCENT, DARK, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
-from studies.figures import label_of
+from studies.looks import label_of
 
 RANGE = (0.01, 100.0)
 """mm, of the colours."""

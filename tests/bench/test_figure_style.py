@@ -17,7 +17,7 @@ from baselines.figures import runs as figures
 from baselines.figures.runs import save
 from studies.comparison.figure import CONDITIONS, draw_comparison
 from studies.comparison.stiffness_figures import draw_studies
-from studies.figures import COLOURS, look
+from studies.looks import COLOURS, look
 from studies.stability.figure import stability_figure
 
 ROOT = Path(__file__).resolve().parent.parent.parent
