@@ -230,7 +230,7 @@ class Simulation:
             self.actuation.explain(self.measurement, self.reference)  # type: ignore[attr-defined]
 
     def _places(self) -> tuple[list[Place], list[Place]]:
-        """Where the arrays of this class stand in a block: in ``World`` and in ``Seen``."""
+        """Where the arrays of this class stand in a block: in the world, and in what is seen."""
         plant, lanes, actuation = self.plant, self.plant.num_envs, self.actuation
         self._opens, self._sampled = actuation, self.sensors.sampled
         if len(self.action) != actuation.size:
