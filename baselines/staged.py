@@ -155,7 +155,7 @@ class StagedController:
         return self._loop.run()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of what is seen."""
+        """Arrays of a derived class, once prepared, that its stages read or write besides, with their rows of ``Seen``."""
         return []
 
 
@@ -205,7 +205,7 @@ class CompiledDriving(Driving):
         return self.controller.stages()
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Arrays that the loop places in rows of what is seen."""
+        """Arrays that the loop places in rows of ``Seen``."""
         own = self.controller.more_rows(lanes)
         if self.controller.asks:
             return own

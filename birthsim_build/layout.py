@@ -1,6 +1,6 @@
 """Names, units and numbers of the rows that a built loop shares with whoever runs it: the one source of header and JavaScript.
 
-Rows are doubles, one lane. First the world, then what is seen, as in ``birthsim_env.loop.rows``; then the inputs, with which a
+Rows are doubles, one lane. First ``World``, then ``Seen``, as in ``birthsim_env.loop.rows``; then the inputs, with which a
 person or another program acts on a loop that has its own scenario.
 """
 

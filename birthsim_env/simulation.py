@@ -266,7 +266,7 @@ class Simulation:
         return [self._put_out] if hasattr(self.sensors, "put_out") else []
 
     def rows(self) -> tuple[Array, Array]:
-        """Copies of the rows of the world and of what is seen now, (WORLD, N) and (SEEN, N)."""
+        """Copies of the rows of ``World`` and ``Seen`` now, (WORLD, N) and (SEEN, N)."""
         world, seen = (np.zeros((count, self.plant.num_envs)) for count in (at.WORLD, at.SEEN))
         for rows, places in zip((world, seen), self.places(), strict=True):
             for array, row in places:

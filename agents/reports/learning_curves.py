@@ -14,7 +14,7 @@ from baselines.bench.statistics import crossed_interval, interquartile_mean
 from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
 
-SHOWN = (
+FIGURES = (
     ("pooled_mm", "pooled settled error (mm)"),
     ("tail_mm", "settled error, 95 % quantile (mm)"),
     ("stiffness_error_percent", "error along the push (%)"),
@@ -34,7 +34,7 @@ def _learning_curve(file: Path) -> dict[str, Any]:
     try:
         training = dict(json.loads(file.read_text(encoding="utf-8")))
         for figures in (training["law"], *training["curve"]):
-            for name, _ in SHOWN:
+            for name, _ in FIGURES:
                 _number(figures[name])
         for steps in [training["curve"][0], *training["curve"]]:
             float(steps["steps"])
@@ -66,7 +66,7 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
     """Draw ``learning_curves`` (PNG and SVG) with the law as a line; nothing without trainings."""
     if not trainings:
         return []
-    curves = [(key, label, *over_seeds(trainings, key)) for key, label in SHOWN]
+    curves = [(key, label, *over_seeds(trainings, key)) for key, label in FIGURES]
     said = [curve for curve in curves if np.isfinite(curve[-1]).any()]
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(1, len(said), figsize=(2.6 * len(said), 3.2), layout="constrained", squeeze=False)

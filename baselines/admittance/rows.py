@@ -69,7 +69,7 @@ class Beliefs(Numbers):
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
     learns_noise = number("1", "1 where the tracker's noise is learned")
-    place = number("1", "row of what is seen at which a ``Point`` stands")
+    place = number("1", "row of ``Seen`` at which a ``Point`` stands")
     rows_of_memory = number("1", "rows of the memory")
     trust = number("1", "trust in a pressure cell, 0 to 1")
     friction_fraction = number("1", "fraction of the believed friction that is fed forward")

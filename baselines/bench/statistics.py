@@ -8,16 +8,12 @@ infinite too, and print as "lost". NaN is an episode that says nothing about a m
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from birthsim_env.physics.compiled.lanes import Array
-
-RESAMPLES = 9999
-"""Bootstrap samples of an interval: 0.2 % of the interval's width in error."""
 
 LEVEL = 0.95
 """Confidence of the intervals."""
@@ -39,7 +35,7 @@ def penalize_lost(values: ArrayLike, lost: ArrayLike, applies: bool | None = Non
 
 def quantile(values: ArrayLike, fraction: float) -> float:
     """Quantile by linear interpolation; infinite where it leans on an infinite value, NaN without values. NaNs are ignored."""
-    said = np.sort(_said(values))
+    said = np.sort(given_in(values))
     if said.size == 0:
         return float("nan")
     place = fraction * (said.size - 1)
@@ -49,7 +45,7 @@ def quantile(values: ArrayLike, fraction: float) -> float:
 
 def summarize(values: ArrayLike) -> dict[str, float]:
     """Median, mean, 95 % quantile and maximum, the latter two of the sizes; NaNs are ignored, and the answer to no value."""
-    said = _said(values)
+    said = given_in(values)
     return {
         "median": quantile(said, 0.5),
         "mean": float(np.mean(said)) if said.size else float("nan"),
@@ -58,33 +54,12 @@ def summarize(values: ArrayLike) -> dict[str, float]:
     }
 
 
-@cache
-def _middles(count: int) -> NDArray[np.intp]:
-    """Ranks (RESAMPLES, 2) of the two middle values in resamples of ``count`` sorted values, from a fixed seed."""
-    ranks = np.sort(np.random.default_rng(count).integers(count, size=(RESAMPLES, count)), axis=1)
-    return ranks[:, [(count - 1) // 2, count // 2]]
-
-
-def median_interval(values: ArrayLike) -> tuple[float, float]:
-    """95 % interval of the median: percentile bootstrap over the values (Efron 1979), the same at every call.
-
-    A bound is infinite where a lost episode decides it; both are NaN without values. NaNs are ignored.
-    """
-    said = np.sort(_said(values))
-    if said.size == 0:
-        return float("nan"), float("nan")
-    medians = np.sort(said[_middles(said.size)].mean(axis=1))
-    tail = (1 - LEVEL) / 2
-    # Without interpolation, which has no meaning between a number and infinity.
-    return float(medians[int(tail * RESAMPLES)]), float(medians[int(np.ceil((1 - tail) * RESAMPLES)) - 1])
-
-
 def interquartile_mean(values: ArrayLike) -> float:
     """Mean of the middle half of the values, those at its edges by their fraction (Agarwal et al. 2021); NaNs are ignored.
 
     Infinite where a lost episode falls into the middle half, NaN without values.
     """
-    said = np.sort(_said(values))
+    said = np.sort(given_in(values))
     if said.size == 0:
         return float("nan")
     edges = np.clip(np.arange(said.size + 1), said.size / 4, 3 * said.size / 4)
@@ -107,27 +82,8 @@ def crossed_interval(statistic: Callable[[Array], float], values: ArrayLike, res
     return float(drawn[int(tail * resamples)]), float(drawn[int(np.ceil((1 - tail) * resamples)) - 1])
 
 
-def paired_ratios(mine: ArrayLike, reference: ArrayLike) -> Array:
-    """Sizes of ``mine`` (N,) over those of ``reference`` (N,), episode by episode.
-
-    Equal ones give 1, two lost episodes and two zeros among them; NaN where either says nothing.
-    """
-    above, below = np.abs(np.asarray(mine, dtype=np.float64)), np.abs(np.asarray(reference, dtype=np.float64))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(above == below, 1.0, above / below)
-
-
-def summary_with_interval(values: ArrayLike) -> dict[str, Any]:
-    """``median`` with its interval ``low`` and ``high``, ``q95``, ``worst`` and ``count`` of the sizes of ``values``."""
-    size = np.abs(_said(values))
-    low, high = median_interval(size)
-    return {
-        "median": quantile(size, 0.5), "low": low, "high": high,
-        "q95": quantile(size, 0.95), "worst": quantile(size, 1.0), "count": int(size.size),
-    }  # fmt: skip
-
-
-def _said(values: ArrayLike) -> Array:
+def given_in(values: ArrayLike) -> Array:
+    """The values that are numbers, not NaN."""
     given = np.asarray(values, dtype=np.float64)
     return given[~np.isnan(given)]
 

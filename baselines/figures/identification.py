@@ -17,7 +17,7 @@ LAGS = 40
 """Rows up to which residuals are compared with themselves."""
 
 
-SHOWN = 5
+EVERY = 5
 """Of so many rows of pressures one is drawn."""
 
 
@@ -34,7 +34,7 @@ def residuals_figure(found: Identified, folder: Path) -> list[Path]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 1, figsize=(9, 8), layout="constrained")
         for k, (name, colour) in enumerate(zip(CHAMBERS, (DARK, MIDDLE, ACCENT, LIGHT), strict=True)):
-            shown = times[:, ::SHOWN].ravel(), pressures[:, ::SHOWN, k].ravel()
+            shown = times[:, ::EVERY].ravel(), pressures[:, ::EVERY, k].ravel()
             axes[0].plot(*shown, ".", ms=1.5, color=colour, label=f"chamber {name}", rasterized=True)
             lags, values = _correlation(pressures[..., k])
             axes[2].plot(1e3 * period * lags, values, color=colour, ls=LINES[k], label=f"chamber {name}")
@@ -43,7 +43,7 @@ def residuals_figure(found: Identified, folder: Path) -> list[Path]:
             shown = arrived, 1e3 * positions[..., k][windows.valid]
             axes[1].plot(*shown, ".", ms=2, color=colour, label=f"position {name}", rasterized=True)
         axes[0].set(
-            xlabel="time (s)", ylabel="pressure residual (Pa)", title=f"measured less predicted (pressures: one row in {SHOWN})"
+            xlabel="time (s)", ylabel="pressure residual (Pa)", title=f"measured less predicted (pressures: one row in {EVERY})"
         )
         axes[1].set(xlabel="time (s)", ylabel="position residual (mm)")
         axes[2].set(xlabel="lag (ms)", ylabel="correlation of residuals (-)", ylim=(-0.3, 1.05))

@@ -12,9 +12,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.measures import TRACE
@@ -24,10 +22,7 @@ from birthsim_env.physics.compiled.lanes import Array
 DARK, MIDDLE, ACCENT, LIGHT = "#1b2a41", "#b23a0a", "#3f9e6a", "#8fb2dc"
 """Colours from dark to light: in grey they lie a sixth of the way from black to white apart. Line styles differ too."""
 
-COLOURS = (DARK, MIDDLE, ACCENT, LIGHT, "#b8860b", "#8e5ea2")
 LINES = ("-", "--", "-.", ":")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">", "h", "p")
-
 STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -37,27 +32,6 @@ STYLE: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
-
-
-def look(k: int) -> dict[str, Any]:
-    """Colour, line style and marker of the k-th of several controllers: twelve that a grey print tells apart by marker."""
-    return {
-        "color": COLOURS[k % len(COLOURS)], "linestyle": LINES[(k + k // len(COLOURS)) % len(LINES)],
-        "marker": MARKERS[k % len(MARKERS)],
-    }  # fmt: skip
-
-
-def log_ticks(axis: Axis) -> None:
-    """Labels 1, 2 and 5 of every decade as plain numbers, on an axis that is already logarithmic."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
-
-
-def label_of(controller: str) -> str:
-    """A controller's name for a picture: a file without its folders, at most 36 letters."""
-    name = controller.rpartition("/")[2]
-    return name if len(name) <= 36 else f"{name[:35]}…"
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:

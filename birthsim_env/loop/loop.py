@@ -26,7 +26,7 @@ WORTH_A_THREAD = 300
 0.9 us."""
 
 Place = tuple[Array, int]
-"""An array (rows, N) and the row of the world, or of what is seen, at which it stands in a block."""
+"""An array (rows, N) and the row of ``World``, or of ``Seen``, at which it stands in a block."""
 
 
 @kernel

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-from baselines.figures.runs import LINES, STYLE, legend_below, log_ticks, look, save
+from baselines.figures.runs import LINES, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
 from studies.accuracy.errors import ADAPTIVE, EVALUATIONS
+from studies.looks import log_ticks, look
 
 LOST = 1e5
 """um: at a tenth of a metre it is another motion, whatever the number; unstable runs are drawn there."""

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from matplotlib import pyplot as plt
 
-from baselines.figures.runs import DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
+from baselines.figures.runs import DARK, MIDDLE, STYLE, legend_below, save
 from studies.comparison.grid import known
 from studies.comparison.tables import CIRCLE, Figures, controllers_of
+from studies.looks import label_of, log_ticks, look
 
 CONDITIONS = {
     ("ideal", "nominal"): {"marker": "o", "color": DARK, "mfc": DARK},

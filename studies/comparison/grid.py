@@ -20,13 +20,14 @@ from agents.policy.seeds import SHIPPED, policy_folders
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import UNITS
 from baselines.bench.pieces import controller_settings, file_hash, file_stem
-from baselines.bench.statistics import paired_ratios, penalize_lost, summary_with_interval
+from baselines.bench.statistics import penalize_lost
 from baselines.registry import LISTED, SLOW, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.sensors.sensor_errors import FIGURES
 from birthsim_env.parts.sensors.sensors import drawn_by
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.comparison.paired import paired_ratios, summary_with_interval
 
 ENVIRONMENTS = tuple(environment_id(scenario) for scenario in SCENARIOS)
 COMPARED = ("ideal", "lab")

@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, label_of, legend_below, look, save
+from baselines.figures.runs import DARK, LIGHT, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
+from studies.looks import label_of, look
 
 Study = Mapping[str, dict[str, Any]]
 """Label of a controller -> its result, as ``studies.comparison.stiffness`` returns it."""

@@ -11,13 +11,14 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, label_of, legend_below, log_ticks, look, save
+from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics import coupled
 from studies.haptics.coupled import stable_up_to
 from studies.haptics.release import PULL, STIFFNESS
 from studies.haptics.rendering import PEAKS
 from studies.haptics.tables import PEAK
+from studies.looks import label_of, log_ticks, look
 from studies.stability.figure import stability_figure
 
 Runs = Sequence[dict[str, Any]]

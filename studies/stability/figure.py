@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from baselines.figures.runs import ACCENT, DARK, STYLE, label_of, legend_below, save
+from baselines.figures.runs import ACCENT, DARK, STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
+from studies.looks import label_of
 
 RANGE = (0.01, 100.0)
 """mm, of the colours."""

@@ -14,9 +14,10 @@ from PIL import Image
 from agents.reports.correction_figure import draw_corrections
 from agents.reports.learning_curves import draw_learning_curves
 from baselines.figures import runs as figures
-from baselines.figures.runs import COLOURS, look, save
+from baselines.figures.runs import save
 from studies.comparison.figure import CONDITIONS, draw_comparison
 from studies.comparison.stiffness_figures import draw_studies
+from studies.looks import COLOURS, look
 from studies.stability.figure import stability_figure
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from baselines.bench import statistics
 from baselines.bench.statistics import (
     LEVEL,
     LOST_ERROR,
     jsonable,
-    median_interval,
     number,
-    paired_ratios,
     penalize_lost,
     quantile,
     summarize,
-    summary_with_interval,
 )
+from studies.comparison import paired
+from studies.comparison.paired import median_interval, paired_ratios, summary_with_interval
 
 INF, NAN = math.inf, math.nan
 
@@ -80,7 +78,7 @@ def test_bootstrap_interval_is_that_of_the_exact_bootstrap_distribution(count):
 def test_of_an_even_number_the_resampled_median_is_the_mean_of_the_middle_two(monkeypatch):
     values = (0.0, 1.0, 3.0, 7.0)
     medians = np.sort([np.median(chosen) for chosen in product(values, repeat=4)])
-    monkeypatch.setattr(statistics, "LEVEL", 0.5)
+    monkeypatch.setattr(paired, "LEVEL", 0.5)
     assert median_interval(values) == (medians[64], medians[191])
 
 

@@ -14,7 +14,10 @@ from baselines.commands.command import perform_with
 from birthsim_build.code.compiler import LEAST_LLVM
 from birthsim_build.commands.build import Settings, main
 
-BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "circle_honest_student", "--sensors", "ideal", "lab")
+BUILT = (
+    "--controller", "admittance-backstepping", "limited:pid", "--policy", "circle", "circle_honest_student",
+    "--sensors", "ideal", "lab",
+)  # fmt: skip
 
 
 def need(there, reason):

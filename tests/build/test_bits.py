@@ -13,6 +13,7 @@ from tests.build.targets import assert_same_bits, need_program
 CASES = [
     ("ideal", "admittance-backstepping"),
     ("lab", "admittance-backstepping"),
+    ("lab", "limited:pid"),
     ("ideal", "residual:circle"),
     ("lab", "residual:circle"),
     ("ideal", "residual:circle_honest_student"),

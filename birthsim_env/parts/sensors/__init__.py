@@ -1,1 +1,1 @@
-"""What a controller is shown of the rig."""
+"""What is measured of the rig."""

@@ -127,7 +127,7 @@ class LabSensors:
     """A tracker with a rate of its own, noise and latency; noisy pressure cells read at every control period, and so is an
     acceleration sensor where the rig has one.
 
-    No velocity is measured: what is shown is the low-passed difference of samples. The user's force is that of an ideal
+    No velocity is measured: in its place stands the low-passed difference of samples. The user's force is that of an ideal
     force sensor.
     """
 

@@ -26,7 +26,7 @@ class Arrived(Sample):
 
 
 RATE_TIME = 0.02
-"""s; assumed: time constant of the low-pass on the position differences that are shown as velocity."""
+"""s; assumed: time constant of the low-pass on the position differences that stand for the velocity."""
 
 
 def slots(rate: float, latency: float) -> int:
