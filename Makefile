@@ -124,8 +124,7 @@ oldest: $(READY)
 	PYTHONPATH=$(CURDIR)/$(OUT)/oldest NUMBA_CACHE_DIR=$(CURDIR)/$(OUT)/oldest/cache $(BIN)/python -m studies.processors here
 
 verify: $(READY)
-	$(BIN)/birthsim study accuracy --out $(OUT)/verify
-	$(BIN)/birthsim study verification accuracy $(OUT)/verify
+	$(BIN)/birthsim study accuracy
 	$(BIN)/birthsim study verification balances
 	$(BIN)/birthsim study verification report
 
@@ -241,7 +240,8 @@ scratch: $(READY)
 	cp $(OUT)/scratch/scratch.png docs/
 
 targets: $(READY)
-	$(BIN)/birthsim study targets --out $(OUT)/targets --page docs/targets.md
+	$(BIN)/birthsim study targets
+	$(BIN)/birthsim study render
 
 page: $(READY)
 	$(BIN)/python -m birthsim_live.rig.build

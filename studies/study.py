@@ -100,11 +100,10 @@ class Study:
 def _option(name: str, default: Any, study: Study) -> tuple[Any, Any]:
     """Annotation and default of an option of the kind of its default."""
     several = isinstance(default, tuple)
-    kind: type = type(default[0] if several else default)
-    reads: dict[type, Any] = {float: number("N"), int: whole(0, 2**32 - 1) if name == "seed" else whole(1, EPISODES)}
-    own = [reads[kind]] if kind in reads else [Parameter(metavar="NAME...")] if several else []
-    choices = tuple(study.allowed.get(name, ())) or None
+    kind: Any = type(default[0] if several else default)
+    reads = {float: number("N"), int: whole(0, 2**32 - 1) if name == "seed" else whole(1, EPISODES)}
+    one = Annotated[kind, reads[kind]] if kind in reads else kind
     text = study.words.get(name, "")
-    own += [Parameter(choices=choices, help=f"{text[:1].upper()}{text[1:]}." if text else None), *([MANY] if several else [])]
-    annotation: Any = Annotated[(list[kind] if several else kind, *own)]  # type: ignore[valid-type]
-    return annotation, default
+    own = Parameter(choices=tuple(study.allowed.get(name, ())) or None, help=f"{text[:1].upper()}{text[1:]}." if text else None)
+    many: Any = list[one]  # type: ignore[valid-type]
+    return (Annotated[many, MANY, Parameter(metavar="NAME..."), own] if several else Annotated[one, own]), default

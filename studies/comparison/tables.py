@@ -136,13 +136,13 @@ def settled(figures: Figures) -> str:
 
 KINDS = {
     ("ideal", "randomised"): "ideal", ("lab", "randomised"): "lab", ("honest", "described-sensors"): "honest",
-    ("honest", "randomised"): "honest, drawn",
+    ("honest", "randomised"): "honest, randomised",
 }  # fmt: skip
-"""Sensors and plant -> what the table of sensors calls them, on drawn rigs."""
+"""Sensors and plant -> what the table of sensors calls them, on randomised rigs."""
 
 
 def by_sensors(figures: Figures) -> str:
-    """What sensors cost on drawn rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand."""
+    """What sensors cost on randomised rigs: median, 95 % and worst per controller and ``KINDS``, a column per hand."""
     found = {(cell["controller"], *_place(cell)): cell for cell in figures}
     rows = [[
         "controller", "sensors", "Probe: stiffness error, %", "hunting, mm", "settled error, mm", "Circle: settled error, mm",

@@ -64,8 +64,8 @@ def _haptics(name: str, **options: Any) -> Study:
         _tasks, _kept, UNITS, partial(_shown, name=name), _pictures,
         allowed={"sensors": tuple(SENSORS), "subject": SUBJECTS},
         words={
-            "controller": "registered names, with options, or path/to/file.py:Class", "rigs": "drawn at random",
-            "nominal": "the rig as the controllers believe it, instead of rigs drawn",
+            "controller": "registered names, with options, or path/to/file.py:Class", "rigs": "randomised ones",
+            "nominal": "the rig as the controllers believe it, instead of randomised ones",
             "no_force_sensor": "show the controllers a hand's force of zero", "parameters": "TOML file of the rig",
         },
     )  # fmt: skip

@@ -28,8 +28,8 @@ def report(runs: Runs) -> str:
 def heading(runs: Runs) -> str:
     """Which rigs and seeds."""
     first = runs[0]
-    drawn = f"{first['rigs']} rigs drawn, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
-    rigs = drawn if first["rigs"] else "the rig as the laws believe it"
+    randomised = f"{first['rigs']} randomised rigs, seeds {first['seed']} to {first['seed'] + first['rigs'] - 1}"
+    rigs = randomised if first["rigs"] else "the rig as the controllers believe it"
     return f"{rigs[0].upper()}{rigs[1:]}. Two figures in a cell are the median and the worst over poses, directions and rigs."
 
 
@@ -116,7 +116,7 @@ def stability_table(runs: Runs) -> str:
     return _table(title, columns, rows)
 
 
-WHO = ("law", "sensors", "uses the hand's force")
+WHO = ("controller", "sensors", "uses the hand's force")
 
 
 def _who(run: dict[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What the errors of honest sensors leave to the best controller on drawn rigs: a row per kind of drawing."""
+"""What the errors of honest sensors leave to the best controller on randomised rigs."""
 
 from __future__ import annotations
 
@@ -33,9 +33,11 @@ def floor(rig: dict[str, Any], episodes: int, seed: int) -> Result:
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["sensors", "stiffness error, %: median, 95 %, worst", "error while held, mm"]]
+    rows = [["sensors", "stiffness error, %: median, 95th percentile, worst", "error while held, mm"]]
     for kind, found in content["figures"].items():
-        rows.append([kind, *(", ".join(number(found[name][key]) for key in FRACTIONS) for name in UNITS)])
+        rows.append(
+            [kind.replace("drawn", "randomised"), *(", ".join(number(found[name][key]) for key in FRACTIONS) for name in UNITS)]
+        )
     return {"floor.md": markdown(rows) + "\n"}
 
 

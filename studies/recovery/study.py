@@ -1,4 +1,4 @@
-"""Rigs drawn at random, identified from logs of their own."""
+"""Randomised rigs, identified from logs of their own."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def _shown(content: Content) -> dict[str, str]:
 def recovery_table(results: list[dict[str, Any]]) -> list[str]:
     """Markdown: per parameter how many rigs' logs tell it, and of these error and interval."""
     lines = [
-        "| parameter | drawn from | told in | error: median | 95 % | largest | half interval: median | true value inside |",
+        "| parameter | randomised from | told in | error: median | 95th percentile | largest | half interval: median "
+        "| true value inside |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for one in QUANTITIES:
@@ -61,5 +62,5 @@ def recovery_table(results: list[dict[str, Any]]) -> list[str]:
 STUDY = Study(
     ("studies.recovery.tasks",), {"rigs": 50, "seed": 82000, "duration": 12.0, "experiment": "proposed"}, _tasks, _kept,
     {"misfit": "of the log's noise", "value": "the parameter's"}, _shown, partial=True,
-    allowed={"experiment": tuple(EXPERIMENTS)}, words={"duration": "s of each experiment", "rigs": "drawn at random"},
+    allowed={"experiment": tuple(EXPERIMENTS)}, words={"duration": "s of each experiment", "rigs": "randomised"},
 )  # fmt: skip

@@ -28,16 +28,16 @@ Rows = dict[str, dict[str, Any]]
 """Controller -> its figures in one environment under one condition."""
 
 _CAPTION = (
-    "{episodes} episodes from seed {seed}. Where the rig is drawn, so is the scenario. Laws run at 1 kHz; random openings last "
-    "10 ms. Discounts are per 10 ms. The error is the settled error, median over the episodes. A success is an episode with "
-    "less than 1 mm. The score is 0 for shut valves and 100 for the best law. One half of the episodes chooses the best law "
-    "and the best policy, the other half measures them."
+    "{episodes} episodes from seed {seed}. Where the rig is randomised, so is the scenario. Controllers run at 1 kHz; random "
+    "openings last 10 ms. Discounts are per 10 ms. The error is the settled error, median over the episodes. A success is an "
+    "episode with less than 1 mm. The score is 0 for shut valves and 100 for the best controller. One half of the episodes "
+    "chooses the best controller and the best policy, the other half measures them."
 )
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
     if options.episodes < 2:
-        raise ValueError(f"--episodes {options.episodes}; allowed: 2 or more, half of them choose the best law")
+        raise ValueError(f"--episodes {options.episodes}; allowed: 2 or more, half of them choose the best controller")
     conditions = [(name, sensors, rig) for name in ENVIRONMENTS for sensors in SENSORS for rig in RIGS]
     return {
         (where, controller): _task(where, controller, policy, options)

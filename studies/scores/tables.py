@@ -30,8 +30,13 @@ class Scored:
     rows: dict[str, dict[str, Any]]
     roles: dict[str, dict[str, Any]]
 
+    @property
+    def shown_rig(self) -> str:
+        """The kind of rig as tables call it."""
+        return self.rig.replace("drawn", "randomised")
+
     def score(self, controller: str) -> int:
-        """0 for shut valves, 100 for the best law."""
+        """0 for shut valves, 100 for the best controller."""
         low, high = (float(self.roles[role]["return"]) for role in (SHUT, BEST))
         return round(100 * (float(self.rows[controller]["returns"]["1.0"]) - low) / (high - low))
 
@@ -40,7 +45,7 @@ def overview(found: Sequence[Scored]) -> str:
     """Scores of the ``ROLES``, with names where the role does not say who plays it; "-" where nobody does."""
     rows = [["scenario", "sensors", "rig", *(role for role in ROLES if role != SHUT)]]
     for one in found:
-        row = [one.scenario, one.sensors, one.rig]
+        row = [one.scenario, one.sensors, one.shown_rig]
         for role in ROLES:
             if role == SHUT:
                 continue
@@ -61,7 +66,7 @@ def data(found: Sequence[Scored]) -> str:
             error = "lost" if row["error"] is None else number(row["error"])
             paid = [f"{row['returns'][str(discount)]:.4g}" for discount in DISCOUNTS]
             share = [f"{100 * row[key]:.0f}" for key in ("success", "lost")]
-            table.append([one.scenario, one.sensors, one.rig, name, one.score(name), error, *share, *paid])
+            table.append([one.scenario, one.sensors, one.shown_rig, name, one.score(name), error, *share, *paid])
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(table)
     return text.getvalue()

@@ -171,11 +171,9 @@ def _cycles(laws: dict[str, Any], label: str) -> str:
 
 def _firmware(report: dict[str, Any]) -> str:
     rows = [["a running controller", "bytes of RAM"], *([f"`{name}`", f"{size:,}"] for name, size in report["loops"].items())]
-    cycles = ", ".join(f"{cycles} for {kind}" for kind, cycles in CYCLES.items())
-    return (
-        f"The deepest stack is {report['stack']} bytes. Assumed cycles of an operation: {cycles}. Microseconds are at "
-        f"{CLOCK / 1e6:.0f} MHz.\n\n{markdown(rows)}"
-    )
+    cycles = [["operation", *CYCLES], ["assumed cycles", *map(str, CYCLES.values())]]
+    said = f"The deepest stack is {report['stack']} bytes. Microseconds are at {CLOCK / 1e6:.0f} MHz."
+    return "\n\n".join([said, markdown(rows), markdown(cycles)])
 
 
 STUDY = Study(

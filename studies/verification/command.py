@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -11,22 +9,16 @@ from typing import Any, Literal
 from baselines.commands.settings import Configured
 from studies.verification import balances, mutants, reached, report, sources
 
-ACCURACY = (
-    *("studies/accuracy/errors.py", "studies/accuracy/motions.py", "studies/accuracy/second_model.py"),
-    *("birthsim_env/parts/drawn/randomization.py", *(path for path in balances.SOURCES if path.startswith("birthsim_env"))),
-)
-"""Files that decide the figures of ``birthsim study accuracy``."""
-
 
 @dataclass(kw_only=False)
 class Settings(Configured):
-    """Measure the balances (a quarter of a minute) or the coverage (minutes), take what birthsim study mutation or accuracy
-    wrote, or write docs/verification.md from what is stored.
+    """Measure the balances (a quarter of a minute) or the coverage (minutes), take what birthsim study mutation wrote, or write
+    docs/verification.md from what is stored.
     """
 
-    what: Literal["balances", "coverage", "mutation", "accuracy", "report"]
+    what: Literal["balances", "coverage", "mutation", "report"]
     path: Path = Path()
-    """For mutation its report, for accuracy its folder."""
+    """For mutation its report."""
 
 
 def main(options: Settings) -> None:
@@ -38,9 +30,6 @@ def main(options: Settings) -> None:
         keep("coverage", reached.measure(), files)
     elif options.what == "mutation":
         mutants.take(options.path)
-    elif options.what == "accuracy":
-        keep("accuracy", json.loads((options.path / "accuracy.json").read_text(encoding="utf-8"))["figures"], ACCURACY)
-        shutil.copy(options.path / "accuracy.png", sources.ROOT / "docs" / "accuracy.png")
     else:
         report.PAGE.write_text(report.page(), encoding="utf-8")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.accuracy import tables as accuracy_tables
+from studies.results import read_result
 from studies.verification import mutants, sources
 
 PAGE = sources.ROOT / "docs" / "verification.md"
@@ -119,7 +120,8 @@ def basis(measured: dict[str, Any]) -> str:
 
 def accuracy() -> str:
     """Errors, orders and the figure."""
-    found, lines = sources.load("accuracy"), []
+    content, lines = read_result("accuracy") or {}, []
+    found = content["figures"]
     for motion in found["motions"]:
         position, pressure, rig = accuracy_tables.worst(found, motion)
         lines.append(
@@ -129,7 +131,7 @@ def accuracy() -> str:
     doubt = max(one["reference_itself"]["position_m"] for one in found["motions"].values())
     itself = f"With ten times its tolerance the reference itself moves by {accuracy_tables.number(1e6 * doubt)} um."
     text = ACCURACY.format(step=1e3 * found["present_step_s"], worst="\n".join(lines), itself=itself)
-    return f"{text}\n{basis(found)}\n{accuracy_tables.tables(found)}\n"
+    return f"{text}\nMeasured at commit {content['commit'][:7]}.\n\n{accuracy_tables.tables(found)}\n"
 
 
 def balances() -> str:
