@@ -1,4 +1,4 @@
-"""birthsim train: residual policies by reinforcement learning, several seeds in one command."""
+"""birthsim train: residual policies by reinforcement learning or by gradients, several seeds in one command."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 @dataclass(kw_only=True)
 class Settings:
-    """Train residual policies on top of a controller, by PPO, SAC or TQC.
+    """Train residual policies on top of a controller, by PPO, SAC, TQC, or gradients through the closed loop (apg).
 
     Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
     whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
