@@ -84,7 +84,7 @@ class Recorder:
                 bars[first] = reward
             if observation is not None:
                 bars[first + 1 : first + 1 + observation.shape[1]] = observation.T
-            loop.back(periods, tape, rig, bars)
+            loop.back(periods, tape, rig, bars, self._simulation.threads)
             action = WORLD + ACTION
             return bars[self.carried], bars[action : action + size]
 

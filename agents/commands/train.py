@@ -1,4 +1,4 @@
-"""What birthsim train does: residual policies by reinforcement learning, several seeds in one command."""
+"""What birthsim train does: residual policies by reinforcement learning or by gradients, several seeds in one command."""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.reading import read_toml
 from birthsim_env.physics.rig.values import checked_count, checked_number, in_line, shown
 
-ALGORITHMS = ("ppo", "sac", "tqc", "apg")
+STABLE_BASELINES = ("ppo", "sac", "tqc")
+ALGORITHMS = (*STABLE_BASELINES, "apg")
 
 COUNTS = {
     "steps": (1, 10**10), "seed": (0, 2**32 - 1), "lanes": (1, 2**16), "rollout": (1, 2**16), "batch": (2, 2**20),

@@ -29,6 +29,9 @@ from agents.training.validation import SEED_SPACING, TRAINING_SEED
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
 
+MET = 5.0
+"""s: mean time that a rig is met; assumed."""
+
 MOMENTS = (0.9, 0.99)
 """Of Adam; an update is a gradient of length one, so that one bad horizon moves no more than another."""
 
@@ -144,7 +147,16 @@ class PolicyGradient:
             self._adam.param_groups[0]["lr"] = settings.learning_rate * (LEAST_RATE + (1 - LEAST_RATE) * left)
             self._adam.step()
         self._normalized.add(np.concatenate(seen))
+        self._begin_some()
         return stepping
+
+    def _begin_some(self) -> None:
+        """Begin some lanes anew: a policy that meets more rigs is lost on fewer."""
+        env = self._worlds.env
+        share = self._settings.rollout * env.simulation.periods * env.simulation.period / MET
+        chosen = np.random.default_rng((self._settings.seed, self.steps)).random(self._settings.lanes) < share
+        if chosen.any():
+            self._now = self._worlds.now(env.reset(options={"reset_mask": chosen})[0])
 
     def network(self) -> PolicyNetwork:
         """The policy as plain arrays, a copy."""

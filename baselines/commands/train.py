@@ -1,4 +1,4 @@
-"""birthsim train: residual policies by reinforcement learning, several seeds in one command; ``agents.commands`` does it."""
+"""birthsim train: residual policies by reinforcement learning or by gradients, several seeds in one command; ``agents.commands`` does it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from baselines.commands.start import load
 
 @dataclass(kw_only=True)
 class Settings:
-    """Train residual policies on top of a controller, by PPO, SAC or TQC.
+    """Train residual policies on top of a controller, by PPO, SAC, TQC, or gradients through the loop (apg).
 
     Options override what the configuration says, and have its values by default. The best policy on validation worlds is kept
     whenever it improves, and a checkpoint at every validation: after Ctrl-C or a kill the same command goes on, and ends with
@@ -23,7 +23,7 @@ class Settings:
 
     config: Annotated[str, Parameter(metavar="NAME")] = "circle"
     """A configuration of agents/configurations, such as circle_quick, or a TOML file."""
-    algorithm: Literal["ppo", "sac", "tqc"] | None = None
+    algorithm: Literal["ppo", "sac", "tqc", "apg"] | None = None
     """How it learns."""
     law: Annotated[str | None, Parameter(metavar="NAME")] = None
     """Controller underneath, such as backstepping-force-first; none: the policy drives the valves by itself."""

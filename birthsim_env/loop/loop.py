@@ -117,15 +117,17 @@ class Loop:
 
     def run(self, periods: int = 1, threads: int = 1) -> int:
         """Run ``periods`` control periods; returns how many lanes and periods a stage could not serve."""
+        return self._spread(self._between, periods, threads)
+
+    def _spread(self, work: Callable[[int, int, int], int], periods: int, threads: int) -> int:
+        """The sum of ``work(periods, first, last)`` over lanes from ``first`` to ``last``, spread over threads."""
         blocks = -(-self._lanes // BLOCK)
         parts = max(1, min(threads, blocks, self._lanes * periods // WORTH_A_THREAD))
         edges = [BLOCK * (blocks * k // parts) for k in range(parts)] + [self._lanes]
         # What runs in a thread holds this loop, and with it the arrays that it knows by address.
-        waiting = [
-            _pool(os.getpid(), parts - 1).submit(self._between, periods, edges[k], edges[k + 1]) for k in range(1, parts)
-        ]
+        waiting = [_pool(os.getpid(), parts - 1).submit(work, periods, edges[k], edges[k + 1]) for k in range(1, parts)]
         try:
-            missed = self._between(periods, edges[0], edges[1])
+            missed = work(periods, edges[0], edges[1])
         finally:
             wait(waiting)
         return missed + sum(one.result() for one in waiting)

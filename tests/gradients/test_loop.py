@@ -93,6 +93,19 @@ def test_observations_state_and_motion_have_gradients() -> None:
     assert np.abs(by_piston).max() > 0
 
 
+def test_threads_change_no_bit() -> None:
+    found = []
+    for threads in (1, 2):
+        env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=100, randomize=True, num_threads=threads).unwrapped
+        env.reset(seed=1)
+        recorder = Recorder(env.simulation)
+        env.step(np.full((100, 4), 0.03))
+        found.append(recorder.taken()(reward=np.ones(100)))
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+        assert np.abs(one).max() > 0
+
+
 def test_what_has_no_gradients_is_refused_by_name() -> None:
     class Own(UserForce):
         def force(self, time: Any, position: Any, velocity: Any) -> Any:

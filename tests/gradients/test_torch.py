@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,6 +13,8 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
 
 from agents.training.rollouts import Worlds  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 def worlds_of(lanes: int, **arguments: Any) -> Worlds:
@@ -54,3 +58,15 @@ def test_the_end_of_an_episode_cuts_gradients() -> None:
 def test_worlds_that_end_otherwise_are_refused() -> None:
     with pytest.raises(ValueError, match="SameStep"):
         Worlds(gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2))
+
+
+@pytest.mark.slow
+def test_the_example_learns_in_a_hundred_updates() -> None:
+    spec = importlib.util.spec_from_file_location("gradients_example", ROOT / "examples" / "gradients.py")
+    assert spec is not None
+    assert spec.loader is not None
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    errors = example.train(120)
+    assert np.median(errors[-20:]) < 1.5
+    assert np.median(errors[:20]) > 3.0

@@ -13,7 +13,7 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import Policy, load_policy, save_policy
 from agents.residual.settings import ResidualSettings
 from agents.training.algorithms import make_model, network_of, unchecked_distributions
-from agents.training.configuration import ALGORITHMS, TrainingSettings
+from agents.training.configuration import STABLE_BASELINES, TrainingSettings
 from agents.training.sb3_adapter import SB3VecEnv
 
 CIRCLE = "BirthSIM/CircleResidual-v1"
@@ -55,7 +55,7 @@ def rounding(network, inputs):
     return error + 4 * unit
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
 def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(algorithm):
     model, env, native = made(replace(TINY, algorithm=algorithm, log_std=-1.0), randomize=True)
     rows, far = observations(native, 5)
@@ -70,7 +70,7 @@ def test_before_it_has_learned_a_policy_says_nothing_and_explores_around_that(al
     assert all(weight.any() for weight, _ in network_of(model.policy, env).layers[:-1])
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
 @pytest.mark.parametrize("hidden", [(16, 16), (8,), (5, 6, 7)])
 def test_the_network_taken_from_a_model_does_what_the_model_predicts(tmp_path, algorithm, hidden):
     # Without randomisation some inputs never change: their variance is almost nothing, and rounding weighs most.
@@ -97,7 +97,7 @@ def test_the_network_taken_from_a_model_does_what_the_model_predicts(tmp_path, a
     assert controller.command(plain.measurement, plain.reference).shape == (4, 2)
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", STABLE_BASELINES)
 def test_settings_reach_the_algorithm(algorithm):
     settings = replace(TINY, algorithm=algorithm, discount=0.9, learning_rate=2e-3, seed=5)
     model, _, _ = made(settings)

@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.sealed import sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from agents.training import monitor
 from agents.training.algorithms import make_model, network_of
 from agents.training.checkpoint import FORMAT, NAME, load_checkpoint, save_checkpoint
+from agents.training.reached import described
 from agents.training.sb3_adapter import SB3VecEnv
 from agents.training.trainer import train
 from birthsim_env import Parameters
@@ -231,7 +231,7 @@ def test_whatever_an_intact_checkpoint_lacks_is_a_value_error(tmp_path):
 )
 def test_a_training_with_other_settings_or_another_rig_does_not_go_on(tmp_path, short_probe, settings, residual, named):
     model, env = new()
-    save_checkpoint(tmp_path, model, env, monitor.described(TINY, RESIDUAL, Parameters()), PAST)
+    save_checkpoint(tmp_path, model, env, described(TINY, RESIDUAL, Parameters()), PAST)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     rig = Parameters().replace({"mechanics.mass": 4.5}) if named == "rig" else Parameters()
     with pytest.raises(ValueError, match=rf"is of a training with other {named}; allowed: the same settings"):

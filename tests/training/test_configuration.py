@@ -37,7 +37,7 @@ def test_every_configuration_of_the_package_says_what_its_file_says_and_can_be_m
     env = gymnasium.make_vec(training.environment, num_envs=1, **arguments)
     assert env.single_action_space.shape == (residual.size,)
     # PPO's minibatches are whole parts of what it collects.
-    assert training.lanes * training.rollout % training.batch == 0
+    assert training.algorithm != "ppo" or training.lanes * training.rollout % training.batch == 0
     assert json.loads(json.dumps(training.to_dict())) == training.to_dict()
 
 

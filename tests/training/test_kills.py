@@ -13,7 +13,7 @@ import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
-from agents.training import monitor
+from agents.training import monitor, reached
 from agents.training import trainer as training
 from agents.training.checkpoint import NAME, save_checkpoint
 from agents.training.trainer import train
@@ -97,11 +97,11 @@ def test_one_that_dies_again_and_again_gets_there_as_well(tmp_path, monkeypatch)
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("brief")
-@pytest.mark.parametrize("name", ["save_checkpoint", "save_policy"])
-def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, name):
+@pytest.mark.parametrize(("module", "name"), [(monitor, "save_checkpoint"), (reached, "save_policy")])
+def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, module, name):
     """The checkpoint holds the best policy: whichever file is the newer one, the training ends as it would have."""
     expected, saves = train(TINY, RESIDUAL, tmp_path / "whole"), []
-    own = getattr(monitor, name)
+    own = getattr(module, name)
 
     def dies(*args):
         saves.append(own(*args))
@@ -109,7 +109,7 @@ def test_a_death_between_the_two_files_loses_no_policy(tmp_path, monkeypatch, na
             raise Killed
 
     with monkeypatch.context() as patch:
-        patch.setattr(monitor, name, dies)
+        patch.setattr(module, name, dies)
         with pytest.raises(Killed):
             train(TINY, RESIDUAL, tmp_path / "cut")
     (tmp_path / "cut" / WEIGHTS).unlink()

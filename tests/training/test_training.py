@@ -11,6 +11,7 @@ from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, load_policy
 from agents.residual.settings import ResidualSettings
 from agents.training import monitor, validation
+from agents.training import reached as reached_module
 from agents.training import trainer as training
 from agents.training.configuration import TrainingSettings
 from agents.training.trainer import train
@@ -101,7 +102,7 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
         most, one = next(errors)
         return Score(np.array([most, most, one, most]), nothing, nothing, nothing, np.zeros(4), 0)
 
-    monkeypatch.setattr(monitor, "validate", scored)
+    monkeypatch.setattr(reached_module, "validate", scored)
     reached = train(replace(BRIEF, validations=4), RESIDUAL, tmp_path)
     assert [point["max_mm"] for point in reached["curve"]] == [3.0, 9.0, 2.5, 4.0, 2.5]
     assert reached["policy"]["max_mm"] == 2.5

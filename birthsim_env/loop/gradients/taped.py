@@ -154,6 +154,11 @@ class TapedLoop(Loop):
         how = self._moves, self._stages, self._keeps, self._reads, self._rows, self._lanes
         return int(_forward(*how, periods, first, last, self._tape))
 
-    def back(self, periods: int, tape: Array, rig: Array, bars: Array) -> None:
+    def back(self, periods: int, tape: Array, rig: Array, bars: Array, threads: int = 1) -> None:
         """Take ``bars``, gradients to the rows of the space at the end (rows, N), to its beginning."""
-        _backward(self._entries, self._touched, periods, 0, self._lanes, rig, tape, bars, self._most)
+
+        def work(periods: int, first: int, last: int) -> int:
+            _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, self._most)
+            return 0
+
+        self._spread(work, periods, threads)
