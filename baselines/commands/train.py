@@ -1,4 +1,4 @@
-"""birthsim train: policies by reinforcement learning or by gradients, several seeds in one command; ``agents.commands`` does it."""
+"""birthsim train: policies by reinforcement learning or gradients, several seeds at once; ``agents.commands`` does it."""
 
 from __future__ import annotations
 
