@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from llvmlite.binding import llvm_version_info
 
+from baselines.commands.command import perform_with
 from birthsim_build.code.compiler import LEAST_LLVM
-from birthsim_build.commands.build import main
+from birthsim_build.commands.build import Settings, main
 
 BUILT = ("--controller", "admittance-backstepping", "--policy", "circle", "circle_honest_student", "--sensors", "ideal", "lab")
 
@@ -41,7 +42,7 @@ def build(target, folder, *options):
     """The command, in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["birthsim export", "--to", target, *options, "--out", str(folder)])
-        main()
+        perform_with("birthsim export", Settings, main, "")
 
 
 def assert_same_bits(one, other):
