@@ -5,7 +5,6 @@ import math
 import gymnasium
 import numpy as np
 import pytest
-from baselines.backstepping.strict_feedback import strict_feedback_rates
 
 from agents.residual.settings import FORCE_LAWS, ResidualSettings
 from agents.training.shifted_reward import ShiftedReward
@@ -19,6 +18,7 @@ from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from studies.labour.model import Labour
+from studies.verification.strict_feedback import strict_feedback_rates
 
 CIRCLE = "BirthSIM/Circle-v1"
 NAN, INF = math.nan, math.inf
