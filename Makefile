@@ -48,9 +48,6 @@ LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(STUDENT)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
-# A page of docs/ keeps what stands above its mark; the tables that commands wrote follow.
-renew = { sed '/^<!-- tables of/q' docs/$(1).md; $(2); } >$(OUT)/page.md && mv $(OUT)/page.md docs/$(1).md
-
 .PHONY: run figure test test-slow quick kills test-weekly portable oldest verify verify-slow fuzz soak lint prose lock audit sbom dist lint-workflows bench results pictures policies learned scratch targets page docs docs-links golden clean
 
 # What a picture needs, and the project itself.
@@ -219,21 +216,12 @@ policies: $(READY)
 	  cp $(OUT)/training/$$name/seed_$$seed/policy.safetensors $(OUT)/training/$$name/seed_$$seed/training.json $(POLICIES)/$$name/seed_$$seed/ || exit 1; done; done
 
 learned: $(READY)
-	$(BIN)/birthsim evaluate --controller residual --policy circle --episodes 256 --seed 20000 --out $(OUT)/learned/circle
-	for id in Probe-v2 Forceps-v1 Dystocia-v1 Descent-v1; do name=$$(echo $${id%-*} | tr A-Z a-z); \
-	  $(BIN)/birthsim evaluate --env BirthSIM/$$id --controller residual --policy $$name \
-	    --episodes $$([ $$name = descent ] && echo 64 || echo 128) --seed 20000 --out $(OUT)/learned/$$name || exit 1; done
-	$(BIN)/birthsim evaluate --controller residual --policy circle_pure --episodes 64 --seed 20000 --out $(OUT)/learned/circle_pure
-	$(BIN)/birthsim evaluate --controller admittance-backstepping residual --policy circle_lab --sensors lab --episodes 256 --seed 20000 --out $(OUT)/learned/circle_lab
-	$(BIN)/birthsim evaluate --controller admittance-sensorless backstepping-force-first residual --policy $(STUDENT) --sensors honest $(HONEST_RIG) \
-	  --episodes 128 --seed 170000 --out $(OUT)/learned/$(STUDENT)
+	$(BIN)/birthsim study learned
+	$(BIN)/birthsim study render
 	$(BIN)/birthsim explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim explain --policy circle --no-pushes --out $(OUT)/learned/explain
-	$(call renew,learned,$(foreach name,$(LEARNED),printf "\n## $(name)\n\n"; cat $(OUT)/learned/$(name)/seeds.md; ) \
-	  printf "\n## Every metric\n\nEvery metric of law and residual: [learned.csv](data/learned.csv)\n")
-	{ echo policy,metric,unit,controller,value,q95,max; \
-	  $(foreach name,$(LEARNED),sed "1d; s/^/$(name),/" $(OUT)/learned/$(name)/evaluation.csv; ) } >docs/data/learned.csv
-	cp $(OUT)/learned/explain/correction.png $(OUT)/learned/circle/learning_curves.png docs/
+	cp $(OUT)/learned/explain/correction.png docs/
+	cp $(OUT)/studies/learned/learning_curves.png docs/
 
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch

@@ -31,7 +31,7 @@ def figure(name: str) -> str:
 
 def _follow(found: Any, way: Sequence[str]) -> Any:
     for place, word in enumerate(way):
-        if isinstance(found, dict) and "columns" in found:
+        if isinstance(found, dict) and "columns" in found and word not in found:
             return _cell(found, way[place:])
         if isinstance(found, dict) and word not in found:
             raise LookupError(f"{word!r}; allowed: {', '.join(found)}")

@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 MAKE = "import gymnasium, birthsim_env; gymnasium.make{}('BirthSIM/CircleResidual-v1')"
-COMMAND = "import sys; sys.argv = ['birthsim', 'train', '--help']; from birthsim.door import main; main()"
+COMMAND = "import sys; sys.argv = ['birthsim', 'explain', '--help']; from birthsim.door import main; main()"
 
 
 def run(script, folder):
