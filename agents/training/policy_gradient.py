@@ -1,7 +1,7 @@
 """Analytic policy gradient: the reward of a short horizon is differentiated through the closed loop, and Adam climbs it.
 
 As in SHAC (Xu et al., "Accelerated policy learning with parallel differentiable simulation", ICLR 2022), but without a critic:
-the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/explanation/gradients.md`).
+the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/gradients.md`).
 """
 
 from __future__ import annotations
