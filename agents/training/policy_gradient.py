@@ -1,7 +1,7 @@
 """Analytic policy gradient: the reward of a short horizon is differentiated through the closed loop, and Adam climbs it.
 
 As in SHAC (Xu et al., "Accelerated policy learning with parallel differentiable simulation", ICLR 2022), but without a critic:
-the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/explanation/gradients.md`).
+the plant forgets an action within some 100 ms, and every step of the horizon is paid for (`docs/gradients.md`).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from agents.training.reached import Reached
 from agents.training.rollouts import Worlds
 from agents.training.time_split import split
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from birthsim_env.reward import LARGEST_COST
 
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
@@ -34,6 +35,14 @@ MET = 5.0
 
 MOMENTS = (0.9, 0.99)
 """Of Adam; an update is a gradient of length one, so that one bad horizon moves no more than another."""
+
+
+def _cost(reward: Tensor, period: float) -> Tensor:
+    """What a policy step of ``period`` s costs (N,), in errors of a millimetre and more rather than in their logarithm.
+
+    The reward counts ln(1 + error), which leaves a rig alone on which the policy is far off: others gain more by less.
+    """
+    return torch.exp(LARGEST_COST * (1.0 - reward * (0.01 / period)))
 
 
 class Normalized:
@@ -125,6 +134,8 @@ class PolicyGradient:
     def _update(self) -> float:
         """One horizon forward and back; returns the time in the environment, s."""
         settings, stepping, seen = self._settings, 0.0, []
+        simulation = self._worlds.env.simulation
+        period = simulation.periods * simulation.period
         now, loss = self._now.detached(), torch.zeros((), dtype=torch.float64)
         for k in range(settings.rollout):
             seen.append(now.observation.detach().numpy().astype(np.float64))
@@ -132,7 +143,7 @@ class PolicyGradient:
             started = time.perf_counter()
             now = self._worlds.step(now, action)
             stepping += time.perf_counter() - started
-            loss = loss - settings.discount**k * now.reward.mean()
+            loss = loss + settings.discount**k * _cost(now.reward, period).mean()
         self._now = now
         self._adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]

@@ -24,6 +24,9 @@ from birthsim_env.physics.gradients.steps import STAGES, back_over, lay_out
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
 """Of the space, in the order of gradients: state, openings, force."""
 
+BEGINNING, PUSHED = 0, INPUTS - 2
+"""First point of a period, and the row at which the force stands."""
+
 
 @kernel
 def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: int) -> int:
@@ -39,13 +42,13 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
             total[row, i], by[row, i] = 0.0 if row < STATES else weighs[row, i], 0.0
     for row in range(STATES):
         for i in range(n):
-            points[0, row, i], late[row, i] = given[row, i], weighs[row, i]
+            points[BEGINNING, row, i], late[row, i] = given[row, i], weighs[row, i]
     for row in range(4):
         for i in range(n):
             u[row, i] = given[STATES + row, i]
     for row in range(2):
         for i in range(n):
-            f[row, i] = given[STATES + 4 + row, i]
+            f[row, i] = given[PUSHED + row, i]
     lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
     back_over(points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)

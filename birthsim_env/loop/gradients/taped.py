@@ -20,6 +20,9 @@ from birthsim_env.physics.compiled.lanes import Array
 
 Whole = NDArray[np.int64]
 
+ADJOINT, CONSTANTS, READS, FIRST, COUNT, CLOSES = range(6)
+"""Columns of ``_backward``'s entries."""
+
 
 @kernel
 def _keep(space: Array, reads: Whole, first: int, count: int, tape: Array, n: int) -> None:
@@ -88,17 +91,18 @@ def _backward(
                 p[row, i] = rig[row, start + i]
         for period in range(periods - 1, -1, -1):
             for e in range(entries.shape[0] - 1, -1, -1):
-                if entries[e, 5] == 0 or period == periods - 1:
-                    place -= entries[e, 2]
-                    for k in range(entries[e, 4]):
+                if entries[e, CLOSES] == 0 or period == periods - 1:
+                    where = entries[e, FIRST]
+                    place -= entries[e, READS]
+                    for k in range(entries[e, COUNT]):
                         for i in range(n):
-                            given[k, i] = space[touched[entries[e, 3] + k], i]
+                            given[k, i] = space[touched[where + k], i]
                     there = tape[start // BLOCK, place:]
                     places = there.ctypes.data, given.ctypes.data, result.ctypes.data, p.ctypes.data
-                    call_stage(entries[e, 0], *places, entries[e, 1], start, n)
-                    for k in range(entries[e, 4]):
+                    call_stage(entries[e, ADJOINT], *places, entries[e, CONSTANTS], start, n)
+                    for k in range(entries[e, COUNT]):
                         for i in range(n):
-                            space[touched[entries[e, 3] + k], i] = result[k, i]
+                            space[touched[where + k], i] = result[k, i]
         for row in range(bars.shape[0]):
             for i in range(n):
                 bars[row, start + i] = space[row, i]
@@ -141,8 +145,8 @@ class TapedLoop(Loop):
 
     def new_tape(self, periods: int) -> Array:
         """Room for ``periods`` control periods, the last one with what closes it."""
-        closing = self._entries[:, 5] == 1
-        size = periods * self._entries[~closing, 2].sum() + self._entries[closing, 2].sum()
+        closing = self._entries[:, CLOSES] == 1
+        size = periods * self._entries[~closing, READS].sum() + self._entries[closing, READS].sum()
         return np.zeros((-(-self._lanes // BLOCK), max(1, size), BLOCK))
 
     def run_taped(self, periods: int, tape: Array, threads: int = 1) -> int:

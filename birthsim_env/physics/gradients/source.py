@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from functools import cache
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -103,16 +104,16 @@ def module_of(text: str) -> ModuleType:
     """A module of generated source, kept beside the machine code of kernels under the hash of its text.
 
     The hash is part of the module's name, and the text is a file that kernels are made from: so both are part of what names
-    their machine code.
+    their machine code. It is no ``.py``: nobody wrote it, and what looks at the project's sources need not.
     """
     name = f"gradients_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     folder = cache_folder() or Path(tempfile.mkdtemp())
-    path = folder / f"{name}.py"
+    path = folder / f"{name}.source"
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         partial = path.with_suffix(f".{id(text)}.partial")
         partial.write_text(text, encoding="utf-8")
         partial.replace(path)
-    spec = importlib.util.spec_from_file_location(name, path)
+    spec = importlib.util.spec_from_file_location(name, path, loader=SourceFileLoader(name, str(path)))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
