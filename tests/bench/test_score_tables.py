@@ -18,7 +18,7 @@ FOUND = [Scored("Circle", "ideal", "drawn", ROWS, PLAYED)]
 
 
 def test_the_overview_names_the_best_and_says_where_there_is_none():
-    assert overview(FOUND).splitlines()[2] == "| Circle | ideal | drawn | -25 | 50 | 100, best | - |"
+    assert overview(FOUND).splitlines()[2] == "| Circle | ideal | randomised | -25 | 50 | 100, best | - |"
 
 
 def test_the_data_file_has_every_controller_with_its_returns():

@@ -184,7 +184,7 @@ BAD = [
     ("train", ("--config", "{tmp}/own.py"), "own.py' is no TOML: "),
     ("train", ("--config", "{tmp}/rig.toml"), "rig.toml': table 'mechanics'; allowed: training, residual"),
     ("train", ("--algorithm", "dqn"), ("--algorithm", "dqn", "ppo", "sac", "tqc")),
-    ("train", ("--law", "pid"), ("--law", "pid", "backstepping-weight", "none")),
+    ("train", ("--law", "pid"), ("law = 'pid'", "backstepping-weight", "none")),
     ("train", ("--impedance", "soft"), ("--impedance", "soft", "fixed", "variable")),
     ("train", ("--law", "none", "--impedance", "variable"), "impedance = 'variable'; allowed: 'fixed', law = 'none' has no"),
     ("train", ("--seeds", "0"), ("--seeds", "'0'", "allowed: a whole number ", "1")),

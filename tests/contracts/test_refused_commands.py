@@ -8,7 +8,7 @@ from tests.build.targets import need_linker
 from tests.console import call
 
 FILES = {
-    "own/mine.txt": "mine", "tubes.toml": "[chambers]\ntube_length = 1.0\n", "heavy.toml": "[mechanics]\nmass = 90.0\n",
+    "own/mine.txt": "mine", "heavy.toml": "[mechanics]\nmass = 90.0\n",
 }  # fmt: skip
 """What lies in the folder where a command is called."""
 ONE_OF = "allowed: one of LOG, --propose PLAN, --simulate PLAN"
@@ -19,7 +19,6 @@ TABLE = {
     "export --to riscv": "--to 'riscv'; allowed: onnx, wasm, c, x86-64, aarch64, cortex-m7",
     "export --to wasm --env CartPole-v1 --out x": "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1",
     "export --to wasm --controller nonlinear-mpc --out x": f"controller = 'nonlinear-mpc'; {COMPILED}",
-    "export --to wasm --controller limited:pid --out x": f"controller = 'limited:pid'; {COMPILED}",
     "export --to wasm --controller nothing --out x": "controller = 'nothing'; allowed: backstepping",
     "export --to wasm --controller pid[gain=1] --out x": "gain = 1.0 is unknown; allowed for pid: ",
     "export --to wasm --controller residual --out x": "--controller residual; allowed: --policy NAME",
@@ -54,7 +53,6 @@ TABLE = {
     "live --replay a.rec --controller pid": "--controller with --replay; allowed: without it",
     "live --policy circle nowhere --port 0": "policy = 'nowhere'",
     "live --policy circle nowhere --static page": "policy = 'nowhere'",
-    "live --static page --parameters tubes.toml": "tubes",
     "live --static page --parameters heavy.toml": "mass",
     "live --static own": "--static 'own' is not empty; allowed: a new or empty folder",
 }

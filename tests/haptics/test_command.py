@@ -80,7 +80,7 @@ def test_tables_say_lost_and_refused() -> None:
         {"stiffness": 0.0, "refused": "stiffness setpoint ..."},
     ]
     table = backdriving_table([{**run, "backdriving": pieces}])
-    assert "| law | sensors | uses the hand's force | at 500 N/m | at 0 N/m |" in table
+    assert "| controller | sensors | uses the hand's force | at 500 N/m | at 0 N/m |" in table
     assert "| mine | lab | no | 2; lost | refused |" in table
     piece = {"lost": [False], "overshoot_mm": [5.0], "speed": [1.5], "kinetic": [3.0], "energy": [0.0], "stored": 4.5}
     assert "| mine | lab | no | 5; 5 | - | 1.5; 1.5 | - | 3; 3 | 4.5 | 0; 0 | 0 |" in release_table(

@@ -92,7 +92,9 @@ def test_rows_by_number_are_found():
 def test_kernels_name_their_rows():
     root, found = pathlib.Path(__file__).parents[2], []
     packages = (birthsim_env, baselines, agents, studies)
-    for path in (one for package in packages for one in (root / package.__name__).rglob("*.py")):
+    for path in (
+        one for package in packages for one in (root / package.__name__).rglob("*.py") if one.parent.name != "__pycache__"
+    ):
         place = path.relative_to(root).as_posix()
         if place != HASH and "/physics/" not in place:
             found += [f"{place}: {row}" for row in rows_by_number(path.read_text(encoding="utf-8"))]
