@@ -1,5 +1,5 @@
 # make quick  lints, and runs the contracts and the stored bits: half a minute, between two edits
-# make run    installs, reproduces Fig. 4, trains a residual policy until it is 85 % below the paper's law, and evaluates it
+# make run    installs, reproduces Fig. 4, trains a residual policy and, by gradients, a controller from scratch, and evaluates them
 # make test   installs and runs the tests; make test-slow runs those marked slow; make portable runs them as other processors would
 # make kills kills every command at random moments, an hour or two, and writes docs/kills.md; it needs root, for a small disk
 # make fuzz tries odd input on everything that is read or called; make soak runs 10^8 policy steps (an hour or more)
@@ -78,11 +78,14 @@ $(TOOLS)/.ready: requirements/tools.txt
 # PyTorch is installed while Fig. 4 is computed.
 run: $(BASE)
 	@$(MAKE) --no-print-directory --jobs 2 figure $(AGENTS)
-	@echo "== 2 of 3: a residual policy on top of a law, half a minute to two minutes"
+	@echo "== 2 of 4: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim train --config circle_quick --seed 0 --out $(OUT)/policy
-	@echo "== 3 of 3: the paper's law, the best law and the residual on 64 episodes that training never saw"
-	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual --policy $(OUT)/policy \
+	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, half a minute"
+	rm -rf $(OUT)/scratch
+	$(BIN)/birthsim train --config circle_apg --steps 500000 --seed 0 --out $(OUT)/scratch
+	@echo "== 4 of 4: the paper's law, the best law, the controller from scratch and the residual on 64 episodes that training never saw"
+	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual:$(OUT)/scratch residual --policy $(OUT)/policy \
 	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
 	@echo "== What to try next"
 	@echo "$(BIN)/birthsim live                                       the rig in the browser, to be pulled with the mouse"
@@ -90,7 +93,7 @@ run: $(BASE)
 	@echo "$(BIN)/birthsim evaluate --controller residual --policy circle --out $(OUT)/learned       a policy trained for longer"
 
 figure: $(BASE)
-	@echo "== 1 of 3: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
+	@echo "== 1 of 4: the experiment of Fig. 4 (look at $(OUT)/figure4/figure4.png)"
 	$(BIN)/birthsim figure4 --out $(OUT)/figure4
 
 test: $(READY)
