@@ -38,7 +38,7 @@ def size_of(env: Any) -> int:
     return int(env.single_action_space.shape[0])
 
 
-FAST = ("valves", "no law")
+FAST = ("valves",)
 
 
 @pytest.mark.parametrize("name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LOOPS])

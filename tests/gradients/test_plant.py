@@ -30,6 +30,7 @@ def along(lanes: int, rig: Array, samples: int, seed: int) -> Derivatives:
     return Derivatives(SCALES * normal((18, lanes)), 0.1 * normal((4, lanes)), normal((samples, 2, lanes)), changes)
 
 
+@pytest.mark.slow
 def test_taped_and_tangent_steps_have_the_bits_of_the_plant() -> None:
     (plant, opening, force), (other, _, _), (third, _, _) = (plant_of(37, 0) for _ in range(3))
     forces = np.stack([force, -0.5 * force])
@@ -67,6 +68,7 @@ def test_gradients_are_differences_on_drawn_rigs() -> None:
     assert np.all(off(1e-6) < 1e-6)
 
 
+@pytest.mark.slow
 def test_reverse_is_forward_mode() -> None:
     plant, opening, force = plant_of(256, 6)
     state, forces = plant.state.copy(), np.stack([force, 0.3 * force])
