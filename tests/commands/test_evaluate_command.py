@@ -198,7 +198,7 @@ def test_the_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, 
     own, out = tmp_path / "own.py", tmp_path / "out"
     own.write_text(OWN + WAITING)
     names = ("--controller", f"{own}:Slam", f"{own}:Waits")
-    line = (*NARROW, "--episodes", 1, "--jobs", 2, "--plant", "randomised", *names, "--out", out)
+    line = (*NARROW[:-1], 1, "--jobs", 2, "--plant", "randomised", *names, "--out", out)
     status, _ = interrupted("comparison", line, lambda: list(out.rglob("*.json")))
     assert status == 130
     assert len(list(out.rglob("*.json"))) == 1

@@ -59,7 +59,7 @@ def test_a_pull_that_is_let_go_overshoots_less():
         "force_sensor": True,
     }
     has, plain = (
-        measure_release(rig=RIG.replace({"electronics.acceleration_bandwidth": hertz}).to_dict(), force_sensor=True, **settings)
+        measure_release(rig=RIG.replace({"electronics.acceleration_bandwidth": hertz}).to_dict(), **settings)
         for hertz in (300.0, 0.0)
     )
     assert np.median(has["overshoot_mm"]) < 0.5 * np.median(plain["overshoot_mm"])
