@@ -81,9 +81,9 @@ run: $(BASE)
 	@echo "== 2 of 4: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim train --config circle_quick --seed 0 --out $(OUT)/policy
-	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, half a minute"
+	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, less than a minute"
 	rm -rf $(OUT)/scratch
-	$(BIN)/birthsim train --config circle_apg --steps 500000 --seed 0 --out $(OUT)/scratch
+	$(BIN)/birthsim train --config circle_apg --steps 900000 --seed 0 --out $(OUT)/scratch
 	@echo "== 4 of 4: the paper's law, the best law, the controller from scratch and the residual on 64 episodes that training never saw"
 	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual:$(OUT)/scratch residual --policy $(OUT)/policy \
 	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
