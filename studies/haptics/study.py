@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from birthsim_env.physics.rig.parameters import load_parameters
 from studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from studies.haptics.tables import report
 from studies.results import Content
-from studies.study import Found, Options, Study
+from studies.study import Found, Options, Study, no_pictures
 
 UNITS = {
     "stiffness": "N/m", "peak": "N", "bandwidth": "Hz", "unnoticed": "Hz", "unnoticed_without_work": "Hz", "energy": "J",
@@ -52,7 +53,7 @@ def _pictures(content: Content, folder: Path) -> list[Path]:
     return haptic_figures(content["figures"], folder)
 
 
-def _haptics(name: str, **options: Any) -> Study:
+def _haptics(name: str, draw: Callable[[Content, Path], list[Path]], **options: Any) -> Study:
     """A study of some controllers; the seeds are of worlds on which nothing was tuned or decided."""
     return Study(
         ("studies.haptics.measurements",),
@@ -61,7 +62,7 @@ def _haptics(name: str, **options: Any) -> Study:
             "sensors": ("ideal", "lab"), "subject": SUBJECTS, "rigs": 4, "nominal": False, "no_force_sensor": False,
             "seed": 4_100_000, "parameters": "", **options,
         },
-        _tasks, _kept, UNITS, partial(_shown, name=name), _pictures,
+        _tasks, _kept, UNITS, partial(_shown, name=name), draw,
         allowed={"sensors": tuple(SENSORS), "subject": SUBJECTS},
         words={
             "controller": "registered names, with options, or path/to/file.py:Class", "rigs": "randomised ones",
@@ -71,8 +72,8 @@ def _haptics(name: str, **options: Any) -> Study:
     )  # fmt: skip
 
 
-STUDY = _haptics("haptics")
+STUDY = _haptics("haptics", _pictures)
 LIMITS = _haptics(
-    "limits", sensors=("lab", "honest"), subject=("hands", "release"), seed=6_400_000, rigs=24,
+    "limits", no_pictures, sensors=("lab", "honest"), subject=("hands", "release"), seed=6_400_000, rigs=24,
     controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
 )  # fmt: skip
