@@ -43,7 +43,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             "study speed"),
     },
     "learn": {
-        "train": Command("baselines", "commands.train", "residual policies by PPO, SAC or TQC",
+        "train": Command("baselines", "commands.train", "policies by PPO, SAC, TQC or gradients",
             "train --config circle --seeds 5 --out out/circle"),
         "distill": Command("agents", "commands.distill", "students without what their teachers are told",
             "distill --teacher out/told --out out/students"),

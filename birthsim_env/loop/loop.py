@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import Stage, address_of, carray, described, pointer
 from birthsim_env.loop.stage import call as call_stage
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
 WORTH_A_THREAD = 300
@@ -27,6 +27,40 @@ WORTH_A_THREAD = 300
 
 Place = tuple[Array, int]
 """An array (rows, N) and the row of ``World``, or of ``Seen``, at which it stands in a block."""
+
+
+@helper
+def load_rows(moves: NDArray[np.int64], lanes: int, start: int, n: int, space: Array) -> None:
+    """Copies ``n`` lanes from ``start`` on, of arrays that ``_run`` describes, into a block (rows, BLOCK)."""
+    for m in range(moves.shape[0]):
+        count, row = moves[m, 1], moves[m, 2]
+        array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+        for k in range(count):
+            for i in range(n):
+                space[row + k, i] = array[k, start + i]
+
+
+@helper
+def store_rows(moves: NDArray[np.int64], lanes: int, start: int, n: int, space: Array) -> None:
+    """Copies the block back into those arrays that are written."""
+    for m in range(moves.shape[0]):
+        count, row = moves[m, 1], moves[m, 2]
+        array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
+        if moves[m, 3]:
+            for k in range(count):
+                for i in range(n):
+                    array[k, start + i] = space[row + k, i]
+
+
+@helper
+def run_stage(stages: NDArray[np.int64], s: int, base: np.int64, start: int, n: int) -> int:
+    """Calls one of the ``stages`` that ``_run`` describes, on a block at the address ``base``; what it returns."""
+    places = (
+        base + stages[s, 1] * BLOCK * 8 if stages[s, 1] >= 0 else 0,
+        base + stages[s, 2] * BLOCK * 8,
+        base + stages[s, 3] * BLOCK * 8,
+    )
+    return call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
 
 
 @kernel
@@ -40,28 +74,12 @@ def _run(
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):
         n = min(BLOCK, last - start)
-        for m in range(moves.shape[0]):
-            count, row = moves[m, 1], moves[m, 2]
-            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-            for k in range(count):
-                for i in range(n):
-                    space[row + k, i] = array[k, start + i]
+        load_rows(moves, lanes, start, n, space)
         for period in range(periods):
             for s in range(stages.shape[0]):
                 if stages[s, 6] == 0 or period == periods - 1:
-                    places = (
-                        base + stages[s, 1] * BLOCK * 8 if stages[s, 1] >= 0 else 0,
-                        base + stages[s, 2] * BLOCK * 8,
-                        base + stages[s, 3] * BLOCK * 8,
-                    )
-                    missed += call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
-        for m in range(moves.shape[0]):
-            count, row = moves[m, 1], moves[m, 2]
-            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-            if moves[m, 3]:
-                for k in range(count):
-                    for i in range(n):
-                        array[k, start + i] = space[row + k, i]
+                    missed += run_stage(stages, s, base, start, n)
+        store_rows(moves, lanes, start, n, space)
     return missed
 
 

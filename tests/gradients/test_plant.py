@@ -16,7 +16,7 @@ from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.gradients.plant import Derivatives, jvp, rig_jacobian, vjp
 from birthsim_env.physics.gradients.right_hand_side import INPUTS, RIG, made
 from birthsim_env.physics.rig.parameters import load_parameters
-from tests.gradients.rigs import SCALES, plant_of
+from studies.gradients.states import SCALES, plant_of
 
 DURATION = 0.01
 

@@ -19,7 +19,7 @@ from birthsim_env.physics.gradients import tracing
 from birthsim_env.physics.gradients.graph import Graph
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics.gradients.right_hand_side import INPUTS
-from birthsim_env.physics.gradients.steps import STAGES, back_over, lay_out
+from birthsim_env.physics.gradients.steps import STAGES, adjoint, back_over, lay_out
 
 ROWS = [*range(STATE, STATE + STATES), *range(WORLD + OPENING, WORLD + OPENING + 4), FORCE, FORCE + 1]
 """Of the space, in the order of gradients: state, openings, force."""
@@ -50,7 +50,7 @@ def _back(tape: int, bars: int, out: int, rig: int, clock: Clock, lane: int, n: 
         for i in range(n):
             f[row, i] = given[PUSHED + row, i]
     lay_out(points, u, f, p, steps, step, x, dx, sums, trial, n)
-    back_over(points, u, f, p, steps, step, late, x, g, by, total, n)
+    back_over(adjoint, points, u, f, p, steps, step, late, x, g, by, total, n)
     dynamics.settle(late, n)
     dynamics.copy(late, total, n)
     dynamics.store(total, 0, n, result)

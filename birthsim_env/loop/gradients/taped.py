@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.gradients.traced import Adjoint
-from birthsim_env.loop.loop import Loop, Place
-from birthsim_env.loop.stage import Stage, carray, pointer
+from birthsim_env.loop.loop import Loop, Place, load_rows, run_stage, store_rows
+from birthsim_env.loop.stage import Stage
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
@@ -42,12 +42,7 @@ def _forward(
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):
         n, place = min(BLOCK, last - start), 0
-        for m in range(moves.shape[0]):
-            count, row = moves[m, 1], moves[m, 2]
-            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-            for k in range(count):
-                for i in range(n):
-                    space[row + k, i] = array[k, start + i]
+        load_rows(moves, lanes, start, n, space)
         for period in range(periods):
             for s in range(stages.shape[0]):
                 if stages[s, 6] == 0 or period == periods - 1:
@@ -57,19 +52,8 @@ def _forward(
                                 _keep(space, reads, kept[e, 2], kept[e, 3], tape[start // BLOCK, place:], n)
                                 place += kept[e, 3]
                         if after == 0:
-                            places = (
-                                base + stages[s, 1] * BLOCK * 8 if stages[s, 1] >= 0 else 0,
-                                base + stages[s, 2] * BLOCK * 8,
-                                base + stages[s, 3] * BLOCK * 8,
-                            )
-                            missed += call_stage(stages[s, 0], *places, stages[s, 4], stages[s, 5], start, n)
-        for m in range(moves.shape[0]):
-            count, row = moves[m, 1], moves[m, 2]
-            array = carray(pointer(moves[m, 0], np.float64), (count, lanes))
-            if moves[m, 3]:
-                for k in range(count):
-                    for i in range(n):
-                        array[k, start + i] = space[row + k, i]
+                            missed += run_stage(stages, s, base, start, n)
+        store_rows(moves, lanes, start, n, space)
     return missed
 
 

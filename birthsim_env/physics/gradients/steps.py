@@ -6,6 +6,8 @@ What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from birthsim_env.physics import dynamics
@@ -76,54 +78,19 @@ def take_in(total: Array, late: Array, n: int) -> None:
 
 @helper
 def back_over(
-    points: Array,
-    u: Array,
-    f: Array,
-    p: Array,
-    steps: int,
-    step: float,
-    late: Array,
-    x: Array,
-    g: Array,
-    out: Array,
-    total: Array,
-    n: int,
-) -> None:
+    walk: Callable[..., None], points: Array, u: Array, f: Array, p: Array, steps: int, step: float, late: Array, x: Array,
+    g: Array, out: Array, total: Array, n: int,
+) -> None:  # fmt: skip
     """Takes the gradient ``late`` (18, n) at the end of the steps of ``points`` to their beginning.
 
-    What it has to openings and force grows in rows of ``total`` (INPUTS, n), whose first 18 are zero.
+    What it has to openings and force, and where ``walk`` is ``adjoint_rig`` to the rig's parameters, grows in rows of ``total``
+    (INPUTS or EVERY, n), whose first 18 are zero.
     """
     for k in range(STAGES * steps - 1, -1, -1):
         stage = k % STAGES
         seed(late, out, weight_of(stage, step), ahead_of(stage, step), g, n)
         dynamics.copy(points[k], x, n)
-        adjoint(x, u, f, p, g, out, n)
-        add(out, total, n)
-        if stage == 0:
-            take_in(total, late, n)
-
-
-@helper
-def back_over_rig(
-    points: Array,
-    u: Array,
-    f: Array,
-    p: Array,
-    steps: int,
-    step: float,
-    late: Array,
-    x: Array,
-    g: Array,
-    out: Array,
-    total: Array,
-    n: int,
-) -> None:
-    """As ``back_over`` with the rig's parameters: ``total`` is (EVERY, n)."""
-    for k in range(STAGES * steps - 1, -1, -1):
-        stage = k % STAGES
-        seed(late, out, weight_of(stage, step), ahead_of(stage, step), g, n)
-        dynamics.copy(points[k], x, n)
-        adjoint_rig(x, u, f, p, g, out, n)
+        walk(x, u, f, p, g, out, n)
         add(out, total, n)
         if stage == 0:
             take_in(total, late, n)
@@ -175,9 +142,9 @@ def backward(
             load(forces[k // steps], first, n, f)
             lay_out(points, u, f, p, 1, step, x, dx, sums, trial, n)
             if rig:
-                back_over_rig(points, u, f, p, 1, step, lam, x, g, out, total, n)
+                back_over(adjoint_rig, points, u, f, p, 1, step, lam, x, g, out, total, n)
             else:
-                back_over(points, u, f, p, 1, step, lam, x, g, out[:INPUTS], total[:INPUTS], n)
+                back_over(adjoint, points, u, f, p, 1, step, lam, x, g, out[:INPUTS], total[:INPUTS], n)
             dynamics.settle(lam, n)
             if k % steps == 0:
                 store(total[INPUTS - 2 : INPUTS], first, n, by_force[k // steps])
