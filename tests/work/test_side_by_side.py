@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import process_executor
 
 from baselines.work.side_by_side import side_by_side
 
@@ -40,6 +41,22 @@ def test_what_the_caller_raises_ends_the_workers_at_once():
     with pytest.raises(KeyboardInterrupt):
         side_by_side(time.sleep, [(0,), (600,), (600,)], 2, interrupt)
     assert time.monotonic() - began < 300
+
+
+def test_a_manager_that_misses_a_cancelled_piece_says_nothing(monkeypatch):
+    manager, cancelled = process_executor._ExecutorManagerThread, []
+    look = manager.add_call_item_to_queue
+
+    def miss(self):
+        if self.executor_flags.kill_workers:
+            cancelled.append(1)
+            raise KeyError(12)
+        look(self)
+
+    monkeypatch.setattr(manager, "add_call_item_to_queue", miss)
+    with pytest.raises(ZeroDivisionError):  # pytest fails where a thread ends with an exception that nobody hears
+        side_by_side(divmod, [(1, 0), (1, 1)], 2, lambda number, result: None)
+    assert cancelled
 
 
 def test_what_a_piece_raises_is_raised_here():

@@ -85,6 +85,7 @@ def test_mass_and_friction_change_the_rig(page) -> None:
         assert np.array_equal(told.rows[-1, : len(wanted)], wanted)
 
 
+@pytest.mark.slow
 def test_the_next_episode_follows_without_a_jump(page) -> None:
     steps = [
         ("set", {"scenario": "dystocia", "scenario_force": True, "controller": "pid"}),
