@@ -4,8 +4,6 @@
 interpreter that runs this.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """Learned residuals on top of a control law; importing this package registers the environments of ``birthsim_env``."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,5 @@
 """Controllers of the rig and their evaluation; laws know measurements and references, never an environment."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,5 @@
 """What each controller is, in a sentence: for the page of ``birthsim live`` and for the documentation."""
 
-from __future__ import annotations
-
 RESIDUAL = "residual"
 """The controller with a trained policy, which stands above this package; ``residual:circle`` names its policy."""
 

@@ -1,7 +1,5 @@
 """What every controller looks like."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 

@@ -1,7 +1,5 @@
 """The impedance that a law means to render: the mass, damping and stiffness that a hand should feel about the target."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 

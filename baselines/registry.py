@@ -3,8 +3,6 @@
 A factory takes the rig as its owner describes it, and keyword options, and returns a ``Controller``.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from functools import partial

@@ -3,8 +3,6 @@
 ``driving`` puts any controller, compiled or not, into a loop.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

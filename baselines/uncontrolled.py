@@ -1,7 +1,5 @@
 """What any controller should beat: shut valves, slammed valves, random openings. They look at nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.loop.signals import Mask, Measurement, Reference

@@ -1,7 +1,5 @@
 """From wanted rates of force and pneumatic stiffness to spool openings: (10), the inverse A-T transform, the inverse valves."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``birthsim doctor``: what works on this machine, and what to install for the rest."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re

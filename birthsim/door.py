@@ -4,8 +4,6 @@ What a command imports takes seconds. This module imports next to nothing, so th
 a command in one line from its first moment on.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import NamedTuple
 

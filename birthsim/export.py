@@ -1,7 +1,5 @@
 """``birthsim export --to FORM``: what leaves BirthSIM, each form by the command that writes it."""
 
-from __future__ import annotations
-
 import sys
 
 from baselines.commands.start import perform

@@ -1,7 +1,5 @@
 """``birthsim run``: one episode of one controller, its error over time printed, its motion drawn."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``birthsim study``: the door to the project's studies, which come with a clone and not with the wheel."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from importlib.util import find_spec

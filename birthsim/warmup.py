@@ -1,7 +1,5 @@
 """``birthsim warmup``: compile ahead what commands need first, so that the first one starts at once."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from typing import Any

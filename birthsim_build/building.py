@@ -1,7 +1,5 @@
 """Builds a bundle for a target into a folder."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path

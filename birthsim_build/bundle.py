@@ -1,7 +1,5 @@
 """What is built together: scenarios with sensors, laws, and the plant; with the code that all need."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

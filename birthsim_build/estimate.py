@@ -3,8 +3,6 @@
 The law runs on this machine, on what sensors said in a closed loop, as code that counts its operations after all optimisation.
 """
 
-from __future__ import annotations
-
 import ctypes
 import platform
 import tempfile

@@ -5,8 +5,6 @@ its stages, places where an address has to be put, and their memory, constants a
 beginning, so that whoever has an image may copy it, and exchange one part for another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ Rows are doubles, one lane. First ``World``, then ``Seen``, as in ``birthsim_env
 person or another program acts on a loop that has its own scenario.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import accumulate
 

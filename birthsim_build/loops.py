@@ -1,7 +1,5 @@
 """The closed loops that are built: environment, sensors and controller as parts, the same stages as in Python."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeGuard

@@ -3,8 +3,6 @@
 The page's rig has them too. Besides: what a law without a residual is asked for, and one valve per cylinder.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_build.layout import Inputs, Passages

@@ -1,7 +1,5 @@
 """Builds the simulation of an environment from the arguments of ``gym.make``, refusing what cannot be."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The single environment: one lane of the simulation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """What the single and the vector environment share: episodes of lanes, their seeds, rewards, observations and frames."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np

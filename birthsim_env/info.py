@@ -1,7 +1,5 @@
 """The ``info`` of the environments: the true state of the rig and its task in SI units."""
 
-from __future__ import annotations
-
 from birthsim_env.loop.rows import Signals, World
 from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import control_model, dynamics

@@ -3,8 +3,6 @@
 Other distributions (``openai-agents``) and folders of users have packages of that name too.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

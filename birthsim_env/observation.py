@@ -3,8 +3,6 @@
 All entries come from measurements (noisy and late with ``lab`` sensors).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What closes a policy step: reward, success, info and observation of all lanes, as one stage of the closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

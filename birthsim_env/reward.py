@@ -8,8 +8,6 @@ constant of 60 ms, and the error against it counts as at any other time. A rewar
 haste, and rigs near their limit do not return from an overshoot.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.loop.rows import World

@@ -3,8 +3,6 @@
 ``birthsim study scores`` measures them and writes the file that lies beside this module.
 """
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -5,8 +5,6 @@ plant moves, and then reference, hand and sensors are brought to the new instant
 all periods of a policy step are one call; the loop stops only for what a user has written in Python.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol
 

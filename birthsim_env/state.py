@@ -5,8 +5,6 @@ and lists, tuples, dictionaries and objects of these. What pickling a part leave
 and frozen dataclasses are constants. Nothing in the dictionary can run.
 """
 
-from __future__ import annotations
-
 import json
 from enum import Enum
 from pathlib import PurePath

@@ -1,7 +1,5 @@
 """What counts as success: an episode that goes on to its end and stays within a millimetre of the compliant target."""
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.loop.rows import World

@@ -1,7 +1,5 @@
 """The native vector environment: N lanes of one scenario in one kernel call."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """birthsim distill: recurrent students of privileged policies, where TEACHER/seed_0 ... hold one teacher for each student."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What birthsim evaluate does: controllers over seeded episodes, tables, JSON and figures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """birthsim explain: what a trained residual has learned, and what a hand feels of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any

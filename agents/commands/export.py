@@ -1,7 +1,5 @@
 """birthsim export: a trained policy as one file for other runtimes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """What birthsim train does: residual policies by reinforcement learning or by gradients, several seeds in one command."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A trained residual as a controller: what the environments do inside, from measurements alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -4,8 +4,6 @@ The arrays are mean, variance, of layer k k.weight and k.bias, and of a memory e
 own.bias; the JSON has format, environment, residual settings, training configuration and a checksum of the file.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

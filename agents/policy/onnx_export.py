@@ -5,8 +5,6 @@ The file's metadata (``metadata_props``): ``format``; ``environment``, on which 
 has "memory" (N, cells) as a further input, zeros where an episode begins, and "next_memory" as a further output, both float64.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 import warnings

@@ -1,7 +1,5 @@
 """A safetensors file with JSON about its arrays and a SHA-256 of every byte: what has changed is refused, nothing can run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from typing import Any

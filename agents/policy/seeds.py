@@ -1,7 +1,5 @@
 """Policies of several training seeds: where they are, and what they reach together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

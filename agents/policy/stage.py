@@ -1,7 +1,5 @@
 """A policy as a stage of the closed loop, before the law that it corrects: the same bits as ``ResidualController``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The figure of what a residual has learned."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 All experiments are of a rig with ideal sensors; a correction is the force that the residual makes the law believe in.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import product

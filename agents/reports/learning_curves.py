@@ -1,7 +1,5 @@
 """Learning curves of several training seeds: interquartile mean and 95 % bootstrap interval over the seeds."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -9,8 +9,6 @@ Beyond ``SWING`` the valves saturate, and the law by itself keeps up a swing tha
 residual. It then works with less stiffness, until the swing has died.
 """
 
-from __future__ import annotations
-
 from baselines.admittance.law import sustained
 from baselines.admittance.rows import HalfWave
 from baselines.backstepping.cartesian_law import across, along

@@ -1,7 +1,5 @@
 """The scenarios with the law inside: a policy adds a residual."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from agents.residual.law import ResidualActuation

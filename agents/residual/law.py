@@ -8,8 +8,6 @@ softened an axis never recovered. Forces and stiffness yield where pistons oscil
 a law the actions are the openings.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Its observer is given the hand's force. It never lets a piston rest: a residual is there for what friction hides.
 """
 
-from __future__ import annotations
-
 from agents.residual import unexplained
 from baselines.estimation import disturbance_observer, observers
 from baselines.estimation.rows import Belief, Given, Pistons

@@ -3,8 +3,6 @@
 No controller can know them. A policy that does says what is left to be learned by one that guesses them from measurements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

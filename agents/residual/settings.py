@@ -1,7 +1,5 @@
 """What a residual may do, and on which law."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

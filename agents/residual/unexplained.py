@@ -4,8 +4,6 @@ An observer finds the force that accelerates each piston unexplained; dry fricti
 turns. What was met when the piston last moved out and in tells weight and friction apart, and friction before it jumps.
 """
 
-from __future__ import annotations
-
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry
 from birthsim_env.physics.compiled import exact

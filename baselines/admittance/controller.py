@@ -6,8 +6,6 @@ halved as well.
     birthsim tune --controller admittance-backstepping --trials 45 --seed 1 --sensors lab --start gains.json --out out/tune/lab
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """What the admittance law knows, over N lanes, for a planner that commands by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

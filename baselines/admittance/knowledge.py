@@ -7,8 +7,6 @@
 - learn: the level of friction from what is left unexplained, and without a force sensor the hand's force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

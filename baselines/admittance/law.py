@@ -14,8 +14,6 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
 - ``lead``: the commanded opening takes the spool, whose lag is known, where the law wants it.
 """
 
-from __future__ import annotations
-
 from baselines.admittance.rows import Gains, HalfWave, Known, Memory, Watch
 from baselines.backstepping.cartesian_law import across, along, load_rates, pressure_openings
 from baselines.estimation.rows import Belief

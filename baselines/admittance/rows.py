@@ -1,7 +1,5 @@
 """Rows of the admittance law: what it remembers, what it knows at one instant, and its constants."""
 
-from __future__ import annotations
-
 from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand

@@ -1,7 +1,5 @@
 """The admittance law as a stage of the closed loop: what is known, then ``law.command``; and what is known by itself."""
 
-from __future__ import annotations
-
 from baselines.admittance import knowledge, law
 from baselines.admittance.rows import Beliefs, Constants, Known, Memory
 from birthsim_env.loop.rows import Seen

@@ -1,7 +1,5 @@
 """Backstepping that renders any symmetric positive definite stiffness matrix, where (18) keeps only the diagonal of J^T K J."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import ClassVar
 

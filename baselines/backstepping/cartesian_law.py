@@ -11,8 +11,6 @@ The last term stands for Fv in ``gains.closed_loop_stiffness``. At rest under a 
 friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever the size of e.
 """
 
-from __future__ import annotations
-
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
 from baselines.estimation.stages import Estimate

@@ -1,7 +1,5 @@
 """Joint stiffness setpoints from Cartesian ones (18): the diagonal of J^T diag(Kclx, Kcly) J."""
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled.compilation import helper
 
 

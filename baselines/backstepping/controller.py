@@ -1,7 +1,5 @@
 """The paper's controller as a user calls it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -15,8 +15,6 @@ which is 0.77 without viscous friction. More damping takes a larger sum. Within 
 c1 = c3 > c2, the largest root of a quartic, and it exists for any damping above the least.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

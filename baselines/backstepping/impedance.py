@@ -7,8 +7,6 @@ The paper's law has one such Z per piston, which the Jacobian (16) turns into J^
 matrices in the place of numbers. Above (a2 - phi)/2 pi, 15 Hz and more from 2000 N/m on, the rest of the series counts.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

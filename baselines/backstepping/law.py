@@ -10,8 +10,6 @@ A = ad - c1 (v - vd) - z1 - c2 z2, kappa' = kappa (v2/r2 + v1/r4 + p v1), p = 2 
     F2* = m A2 + Fext2 + Ff2 - [m (g cos(theta1) + r2 theta1'^2), the part (14) that weight compensation puts back]
 """
 
-from __future__ import annotations
-
 import math
 
 from baselines.backstepping.cartesian_stiffness import joint_stiffness1, joint_stiffness2

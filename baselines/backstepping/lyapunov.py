@@ -15,8 +15,6 @@ its viscous friction; then V falls where ``decay`` is positive. Nothing is prove
 gains), valves that lag or saturate, or forces that the model does not know, such as the hand's.
 """
 
-from __future__ import annotations
-
 import copy
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ setpoint asks for unstable, and saturated valves then keep up a swing of 100 mm 
 ``birthsim study stiffest`` measures. ``RATE`` is below all of them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

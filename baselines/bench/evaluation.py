@@ -1,7 +1,5 @@
 """Runs a controller over seeded episodes of an environment and measures it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Evaluations as CSV: a row per metric and controller."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ between atmosphere and supply, can push with (Ps - Pa) Sp and pull with (Ps - Pa
 controller stays on the target.
 """
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

@@ -5,8 +5,6 @@ lane that leaves the physical range is lost: it is measured no further, and put 
 harms nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """What an evaluation measures, accumulated while lanes run: tracking, stiffness, hunting, air."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Evaluations in pieces: some episodes of one controller each, which several processes and interrupted runs put together."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 from collections.abc import Callable, Sequence

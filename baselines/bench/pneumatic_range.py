@@ -1,7 +1,5 @@
 """Which pneumatic stiffness a cylinder can have while it holds a load: pressures lie between atmosphere and supply."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array

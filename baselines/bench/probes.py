@@ -3,8 +3,6 @@
 Every lane is one case with a pose, a force, a stiffness and a rig of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

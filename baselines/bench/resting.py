@@ -1,7 +1,5 @@
 """Rigs that rest on their targets under a controller: what the stiffness test, haptics and the laboratory share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

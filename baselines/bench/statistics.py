@@ -5,8 +5,6 @@ nothing by losing an episode, every figure of a lost episode counts as infinite:
 infinite too, and print as "lost". NaN is an episode that says nothing about a metric; it counts nowhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

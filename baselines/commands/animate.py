@@ -1,7 +1,5 @@
 """birthsim animate: two controllers in the same world beside each other, as an animated picture in real time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial

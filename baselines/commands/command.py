@@ -1,7 +1,5 @@
 """How a command runs: its settings are read, signals are answered, and what a user can mend ends it in one line."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

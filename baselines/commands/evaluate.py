@@ -1,7 +1,5 @@
 """birthsim evaluate: controllers over seeded episodes, tables, JSON and figures; ``agents.commands`` does it, policies too."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """birthsim figure4: the experiment of the paper's Fig. 4 on the full plant, its figures and its picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """birthsim identify: a laboratory's own rig from a log, and the experiment that makes such a log."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field

@@ -2,7 +2,7 @@
 
 The settings of a command are a dataclass. Its docstring says what the command does; every field is an option of the command
 line and a key of ``--config``, and the text below a field is its help. This module imports nothing that is slow to load, so
-that help comes at once. Its annotations are no text, as others inherit them.
+that help comes at once.
 """
 
 import math

@@ -4,8 +4,6 @@ What a command imports takes seconds. This module imports next to nothing, so th
 first moment on.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """birthsim train: policies by reinforcement learning or gradients, several seeds at once; ``agents.commands`` does it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """What commands look at before they begin: the environment, its world, and the controllers' options."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

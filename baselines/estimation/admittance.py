@@ -6,8 +6,6 @@ with the full symmetric stiffness matrix K. At rest it stands on the compliant t
 K, whatever its own stiffness. The mass is the rig's own, so that the hand feels no other inertia than what it moves anyway.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ the believed spool lets through and the dead volume, and corrected by what its c
 so that noise is averaged over 1/w without the delay of a filter: only the model's error of P' lags, and by 1/w.
 """
 
-from __future__ import annotations
-
 from baselines.valve_inverse import driving_flows
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import control_model, valves

@@ -6,8 +6,6 @@ At rest d takes up friction and the model's errors, so that the force follows th
 the compliance error in disguise.
 """
 
-from __future__ import annotations
-
 from baselines.estimation.rows import Belief, Given, Pistons
 from birthsim_env.loop.signals import Joints, PerChamber, Point
 from birthsim_env.physics import geometry, mechanics

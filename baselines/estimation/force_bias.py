@@ -5,8 +5,6 @@ balance of the chambers gives the hand only up to friction, which is ten times t
 believed to have is not taken off: a hand that was there at the start costs no more than that.
 """
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 

@@ -8,8 +8,6 @@ itself where less friction is there than believed. What is left at the start, be
 mass and of the pressure cells.
 """
 
-from __future__ import annotations
-
 from baselines.estimation import force_bias
 from birthsim_env.loop.signals import Joints, PerPiston
 from birthsim_env.physics import geometry

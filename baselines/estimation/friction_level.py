@@ -7,8 +7,6 @@ while the piston slides as u says. Only sliding in both directions separates the
 what the observer found besides, so that it does not depend on what has been learned.
 """
 
-from __future__ import annotations
-
 from baselines.estimation.rows import Belief
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.compilation import helper

@@ -11,8 +11,6 @@ Noise of 0.02 m/s2 at 1 kHz and of 0.1 mm at 240 Hz have their Kalman filter at 
 q = 4e-7 m2/s3 and r = 4.2e-11 m2 s; the speed is then known to 0.24 mm/s. Friction turns within 0.24 mm of motion.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.staged import LawStage

@@ -16,8 +16,6 @@ and position samples move y alone, by 1 - exp(-ws Ts). A piston counts as restin
 low-passed innovation is larger than noise explains, or when the observer is given that the reference moves.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.estimation.disturbance_observer import accelerations

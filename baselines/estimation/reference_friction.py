@@ -3,8 +3,6 @@
 It is there before an observer sees it, and since it never looks at the measured speed it cannot excite itself.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.loop.signals import Joints, Motion

@@ -1,7 +1,5 @@
 """Rows that the parts of an estimate share."""
 
-from __future__ import annotations
-
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics.compiled.lanes import Rig
 from birthsim_env.physics.compiled.records import Numbers, Rows, number, part, row, rows

@@ -1,7 +1,5 @@
 """Stages that laws share: the motion that the hand should find, and where the pistons are."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.estimation.admittance import DAMPING_RATIO, Compliance, give_way, mark_moving

@@ -6,8 +6,6 @@ So the samples give s without a model of the rig, wherever the noise comes from.
 35 um; larger ones are clipped.
 """
 
-from __future__ import annotations
-
 from birthsim_env.loop.rows import Signals
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array

@@ -1,7 +1,5 @@
 """One episode as a figure: where the end effector is, how far from where it should be, and the hand's force."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures: PNG and SVG, units on every axis, line styles that survive a grey print."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -9,8 +9,6 @@ The forces of the chambers that balance the weight are those of now and the hand
 oscillation the acceleration averages to nothing.
 """
 
-from __future__ import annotations
-
 import math
 
 from baselines.valve_inverse import driving_flows

@@ -19,8 +19,6 @@ The tank needs a force sensor. Energy tanks: Ferraguti, Secchi and Fantuzzi, ICR
 IEEE Transactions on Robotics and Automation 18(1), 2002. Figures without a source are assumed.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Signals of the last control periods, at the time at which a late position was taken."""
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.physics.compiled.compilation import helper

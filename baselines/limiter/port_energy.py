@@ -6,8 +6,6 @@ count without delay would let it be. With late positions, a hand that is a sprin
 amplitude X; with late forces, a hand that is a mass does. A rig whose oscillation decays fast enough passes both counts.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.loop.rows import Signals

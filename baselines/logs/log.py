@@ -1,7 +1,5 @@
 """A log: series of named numbers with units, whatever they were read from and whatever they will be written to."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

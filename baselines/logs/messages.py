@@ -1,7 +1,5 @@
 """Messages of an MCAP file, one after the other, of which no more is unpacked than a limit allows."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Iterator

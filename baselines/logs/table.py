@@ -1,7 +1,5 @@
 """Tables of named columns from CSV, Parquet and MCAP files, whoever wrote them."""
 
-from __future__ import annotations
-
 import csv
 import io
 from array import array

@@ -8,8 +8,6 @@ the event as JSON text; a metadata record ``birthsim``. Numbers are the shortest
 number. JSON has none that is not finite: a message leaves it out. Null, or a field of two types, is more than Foxglove reads.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

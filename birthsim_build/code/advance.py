@@ -1,7 +1,5 @@
 """What runs an image: a kernel over its parts, and ``birthsim_advance``, by which C and JavaScript call it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Objects for a target, made in a process of their own; and the linker of PyPI's ``ziglang``."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """How many operations of each kind code executes: counters put into its LLVM code."""
 
-from __future__ import annotations
-
 import re
 
 KINDS = {

@@ -1,7 +1,5 @@
 """What an object file in ELF holds: sizes of its sections, and the names that it expects from elsewhere."""
 
-from __future__ import annotations
-
 import struct
 
 SYMBOL_TABLE = 2

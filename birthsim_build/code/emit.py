@@ -6,8 +6,6 @@ The request names functions (``module:name``), the target, data (an NPZ file of 
 and whether the code counts its operations.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys

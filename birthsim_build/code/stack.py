@@ -1,7 +1,5 @@
 """How much stack code for ARM takes, from its assembly: frames of functions, and which function calls which."""
 
-from __future__ import annotations
-
 import re
 
 _LABEL = re.compile(r"^([\w.$]+):")

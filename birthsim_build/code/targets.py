@@ -1,7 +1,5 @@
 """Processors that are built for, as LLVM knows them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

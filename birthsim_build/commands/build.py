@@ -1,7 +1,5 @@
 """birthsim export: closed loops without Python, as WebAssembly, for C, or for a microcontroller."""
 
-from __future__ import annotations
-
 import platform
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """birthsim export: the rig for tools that speak FMI, alone or under a law."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """The C header, and an example with CMake and pkg-config."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

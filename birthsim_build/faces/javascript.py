@@ -1,7 +1,5 @@
 """The JavaScript module of a bundle, with its types and its data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The JavaScript module: rows and parts as data, and what names them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

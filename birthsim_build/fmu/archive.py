@@ -1,7 +1,5 @@
 """FMU files: a description and binaries in a ZIP archive, without Python inside."""
 
-from __future__ import annotations
-
 import tempfile
 import zipfile
 from collections.abc import Sequence

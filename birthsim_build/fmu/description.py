@@ -1,7 +1,5 @@
 """``modelDescription.xml`` of FMI 2.0 and 3.0: what a tool reads of a model before it loads it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """A model for FMI: which rows of a built loop are its inputs and outputs, and the C header that says so."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """Units of the project's figures as exponents of base units, as the FMI standards write them."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 

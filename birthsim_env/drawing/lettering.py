@@ -1,7 +1,5 @@
 """Text on pictures, in the typeface of the figures."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from collections.abc import Sequence

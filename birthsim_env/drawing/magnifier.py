@@ -1,7 +1,5 @@
 """The magnifier: surroundings of the compliant target, where millimetres can be seen."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

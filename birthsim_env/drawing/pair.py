@@ -1,7 +1,5 @@
 """Two runs of the same world beside each other: rig, magnifier and tracking error over time of each, to the same scales."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The panel beside the rig: magnifier, legend and chamber pressures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

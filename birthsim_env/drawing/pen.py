@@ -1,7 +1,5 @@
 """Primitives: colours, a pen in metres that skips whatever is not finite, markers and the force arrow."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

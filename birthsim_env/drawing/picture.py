@@ -1,7 +1,5 @@
 """One picture of the rig: header, main view and side panel."""
 
-from __future__ import annotations
-
 import math
 
 import pygame

@@ -1,7 +1,5 @@
 """The linkage as a picture: cylinders, pins, fetal head, the column that carries them, and how much room they take."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

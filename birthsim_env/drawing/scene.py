@@ -1,7 +1,5 @@
 """What a picture of the rig shows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

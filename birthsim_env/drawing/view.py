@@ -1,7 +1,5 @@
 """The rig in its workspace with everything that happens at the end effector: the main view of a picture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

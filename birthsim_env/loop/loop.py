@@ -4,8 +4,6 @@ A block of lanes is copied into scratch rows, goes through all periods there, an
 the number of lanes nor that of threads changes a bit.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait

@@ -3,8 +3,6 @@
 ``World`` is the truth, for the plant and what acts on it; ``Seen`` is what a controller is handed.
 """
 
-from __future__ import annotations
-
 from birthsim_env.loop.signals import Measurement, Point, Reference
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, PARAMETER_UNITS, STATE_NAMES, STATE_UNITS, Array
 from birthsim_env.physics.compiled.records import Rows, part, row, rows

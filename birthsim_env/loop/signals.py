@@ -3,8 +3,6 @@
 Arrays are (rows, N) over N lanes. Everything also works for one rig without the lane axis, (rows,).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -7,8 +7,6 @@ its address; ``block``, ``numbers`` and ``table`` make arrays of other addresses
 vectorises loops over it. A law is called with zero for the world.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial

@@ -1,7 +1,5 @@
 """Stages of the world: the plant with its clock, and what jumps."""
 
-from __future__ import annotations
-
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import Stage, scratch
 from birthsim_env.physics import dynamics, options, spools

@@ -4,8 +4,6 @@ An actuation is asked once per policy step where ``every_period`` is False, else
 ``two_valves`` has one valve per chamber, ``one_valve`` one 5/3 valve per cylinder (its chambers get opposite openings).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Protocol

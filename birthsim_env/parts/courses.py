@@ -1,7 +1,5 @@
 """The check of new episodes: what is asked for stays finite, reachable and stiff from their beginning to their end."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math

@@ -1,7 +1,5 @@
 """Parts of a user's own: classes and functions in Python files, plain functions of time, and CSV files."""
 
-from __future__ import annotations
-
 import csv
 import importlib.util
 import inspect

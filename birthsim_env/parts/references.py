@@ -4,8 +4,6 @@ A user's own trajectory derives from ``Trajectory`` and implements ``sample``. N
 start of every episode.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from typing import Any, Self

@@ -4,8 +4,6 @@
 source stands beside them; (0.5, 0) m is the centre of the workspace. ``docs/obstetrics.md`` lists every figure with its source.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

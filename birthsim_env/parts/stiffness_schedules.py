@@ -1,8 +1,6 @@
 """Setpoints over time: closed-loop stiffness (steps, as a user may change it at any control period) and pneumatic
 stiffness (minimum-jerk transitions, since a chamber takes time to fill)."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from itertools import pairwise

@@ -7,8 +7,6 @@ dT/dt = T [ (dP/dt)/P + (dV/dt)/V - (qin - qout) r T / (P V) ]
 Both are computed from powers, so that one division by P V serves a chamber.
 """
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled.compilation import helper
 
 

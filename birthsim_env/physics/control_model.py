@@ -4,8 +4,6 @@ For one cylinder of stroke l at position y: Lp = l/2 + y, Ln = l/2 - y. It knows
 exchange; the plant does. Scalar helpers for kernels; all of them also work on NumPy arrays through ``.py_func``.
 """
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled.compilation import helper
 
 

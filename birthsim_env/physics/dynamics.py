@@ -4,8 +4,6 @@ State rows are those of ``lanes.STATE_NAMES``. A kernel copies one block of lane
 shape, works there, and copies back; the right-hand side is inlined where it is used.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

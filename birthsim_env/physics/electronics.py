@@ -1,7 +1,5 @@
 """Control board and sensors as data: what the sensor models ``lab`` and ``honest`` take their figures from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from birthsim_env.physics.rig.quantities import Part, quantity

@@ -1,7 +1,5 @@
 """States to start from: pistons at given positions and speeds, chambers balanced at a pneumatic stiffness."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,8 +11,6 @@ under any oscillating force. The authors' sine transition is replaced by the cub
 has the same ends, middle and symmetry, and is at most 0.010 away.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.physics.compiled.compilation import helper

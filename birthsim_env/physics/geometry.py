@@ -5,8 +5,6 @@ the end take arrays of any shape. Angles: ``theta1`` is the tilt of cylinder 2 f
 With w = r4^2 - d3^2 - d6^2 and S = sqrt(4 d3^2 d6^2 - w^2): sin(gamma3 - theta1) = w / (2 d3 d6), cos = S / (2 d3 d6).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

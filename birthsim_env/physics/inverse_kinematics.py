@@ -6,8 +6,6 @@ With P, V, A, J the end effector's position to jerk: r2^2 = P.P and theta1 = ata
 and r4^2 = d3^2 + d6^2 + 2 d3 d6 sin(gamma3 - theta1) gives r4 in the same way.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.physics import geometry

@@ -1,7 +1,5 @@
 """Mechanics: accelerations of both pistons (5), pneumatic and external forces (3), and the end stops."""
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled.compilation import helper
 
 

@@ -12,8 +12,6 @@ kernels of ``dynamics``, which know none of them. With an option the state has f
   counted from where its weight holds it. Hand and tracker are at the handle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.physics import dynamics, valves

@@ -1,7 +1,5 @@
 """The plant alone: N rigs side by side, without Gymnasium."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -5,8 +5,6 @@ width. Within the deadband nothing opens; beyond it the characteristic is straig
 command, before the lag of the spool, and all are off by default.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the cylinders can bear: chambers between atmosphere and supply push with (Ps - Pa) Sp and pull with (Ps - Pa) Sn."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.physics.compiled.lanes import Array

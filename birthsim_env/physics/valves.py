@@ -5,8 +5,6 @@
 Every chamber has an orifice to the supply, C max(s, 0) + Cl, and one to the atmosphere, C max(-s, 0) + Cl.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

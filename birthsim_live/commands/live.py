@@ -1,7 +1,5 @@
 """birthsim live: the rig in the browser, in real time, to see and to push."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated

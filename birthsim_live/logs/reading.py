@@ -1,7 +1,5 @@
 """Logs from what the commands write: recordings, evaluations, and the traces in an evaluation's pieces."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable

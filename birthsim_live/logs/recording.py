@@ -11,8 +11,6 @@ others        {"events"}: those of its rows, {"row", "settings" | "path" | "lost
 A process that is killed leaves whole chunks, and perhaps a part of one at the end, which readers leave out.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

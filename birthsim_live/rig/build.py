@@ -1,8 +1,6 @@
 """Builds what the package carries of the page's rig: ``python -m birthsim_live.rig.build``, after a change of kernels,
 policies, words or version. It needs the extras ``agents`` and ``build``; ``tests/live/rig/test_built.py`` compares."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from birthsim_build.building import write_wasm

@@ -1,7 +1,5 @@
 """The page with a rig, as a folder of files that any server can show."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import tempfile

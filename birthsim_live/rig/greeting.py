@@ -1,7 +1,5 @@
 """What a page must know of a rig before it moves: what can be set, what it looks like, and what is said of all that."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

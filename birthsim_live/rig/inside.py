@@ -1,7 +1,5 @@
 """What goes on inside the cylinders: friction of the pistons and the air that flows into the chambers."""
 
-from __future__ import annotations
-
 from birthsim_env.physics import dynamics, friction
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import helper

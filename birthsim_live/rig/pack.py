@@ -3,8 +3,6 @@
 The files of ``page/worker`` read it. The code of the parts is the same for every rig and policy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a person can set: names, units, ranges and defaults. The page's worker refuses what is not among it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

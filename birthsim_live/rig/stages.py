@@ -1,7 +1,5 @@
 """Stages that only the page's rig has: its start, and what a frame shows of it."""
 
-from __future__ import annotations
-
 from birthsim_env.info import Info, describe
 from birthsim_env.loop.rows import Seen, World
 from birthsim_env.loop.stage import block, scratch

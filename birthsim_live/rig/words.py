@@ -1,7 +1,5 @@
 """What the page says of itself: its figures and plots, its choices, and where it comes from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Where a server listens, and who can reach it there."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import socket

@@ -1,7 +1,5 @@
 """The web server: the files of the page, and a socket for controllers; nothing for foreign origins."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 from urllib.parse import urlsplit

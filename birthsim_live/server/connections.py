@@ -1,7 +1,5 @@
 """Connections of the web server: how long a request may take to arrive, and what of broken ones is worth a line."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from functools import partial

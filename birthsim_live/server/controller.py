@@ -6,8 +6,6 @@ samples, else 0, and the rows of ``Signals``; the answer are the openings of the
 answer is a line of text, and the end.
 """
 
-from __future__ import annotations
-
 import asyncio
 import importlib.util
 import traceback

@@ -1,8 +1,10 @@
 """The public names of a package, with their docstrings, as MyST's directives of Python objects."""
 
+import ast
 import dataclasses
 import inspect
 import re
+import textwrap
 from importlib import import_module
 
 BEYOND = {
@@ -59,21 +61,36 @@ def _signature(thing: object, bound: bool = False) -> str:
         signature = inspect.signature(thing)
     except ValueError:
         return "()"
-    given = [_shown(one) for one in signature.parameters.values()][int(bound) :]
-    back = signature.return_annotation
-    returned = signature.empty if back is signature.empty or inspect.isclass(thing) else _plain(back)
+    written = _annotations(thing)
+    given = [_shown(one, written) for one in signature.parameters.values()][int(bound) :]
+    returned = signature.empty if inspect.isclass(thing) else written.get("return", signature.empty)
     return str(signature.replace(parameters=given, return_annotation=returned))
 
 
-def _shown(one: inspect.Parameter) -> inspect.Parameter:
-    noted = one.annotation if one.annotation is one.empty else _plain(one.annotation)
+def _shown(one: inspect.Parameter, written: dict[str, _Bare]) -> inspect.Parameter:
     # A default that is an object of ours says more by its class than by its address.
     simple = one.default is one.empty or isinstance(one.default, (bool, int, float, str, tuple, type(None)))
-    return one.replace(annotation=noted, default=one.default if simple else _Bare(f"{type(one.default).__name__}(...)"))
+    default = one.default if simple else _Bare(f"{type(one.default).__name__}(...)")
+    return one.replace(annotation=written.get(one.name, one.empty), default=default)
 
 
-def _plain(annotation: object) -> _Bare:
-    return _Bare(annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation)))
+def _annotations(thing: object) -> dict[str, _Bare]:
+    """The annotations of a function, of a class's ``__init__``, or of its fields, as their source has them."""
+    found = {}
+    for one in reversed(inspect.getmro(thing)[:-1]) if inspect.isclass(thing) else [thing]:
+        try:
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
+        except (OSError, TypeError):  # none of Python's
+            continue
+        inside = tree.body if inspect.isclass(one) else [tree]
+        for node in inside:
+            if isinstance(node, ast.FunctionDef) and (not inspect.isclass(one) or node.name == "__init__"):
+                given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
+                found |= {own.arg: _Bare(ast.unparse(own.annotation)) for own in given if own and own.annotation}
+                found |= {"return": _Bare(ast.unparse(node.returns))} if node.returns else {}
+            elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                found[node.target.id] = _Bare(ast.unparse(node.annotation))
+    return found
 
 
 def _text(thing: object) -> str:

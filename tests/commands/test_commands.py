@@ -1,7 +1,5 @@
 """What the console commands have in common: scripts, help, plain errors, strict JSON."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

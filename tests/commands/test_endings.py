@@ -1,7 +1,5 @@
 """How commands answer signals: in one line, from the first moment to the last."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

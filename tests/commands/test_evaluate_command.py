@@ -1,7 +1,5 @@
 """birthsim evaluate: tables, strict JSON and figures, a controller from a file, the comparison by pieces, and Ctrl-C."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import partial

@@ -1,7 +1,5 @@
 """The paper's experiment (Fig. 4), 16 s on the full plant with friction: what the law reaches, and the figures drawn of it."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 

@@ -1,7 +1,5 @@
 """The settings of commands: the same by option and by TOML, and names that help lists without an import."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

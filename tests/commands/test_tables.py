@@ -1,7 +1,5 @@
 """Tables that commands print: decimal points below each other, in 80 columns."""
 
-from __future__ import annotations
-
 import pytest
 
 from agents.commands import explain

@@ -1,7 +1,5 @@
 """birthsim train: a policy that birthsim evaluate runs, resuming, several seeds side by side, and Ctrl-C."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

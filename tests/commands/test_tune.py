@@ -1,7 +1,5 @@
 """birthsim tune: its search on costs that are known, its files, its costs on the plant, plain errors."""
 
-from __future__ import annotations
-
 import json
 import sys
 

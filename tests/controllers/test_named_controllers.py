@@ -15,7 +15,6 @@ RIG = Parameters()
 
 
 OWN = """
-from __future__ import annotations
 from dataclasses import dataclass
 import numpy as np
 

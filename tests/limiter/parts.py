@@ -1,7 +1,5 @@
 """The limiter's parts by themselves: kernels that call its helpers, over N lanes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.limiter import air_spring

@@ -1,7 +1,5 @@
 """What a sweep's file says: grids, draws that do not depend on their number, searches, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 

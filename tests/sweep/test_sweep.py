@@ -1,7 +1,5 @@
 """birthsim study sweep: grids, draws, searches and trainings, kept pieces, and the same bytes however many processes work."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

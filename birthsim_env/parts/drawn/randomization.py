@@ -1,7 +1,5 @@
 """Domain randomisation of the rig: uniform draws from the ranges that the parameter fields document."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math

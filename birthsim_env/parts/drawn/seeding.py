@@ -3,8 +3,6 @@
 Episode ``e`` of a lane seeded ``s`` depends on s and e alone, never on what happened in earlier episodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 

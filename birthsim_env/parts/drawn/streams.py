@@ -4,8 +4,6 @@ A lane's stream is PCG64 (O'Neill 2014: 128-bit congruential steps, "XSL RR" out
 (after O'Neill's ``seed_seq``). NumPy promises that neither changes. Its own ``Generator`` takes 30 us to make.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import cached_property

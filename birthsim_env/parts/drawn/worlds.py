@@ -1,7 +1,5 @@
 """New episodes of many lanes: their random streams, handed to every part that draws from them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The force of uterine contractions with maternal pushes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 None of them jumps: whatever they do, the rig can be asked to give way.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

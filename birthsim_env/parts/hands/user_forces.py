@@ -3,8 +3,6 @@
 A user's own force derives from ``UserForce`` and implements ``force``. The built-in ones are piecewise linear in time.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

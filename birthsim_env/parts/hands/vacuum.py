@@ -1,7 +1,5 @@
 """Tractions of a vacuum extraction, with the peak forces that were measured at births."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

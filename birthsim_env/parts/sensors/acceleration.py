@@ -4,8 +4,6 @@ It measures the mean acceleration of the control period that has just ended, beh
 off: positions give the angles of the rig to a few mrad, and what that leaves, 10 m/s2 times those, counts as bias.
 """
 
-from __future__ import annotations
-
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.records import Rows, row, rows

@@ -4,8 +4,6 @@ Figures, their basis and the ranges that are drawn from are fields of ``physics.
 is the sensor model ``lab`` to the last bit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """What a sensor model looks at where Python calls it instead of the closed loop."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Random numbers of a key and a counter, so that what a sensor shows does not depend on the order of lanes or calls."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

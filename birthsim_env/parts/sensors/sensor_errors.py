@@ -4,8 +4,6 @@ The tracker's distortion is a sum of ``WAVES`` plane waves per axis whose direct
 value where the tracker was registered: smooth, with the wavelength ``distortion_length`` and the given RMS over phases.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

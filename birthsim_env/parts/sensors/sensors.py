@@ -7,8 +7,6 @@ A sensor model's ``measure`` is called whenever somebody looks: at every control
 every policy period.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 import numpy as np

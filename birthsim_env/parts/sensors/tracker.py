@@ -3,8 +3,6 @@
 ``queue`` (Q, 3, N) holds the last samples taken, each a ``Sample``.
 """
 
-from __future__ import annotations
-
 import math
 
 from birthsim_env.physics.compiled.compilation import helper

@@ -10,8 +10,6 @@ depends on: all source files that the kernel's module imports, directly or not, 
 A file that is missing, damaged or cannot be written costs a compilation, never the command.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -6,8 +6,6 @@ these, from kernels and from Python. Errors, against 40 digits, are below one un
 said (`tests/physics/compiled/test_exact.py`). Sources: argument reduction of Cody and Waite (1980), Taylor series.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

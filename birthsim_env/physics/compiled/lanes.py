@@ -4,8 +4,6 @@ A lane is one environment. Arrays are laid out quantity by quantity, (rows, N), 
 over lanes with unit stride.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

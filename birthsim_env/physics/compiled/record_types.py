@@ -6,8 +6,6 @@ so that LLVM vectorises loops over its lanes. A layout is described by ``groups`
 ``layout``), ``size`` and ``per_lane``.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

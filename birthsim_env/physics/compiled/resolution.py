@@ -6,8 +6,6 @@ compile a kernel. Templates of the processor's own target are asked first. Those
 so the machine code stays the same.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any

@@ -13,8 +13,6 @@ Shut spools lie on a kink: opening fills a chamber from the supply, closing empt
 mean of both (``duals``). An opening on one side of zero, however small, gives the gain of that side.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A linear model with names and units, as arrays and as python-control's ``StateSpace``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Dataclass fields that know their unit, their basis, their limits and their range, and parts made of such fields."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Files that a user wrote: read whole where they are small, refused by name where they are not what they should be."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The sections of a rig, from its linkage to its air, with unit and basis of every figure."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Values that a user gives: their words in errors, and the checks that many arguments share."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import sys

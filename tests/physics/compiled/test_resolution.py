@@ -1,7 +1,5 @@
 """Types resolved first are those that Numba comes to without."""
 
-from __future__ import annotations
-
 import operator
 from typing import Any
 
