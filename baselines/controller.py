@@ -1,11 +1,11 @@
 """What every controller looks like."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import is_finite, is_within, limits, shown
 
@@ -40,54 +40,6 @@ def checked_command(name: str, command: Any, lanes: int) -> Array:
         row, lane = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0))[0])
         raise ValueError(f"controller {name!r}: command()[{row}, {lane}] = {array[row, lane]}; {expected}")
     return array
-
-
-def lanes_of(measurement: Measurement, reference: Reference) -> int:
-    """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
-    lanes = int(measurement.position.shape[1])
-    for name, signal, rows in (
-        ("measurement.position", measurement.position, 2),
-        ("measurement.velocity", measurement.velocity, 2),
-        ("measurement.pressures", measurement.pressures, 4),
-        ("measurement.user_force", measurement.user_force, 2),
-        (
-            "measurement.acceleration",
-            measurement.user_force if measurement.acceleration is None else measurement.acceleration,
-            2,
-        ),
-        ("reference.rows", reference.rows, REFERENCES),
-    ):
-        if signal.shape != (rows, lanes):
-            raise ValueError(
-                f"{name} has shape {signal.shape}; allowed: {(rows, lanes)}, with the lanes of measurement.position"
-            )
-    return lanes
-
-
-COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
-"""What ``command`` of a law may take besides the signals."""
-
-
-def feedforward_rows(
-    lanes: int, force: Array | None = None, rate: Array | None = None, factor: Array | None = None, *, taken: Sequence[str]
-) -> Array:
-    """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
-    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
-    given = np.zeros((5, lanes))
-    for name, rows, one in (
-        (COMMAND_OPTIONS[0], given[:2], force),
-        (COMMAND_OPTIONS[1], given[2:4], rate),
-        (COMMAND_OPTIONS[2], given[4], factor),
-    ):
-        if one is not None:
-            if name not in taken:
-                raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
-            if np.shape(one) != rows.shape:
-                raise ValueError(
-                    f"{name} has shape {np.shape(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
-                )
-            rows[:] = one
-    return given
 
 
 class Tunable(Protocol):

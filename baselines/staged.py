@@ -11,10 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.controller import COMMAND_OPTIONS, Controller, checked_command, feedforward_rows, lanes_of
+from baselines.controller import Controller, checked_command
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.rows import ACTION, ASKED, FEEDFORWARD, OPENING, REFERENCE, Seen, fill_measurement
-from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import REFERENCES, Mask, Measurement, Reference
 from birthsim_env.loop.stage import Stage
 from birthsim_env.parts.actuation import Forgetful
 from birthsim_env.physics.compiled.compilation import kernel
@@ -24,6 +24,55 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 NO_ACTION = np.zeros(0, dtype=np.float32)
 """What a single environment's ``step`` takes where a controller drives it."""
+
+
+def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
+    """Signals of one rig, which have no lane axis, as signals over one lane."""
+
+    def column(values: Array) -> Array:
+        return np.asarray(values, dtype=np.float64)[..., None]
+
+    m, acceleration = measurement, measurement.acceleration
+    seen = Measurement(
+        column(m.time), column(m.position), column(m.position_time), column(m.velocity), column(m.pressures),
+        column(m.user_force), m.sampled, None if acceleration is None else column(acceleration),
+    )  # fmt: skip
+    return seen, Reference(column(reference.rows))
+
+
+COMMAND_OPTIONS = ("feedforward_force", "feedforward_rate", "damping_factor")
+"""What ``command`` of a law may take besides the signals."""
+
+
+def lanes_of(measurement: Measurement, reference: Reference) -> int:
+    """The number of lanes of both; ``ValueError`` for signals over different numbers of lanes."""
+    rows = {"position": 2, "velocity": 2, "pressures": 4, "user_force": 2, "acceleration": 2}
+    lanes = int(measurement.position.shape[1])
+    signals = [(f"measurement.{name}", getattr(measurement, name), count) for name, count in rows.items()]
+    for name, signal, count in (*signals, ("reference.rows", reference.rows, REFERENCES)):
+        if signal is not None and signal.shape != (count, lanes):
+            raise ValueError(
+                f"{name} has shape {signal.shape}; allowed: {(count, lanes)}, with the lanes of measurement.position"
+            )
+    return lanes
+
+
+def feedforward_rows(
+    lanes: int, force: Array | None = None, rate: Array | None = None, factor: Array | None = None, *, taken: Sequence[str]
+) -> Array:
+    """What a law takes besides the signals, (5, lanes), zero where nothing: believed forces along cylinders 1 and 2, N, their
+    rates, N/s, and a damping factor. ``ValueError`` for what has not that shape, and for what is not ``taken``."""
+    given = np.zeros((5, lanes))
+    for name, rows, one in zip(COMMAND_OPTIONS, (given[:2], given[2:4], given[4]), (force, rate, factor), strict=True):
+        if one is not None:
+            if name not in taken:
+                raise ValueError(f"{name} is given; allowed: {' and '.join(taken) or 'nothing'} besides the signals")
+            if np.shape(one) != rows.shape:
+                raise ValueError(
+                    f"{name} has shape {np.shape(one)}; allowed: {rows.shape}, with the lanes of measurement.position"
+                )
+            rows[:] = one
+    return given
 
 
 @dataclass(frozen=True)
@@ -120,11 +169,11 @@ class StagedController:
         the damping where the law has one to vary. Raises ``ValueError`` for what is not in ``COMMAND_OPTIONS``, for signals
         over different numbers of lanes, for setpoints that the law cannot render, and where an acceleration is missing.
         """
+        given = (feedforward_force, feedforward_rate, damping_factor)
         if measurement.position.ndim == 1:
-            given = (feedforward_force, feedforward_rate, damping_factor)
             options = (None if one is None else np.asarray(one, dtype=np.float64)[..., None] for one in given)
             return self.command(*one_lane(measurement, reference), *options)[:, 0]
-        if self.run_stages(measurement, reference, (feedforward_force, feedforward_rate, damping_factor)):
+        if self.run_stages(measurement, reference, given):
             self.explain(measurement, reference)
         return self._openings.copy()
 

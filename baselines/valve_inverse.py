@@ -123,6 +123,14 @@ def force_first_openings(rate: float, stiffness_rate: float, c: CylinderAir, p: 
     return opening_p, valves.opening_for_flow(flow_n, fill_n, drain_n, full, leak)
 
 
+@helper
+def pressure_openings(
+    rate: float, wanted: float, wanted_rate: float, c4: float, c: CylinderAir, p: Rig
+) -> tuple[float, float]:  # fmt: skip
+    """``force_first_openings`` for dF/dt = ``rate`` while the pneumatic stiffness tends to ``wanted`` at c4."""
+    return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(c, p) - wanted), c, p)
+
+
 @kernel
 def _flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Array, present: Array) -> None:
     c, leak = p.conductance, p.leakage

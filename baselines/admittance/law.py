@@ -15,9 +15,9 @@ with the forces unseen of ``knowledge``: believed friction and what an observer 
 """
 
 from baselines.admittance.rows import Gains, HalfWave, Known, Memory, Watch
-from baselines.backstepping.cartesian_law import across, along, load_rates, pressure_openings
+from baselines.backstepping.cartesian_law import across, along, load_rates
 from baselines.estimation.rows import Belief
-from baselines.valve_inverse import air_at
+from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.physics import geometry, mechanics
 from birthsim_env.physics.compiled import exact

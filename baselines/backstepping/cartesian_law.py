@@ -14,7 +14,7 @@ friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever 
 from baselines.backstepping.law import smooth_sign
 from baselines.estimation.admittance import is_stiffer, square_root
 from baselines.estimation.stages import Estimate
-from baselines.valve_inverse import CylinderAir, air_at, force_first_openings, stiffness_of
+from baselines.valve_inverse import air_at, pressure_openings
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.signals import Joints
 from birthsim_env.physics import geometry, mechanics
@@ -50,14 +50,6 @@ def load_rates(
     rate1 = kappa * (turn * force_n - growth * force_t - rate_t)
     rate2 = turn * force_t + rate_n
     return rate1, rate2
-
-
-@helper
-def pressure_openings(
-    rate: float, wanted: float, wanted_rate: float, c4: float, cylinder: CylinderAir, p: Rig
-) -> tuple[float, float]:  # fmt: skip
-    """Openings of one cylinder for dF/dt = ``rate`` while its pneumatic stiffness (9) tends to ``wanted`` at c4."""
-    return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(cylinder, p) - wanted), cylinder, p)
 
 
 class Constants(Numbers):

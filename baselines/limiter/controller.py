@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from baselines.controller import Controller, checked_command, lanes_of
+from baselines.controller import Controller, checked_command
 from baselines.impedance import Impedance, declared_by
 from baselines.limiter import air_spring
 from baselines.limiter.past import recall, slots_of
 from baselines.limiter.port_energy import Energy, Work, count_work
-from baselines.staged import LawStage, StagedController
+from baselines.staged import LawStage, StagedController, lanes_of, one_lane
 from birthsim_env.loop.rows import Seen
-from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference, one_lane
+from birthsim_env.loop.signals import InPlane, Joints, Mask, Measurement, PerChamber, Point, Reference
 from birthsim_env.loop.stage import Stage, block, scratch
 from birthsim_env.physics.compiled import exact
 from birthsim_env.physics.compiled.compilation import helper, kernel

@@ -22,8 +22,9 @@ from baselines.controller import check_gains
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
 from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
+from baselines.staged import one_lane
 from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.loop.signals import Mask, Measurement, Reference, one_lane
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 

@@ -116,17 +116,3 @@ class Measurement:
 
 
 Mask = NDArray[np.bool_]
-
-
-def one_lane(measurement: Measurement, reference: Reference) -> tuple[Measurement, Reference]:
-    """Signals of one rig, which have no lane axis, as signals over one lane."""
-
-    def column(values: Array) -> Array:
-        return np.asarray(values, dtype=np.float64)[..., None]
-
-    m, acceleration = measurement, measurement.acceleration
-    seen = Measurement(
-        column(m.time), column(m.position), column(m.position_time), column(m.velocity), column(m.pressures),
-        column(m.user_force), m.sampled, None if acceleration is None else column(acceleration),
-    )  # fmt: skip
-    return seen, Reference(column(reference.rows))

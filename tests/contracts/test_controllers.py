@@ -10,8 +10,8 @@ import pytest
 
 from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
-from baselines.controller import COMMAND_OPTIONS
 from baselines.registry import LIMITED, SLOW, known_options, listed_names, make_controller
+from baselines.staged import COMMAND_OPTIONS
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
