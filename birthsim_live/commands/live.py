@@ -12,7 +12,7 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 from birthsim_live.commands.serving import need_server, serve
 from birthsim_live.logs.recording import load_recording
-from birthsim_live.rig.folder import Packed, packed_page, write_page
+from birthsim_live.rig.folder import Packed, offer, packed_page, write_page
 from birthsim_live.server.addresses import listen
 
 
@@ -63,8 +63,6 @@ def _packed(settings: Settings, rig: Parameters) -> Packed:
     packed = packed_page(rig, settings.policy, opens.values())
     packed.content["opens"] |= opens
     if settings.static is None:
-        from birthsim_live.server.controller import offer  # needs the extra
-
         offer(packed.content, rig, opens.values())
     for name in opens.values():
         allowed = [one["name"] for one in packed.content["hello"]["choices"]["controller"] if "missing" not in one]

@@ -5,6 +5,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from baselines.about import RESIDUAL
 from birthsim_build.faces.module import write_module
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_live.rig.words import controller_choice
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 """HTML, JavaScript and, in ``rig``, what ``birthsim_live.rig.build`` has made of the paper's rig: ``loop.wasm``, which is the
@@ -42,6 +44,28 @@ def packed_page(rig: Parameters, policies: Sequence[str] = (), asked: Iterable[s
     from birthsim_live.rig.pack import pack  # which takes a second to load
 
     return pack(rig, shipped_policies(), content["functions"], others)
+
+
+def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
+    """Let a page (``Packed.content``) offer what is listed and not compiled, and what is ``asked`` for by name.
+
+    Raises ``ValueError`` for a controller that is none.
+    """
+    choices = content["hello"]["choices"]
+    known = {one["name"]: one for one in choices["controller"]}
+    for name in dict.fromkeys(asked):
+        if name not in known:
+            from baselines.registry import make_controller  # which takes a third of a second to load
+
+            make_controller(name, rig)
+            known[name] = {**controller_choice(name), "missing": ""}
+            choices["controller"].append(known[name])
+    content["python"] = [name for name, one in known.items() if "missing" in one]
+    for name in content["python"]:
+        known[name].pop("missing")
+    if find_spec("casadi") is None:
+        known["nonlinear-mpc"]["missing"] = "pip install 'birthsim[mpc]'"
+    choices["compare"][1:] = choices["controller"]
 
 
 def shipped_policies() -> list[str]:

@@ -28,24 +28,15 @@ from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import SCENARIOS, Parts
 from birthsim_env.parts.sensors.sensors import SENSORS
-from birthsim_env.physics.compiled.lanes import (
-    DEADBAND,
-    PRESSURES,
-    STATE_NAMES,
-    TEMPERATURES,
-    TUBE_RATE,
-    Array,
-    parameter_array,
-    parameter_column,
-)
+from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.lanes import Array, parameter_array, parameter_column
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
 from birthsim_env.reward import PRESSURE_RANGE, TEMPERATURE_RANGE
 from birthsim_live.logs.recording import EVERY, FIELDS, FORMAT
 from birthsim_live.rig import stages
 from birthsim_live.rig.folder import Packed
-from birthsim_live.rig.greeting import greeting
-from birthsim_live.rig.settings import OPENS
+from birthsim_live.rig.greeting import OPENS, greeting
 from birthsim_live.rig.words import controller_choice
 
 EPISODES = 16
@@ -109,7 +100,7 @@ def pack(
     }  # fmt: skip
     if functions is None:  # those of worn valves and of tubes too
         worn, tubes = column.copy(), column.copy()
-        worn[DEADBAND], tubes[TUBE_RATE] = 0.01, 100.0
+        worn[at.DEADBAND], tubes[at.TUBE_RATE] = 0.01, 100.0
         functions = sorted(_needed([tree, plant_part(worn), plant_part(tubes)]))
     store, hello = Store(functions), greeting(rig, controllers)
     for one in hello["choices"]["scenario"]:
@@ -129,8 +120,8 @@ def pack(
         },
         "rig": rig_numbers(rig),
         "range": {
-            STATE_NAMES[row]: limits
-            for rows, limits in ((PRESSURES, PRESSURE_RANGE), (TEMPERATURES, TEMPERATURE_RANGE)) for row in rows
+            at.STATE_NAMES[row]: limits
+            for rows, limits in ((at.PRESSURES, PRESSURE_RANGE), (at.TEMPERATURES, TEMPERATURE_RANGE)) for row in rows
         },
         "parts": numbers,
         "scenarios": {

@@ -7,9 +7,8 @@ answer is a line of text, and the end.
 """
 
 import asyncio
-import importlib.util
 import traceback
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from concurrent.futures import Future
 from functools import partial
 from queue import SimpleQueue
@@ -23,27 +22,6 @@ from baselines.controller import Controller, checked_command
 from birthsim_env.loop.rows import ASKED, REFERENCE, measurement_of
 from birthsim_env.loop.signals import Reference
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.words import controller_choice
-
-
-def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -> None:
-    """Let a page (``Packed.content``) offer what is listed and not compiled, and what is ``asked`` for by name.
-
-    Raises ``ValueError`` for a controller that is none.
-    """
-    choices = content["hello"]["choices"]
-    known = {one["name"]: one for one in choices["controller"]}
-    for name in dict.fromkeys(asked):
-        if name not in known:
-            made(name, rig)
-            known[name] = {**controller_choice(name), "missing": ""}
-            choices["controller"].append(known[name])
-    content["python"] = [name for name, one in known.items() if "missing" in one]
-    for name in content["python"]:
-        known[name].pop("missing")
-    if importlib.util.find_spec("casadi") is None:
-        known["nonlinear-mpc"]["missing"] = "pip install 'birthsim[mpc]'"
-    choices["compare"][1:] = choices["controller"]
 
 
 def made(name: str, rig: Parameters) -> Controller:

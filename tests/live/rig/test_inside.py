@@ -23,7 +23,7 @@ from birthsim_env.physics.compiled.lanes import (
 from birthsim_env.physics.geometry import amplification
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.inside import ROWS, look_inside
+from birthsim_live.rig.stages import INSIDE, look_inside
 
 FRICTION = (FC1, FC2, FS1, FS2, FV1, FV2, BRISTLE_S0, BRISTLE_S1)
 
@@ -37,7 +37,7 @@ def moving_plant(law: str) -> Plant:
 
 
 def inside(plant: Plant) -> np.ndarray:
-    rows = np.empty((ROWS, 1))
+    rows = np.empty((INSIDE, 1))
     look_inside(plant.state, plant.lane_parameters, rows)
     return rows[:, 0]
 

@@ -9,7 +9,7 @@ from birthsim_build.layout import DRAG_DAMPING, DRAG_LIMIT, LAYOUT
 from birthsim_env.physics.compiled.lanes import parameter_array
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import SLICES
-from birthsim_live.rig.inside import ROWS, look_inside
+from birthsim_live.rig.stages import INSIDE, look_inside
 from tests.live.rig.worker import Told, run
 
 CALM = ("set", {"controller": "admittance-backstepping"})
@@ -181,7 +181,7 @@ def test_one_hand_pulls_both_and_both_stand_still_where_one_is_lost(page) -> Non
 
 
 def test_a_row_holds_friction_and_flows(page) -> None:
-    told, rows = one(page, held(0.56, 0.02), ("advance", 300))[-1], np.empty((ROWS, 1))
+    told, rows = one(page, held(0.56, 0.02), ("advance", 300))[-1], np.empty((INSIDE, 1))
     look_inside(told.rows[-1, ROW["y1"] : ROW["y1"] + 18, None].copy(), parameter_array(RIG, 1), rows)
     assert np.array_equal(told.of("friction"), rows[:2, 0])
     assert np.array_equal(told.of("flows"), rows[2:, 0])

@@ -13,8 +13,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from birthsim_env.loop.rows import ASKED, OPENING, WORLD
 from birthsim_env.physics.rig.parameters import Parameters
-from birthsim_live.rig.folder import packed_page
-from birthsim_live.server.controller import offer
+from birthsim_live.rig.folder import offer, packed_page
 from studies.targets.reference import whole_rows
 from tests.live.server.conftest import HERE
 
