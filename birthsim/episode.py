@@ -12,7 +12,7 @@ from baselines.commands.settings import RANDOMIZE
 from baselines.commands.worlds import check_environment, policy_of, with_options
 from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
-from baselines.work.files import make_folder, whole_results
+from birthsim_env.files import make_folder, whole_results
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters

@@ -18,6 +18,8 @@ class Entry(NamedTuple):
 
 
 STUDIES = {
+    "acceleration": Entry("comparison.study", "ACCELERATION", "what an acceleration sensor adds"),
+    "acceleration-feel": Entry("haptics.study", "ACCELERATION", "what a hand feels with an acceleration sensor"),
     "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
     "beside-law": Entry("residual.beside_law", "STUDY", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
@@ -29,6 +31,7 @@ STUDIES = {
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
     "learned": Entry("learned.study", "STUDY", "what the shipped policies take off their controllers' errors"),
+    "limited": Entry("comparison.study", "LIMITED", "what a limiter costs"),
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
     "mutation": Entry("mutation.command", "", "how many small changes of the code tests notice"),
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
@@ -40,7 +43,7 @@ STUDIES = {
     "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),
     "stiffest": Entry("stability.stiffest", "STUDY", "the stiffest setpoints at which the paper's controller rests"),
     "stiffness": Entry("comparison.feel", "STUDY", "how the stiffness of every controller feels"),
-    "sweep": Entry("sweeps.command", "", "grids, random draws and searches, from a TOML file"),
+    "sweep": Entry("sweeps.study", "STUDY", "grids, random draws and searches, from a TOML file"),
     "targets": Entry("targets.study", "STUDY", "built code of every target, against Python"),
     "verification": Entry("verification.command", "", "balances, coverage and mutation scores, for docs/verification.md"),
     "worst": Entry("honest.worst", "STUDY", "the worst worlds, and what each owes to its figures"),

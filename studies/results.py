@@ -11,12 +11,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from baselines.work.sources import ROOT, hashes
+from birthsim_env.sources import ROOT, hashes
 
 RESULTS = ROOT / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
-ENGINE = ("baselines/work/", "baselines/commands/", "studies/study.py", "studies/results.py")
+ENGINE = (
+    "baselines/work/", "baselines/commands/", "birthsim_env/files.py", "birthsim_env/sources.py", "studies/study.py",
+    "studies/results.py",
+)  # fmt: skip
 """What reads options and keeps pieces, and decides no figure: a change of it makes no result stale."""
 
 Content = dict[str, Any]

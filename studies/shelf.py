@@ -16,8 +16,8 @@ from typing import cast
 
 from baselines.commands.command import perform_with
 from baselines.commands.settings import Configured
-from baselines.work.files import write_text
-from baselines.work.sources import ROOT
+from birthsim_env.files import write_text
+from birthsim_env.sources import ROOT
 from studies.door import OWN, STUDIES
 from studies.figures import figure
 from studies.results import changed, read_result
@@ -69,10 +69,11 @@ def state(name: str) -> str:
 
 def status() -> None:
     """Print the state of each result, its date, its commit and its seconds."""
+    width = max(map(len, names())) + 2
     for name in names():
         content = read_result(name)
         made = f"{content['date'][:10]}  {content['commit'][:7]}  {content['seconds']:8.0f} s  " if content else ""
-        print(f"{name:12}{made}{state(name)}")
+        print(f"{name:{width}}{made}{state(name)}")
 
 
 def texts(name: str) -> Iterator[tuple[Path, str]]:

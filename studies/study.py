@@ -15,9 +15,9 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from baselines.commands.settings import EPISODES, MANY, Processes, number, whole
-from baselines.work.files import own_folder, whole_results, write_text
-from baselines.work.sources import ROOT
 from baselines.work.tasks import Result, Task, run_tasks
+from birthsim_env.files import own_folder, whole_results, write_text
+from birthsim_env.sources import ROOT
 from studies.results import RESULTS, Content, provenance, written
 
 Options = SimpleNamespace
@@ -26,6 +26,16 @@ Found = Mapping[Any, Result]
 
 def no_pictures(content: Content, folder: Path) -> list[Path]:
     """Of a study that is shown by tables alone."""
+    return []
+
+
+def no_more(options: Options, found: Found) -> dict[Any, Task]:
+    """Of a study whose pieces are known beforehand."""
+    return {}
+
+
+def no_files(options: Options, found: Found, folder: Path) -> list[str]:
+    """Of a study that writes nothing but its result, texts and pictures."""
     return []
 
 
@@ -38,7 +48,8 @@ class Study:
     the figures, as JSON takes them, whose ``units`` are given by column. ``show(result)`` are the texts that stand in
     ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces may fail; ``timed``
     pieces are measured anew, one after another. ``allowed`` has the values of options that take no others, ``words`` the help
-    of what its name does not say.
+    of what its name does not say; the option ``first`` needs no name. ``further(options, results by key)`` are pieces that
+    others suggest, until there are none; ``write(options, results by key, folder)`` writes more files and names them.
     """
 
     code: tuple[str, ...]
@@ -52,10 +63,16 @@ class Study:
     timed: bool = False
     allowed: dict[str, Sequence[str]] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
+    first: str = ""
+    further: Callable[[Options, Found], dict[Any, Task]] = no_more
+    write: Callable[[Options, Found, Path], list[str]] = no_files
 
     def settings(self, measures: str) -> type[Processes]:
         """Its options as a command's settings, whose help says what it ``measures``."""
-        fields = [(name, *_option(name, default, self)) for name, default in self.options.items()]
+        fields = [
+            (name, _option(name, default, self), field(default=default, kw_only=name != self.first))
+            for name, default in self.options.items()
+        ]  # fmt: skip
         out = Annotated[Path | None, Parameter(help="Folder for the result, its tables and its pictures.")]
         made = make_dataclass("Settings", [*fields, ("out", out, None)], bases=(Processes,), kw_only=True)
         made.__doc__ = (
@@ -67,20 +84,26 @@ class Study:
     def measure(self, name: str, settings: Any) -> None:
         """What ``birthsim study NAME`` does."""
         options = Options(**{option: getattr(settings, option) for option in self.options})
-        tasks, began = self.tasks(options), time.perf_counter()
+        began, kept = time.perf_counter(), 0
+        tasks, found, failures = dict[Any, Task](), dict[Any, Result](), dict[str, str]()
+        more, jobs = self.tasks(options), 1 if self.timed else settings.jobs
         with ExitStack() as stack:
             folder = stack.enter_context(own_folder(settings.out or ROOT / "out" / "studies" / name))
             place = Path(stack.enter_context(tempfile.TemporaryDirectory())) if self.timed else folder
             made = provenance(self.code)
-            before = sum((place / task.file()).is_file() for task in tasks.values())
-            jobs = 1 if self.timed else settings.jobs
-            done, failures = run_tasks(list(tasks.values()), place, jobs, name, settings.cluster)
+            while more:
+                kept += sum((place / task.file()).is_file() for task in more.values())
+                each = {task.name: task for task in more.values()}
+                done, failed = run_tasks(list(each.values()), place, jobs, name, settings.cluster)
+                tasks, failures = tasks | more, failures | failed
+                found |= {key: done[task.name] for key, task in more.items() if task.name in done}
+                more = {} if failures else self.further(options, found)
             problem = f"{len(failures)} of {len(tasks)} pieces failed, the first {': '.join(next(iter(failures.items()), ()))}"
-            if failures and not (self.partial and done):
+            if failures and not (self.partial and found):
                 raise ValueError(problem)
-            figures = self.keep(options, {key: done[task.name] for key, task in tasks.items() if task.name in done})
+            figures = self.keep(options, found)
             content = {
-                **made, "seconds": round(time.perf_counter() - began, 1), "pieces": len(tasks), "pieces_kept": before,
+                **made, "seconds": round(time.perf_counter() - began, 1), "pieces": len(tasks), "pieces_kept": kept,
                 "failed": failures, "settings": vars(options), "units": self.units, "figures": figures,
             }  # fmt: skip
             content = json.loads(written(content))
@@ -89,6 +112,7 @@ class Study:
                 for file, text in {f"{name}.json": written(content), **texts}.items():
                     write_text(whole / file, text)
                 drawn = [path.name for path in self.draw(content, whole) if path.suffix == ".png"]
+                drawn += self.write(options, found, whole)
             if not settings.out:
                 write_text(RESULTS / f"{name}.json", written(content))
         print("\n\n".join(text for file, text in texts.items() if file.endswith(".md")))
@@ -97,8 +121,8 @@ class Study:
             raise ValueError(problem)
 
 
-def _option(name: str, default: Any, study: Study) -> tuple[Any, Any]:
-    """Annotation and default of an option of the kind of its default."""
+def _option(name: str, default: Any, study: Study) -> Any:
+    """Annotation of an option of the kind of its default."""
     several = isinstance(default, tuple)
     kind: Any = type(default[0] if several else default)
     reads = {float: number("N"), int: whole(0, 2**32 - 1) if name == "seed" else whole(1, EPISODES)}
@@ -106,4 +130,4 @@ def _option(name: str, default: Any, study: Study) -> tuple[Any, Any]:
     text = study.words.get(name, "")
     own = Parameter(choices=tuple(study.allowed.get(name, ())) or None, help=f"{text[:1].upper()}{text[1:]}." if text else None)
     many: Any = list[one]  # type: ignore[valid-type]
-    return (Annotated[many, MANY, Parameter(metavar="NAME..."), own] if several else Annotated[one, own]), default
+    return Annotated[many, MANY, Parameter(metavar="NAME..."), own] if several else Annotated[one, own]

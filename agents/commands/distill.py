@@ -9,8 +9,8 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.commands.settings import PROCESSES, Configured, RigFile, Seed, whole
-from baselines.work.files import finite, make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
+from birthsim_env.files import finite, make_folder, own_folder, write_json
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 try:

@@ -12,8 +12,8 @@ from baselines.bench.pieces import controller_settings, evaluate_piece, evaluati
 from baselines.commands.evaluate import Settings
 from baselines.commands.settings import RANDOMIZE
 from baselines.commands.worlds import check_environment, check_world, policy_of, with_options
-from baselines.work.files import make_folder, own_folder, whole_results, write_json, write_text
 from baselines.work.tasks import Result, run_tasks
+from birthsim_env.files import make_folder, own_folder, whole_results, write_json, write_text
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import load_parameters
 

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from baselines.bench.statistics import number
 from baselines.commands.settings import Configured
 from baselines.commands.tables import aligned, markdown
-from baselines.work.files import make_folder, write_json, write_text
+from birthsim_env.files import make_folder, write_json, write_text
 
 
 @dataclass(kw_only=True)

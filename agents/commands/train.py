@@ -11,8 +11,8 @@ from agents.training.time_split import shares
 from baselines.commands.settings import RANDOMIZE
 from baselines.commands.train import Settings
 from baselines.commands.worlds import check_environment, check_world
-from baselines.work.files import make_folder, own_folder, write_json
 from baselines.work.side_by_side import side_by_side
+from birthsim_env.files import make_folder, own_folder, write_json
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 

@@ -11,7 +11,7 @@ from typing import Any
 from agents.policy.network import PolicyNetwork
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.residual.settings import ResidualSettings
-from baselines.work.files import finite, whole_file
+from birthsim_env.files import finite, whole_file
 from birthsim_env.physics.rig.values import problem
 
 FORMAT = "birthsim-residual-3"

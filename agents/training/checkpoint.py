@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.policy.sealed import Arrays, sealed, unsealed
 from agents.training.sb3_adapter import SB3VecEnv
-from baselines.work.files import whole_file
+from birthsim_env.files import whole_file
 from birthsim_env.physics.rig.values import problem
 
 NAME = "checkpoint.safetensors"

@@ -16,8 +16,8 @@ from baselines.commands.settings import CONTROLLER, RANDOMIZE, Env, Parts, Rando
 from baselines.commands.worlds import check_environment, policy_of, with_options
 from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
-from baselines.work.files import make_folder, whole_file
 from birthsim_env.drawing.rendering import PairRenderer, Scene
+from birthsim_env.files import make_folder, whole_file
 from birthsim_env.parts.drawn.randomization import described
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters

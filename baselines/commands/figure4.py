@@ -15,7 +15,7 @@ from baselines.commands.tables import aligned
 from baselines.commands.worlds import with_options
 from baselines.registry import make_controller
 from baselines.staged import NO_ACTION, driving
-from baselines.work.files import make_folder, whole_file, whole_results, write_json
+from birthsim_env.files import make_folder, whole_file, whole_results, write_json
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
 from birthsim_env.success import SETTLED

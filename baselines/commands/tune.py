@@ -32,8 +32,8 @@ from baselines.commands.tables import aligned
 from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
-from baselines.work.files import own_folder, whole_results, write_json
 from baselines.work.journal import open_journal
+from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.physics.compiled.lanes import Array

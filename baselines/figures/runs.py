@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from baselines.bench.evaluation import Evaluation
 from baselines.bench.measures import TRACE
-from baselines.work.files import whole_file
+from birthsim_env.files import whole_file
 from birthsim_env.physics.compiled.lanes import Array
 
 DARK, MIDDLE, ACCENT, LIGHT = "#1b2a41", "#b23a0a", "#3f9e6a", "#8fb2dc"

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from baselines.logs.table import read_csv
-from baselines.work.files import write_text
+from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import end_effector, inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters

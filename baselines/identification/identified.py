@@ -13,7 +13,7 @@ from baselines.identification.noise import guessed_noise
 from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, value_of
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
-from baselines.work.files import write_text
+from birthsim_env.files import write_text
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 
 

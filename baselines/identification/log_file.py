@@ -10,7 +10,7 @@ from baselines.identification.trial import Trial
 from baselines.logs.log import Column, Log, Series
 from baselines.logs.table import Table, read_table
 from baselines.logs.writing import WRITERS, write_log
-from baselines.work.files import write_text
+from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.rig.parameters import Parameters

@@ -18,7 +18,7 @@ import numpy as np
 
 import birthsim_env
 from baselines.logs.log import Log, Series
-from baselines.work.files import finite, whole_file
+from birthsim_env.files import finite, whole_file
 
 _TYPES = {"f": "number", "i": "integer", "b": "boolean"}
 """Kind of a NumPy type -> its type in a JSON schema."""

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
@@ -58,7 +59,8 @@ def _in_processes(work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], job
     with ExitStack() as stack:
         # joblib says how many pieces an early end cancels.
         stack.enter_context(warnings.catch_warnings(action="ignore", category=UserWarning))
-        stack.enter_context(_manager_ends_in_silence())
+        stack.callback(setattr, threading, "excepthook", threading.excepthook)
+        threading.excepthook = partial(_hear, threading.excepthook)
         stack.enter_context(parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1, **own))
         with _unheard(quiet=True):
             resource_tracker.ensure_running()  # before any worker: to begin one takes the mask away
@@ -72,21 +74,11 @@ def _in_processes(work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], job
             raise OSError("a process that computed has died, of lack of memory perhaps; what is complete is kept") from error
 
 
-@contextmanager
-def _manager_ends_in_silence() -> Iterator[None]:
+def _hear(before: Callable[[threading.ExceptHookArgs], object], about: threading.ExceptHookArgs) -> None:
     """joblib's manager of processes looks up pieces that it has just cancelled, which now and then ends it with a ``KeyError``;
     its processes have ended by then."""
-    before = threading.excepthook
-
-    def hear(about: threading.ExceptHookArgs) -> None:
-        if not (about.exc_type is KeyError and about.thread is not None and about.thread.name == "ExecutorManagerThread"):
-            before(about)
-
-    threading.excepthook = hear
-    try:
-        yield
-    finally:
-        threading.excepthook = before
+    if not (about.exc_type is KeyError and about.thread is not None and about.thread.name == "ExecutorManagerThread"):
+        before(about)
 
 
 @contextmanager

@@ -16,9 +16,9 @@ from typing import Any
 from tqdm import tqdm
 
 import birthsim_env
-from baselines.work.files import finite, later_signals, write_json
 from baselines.work.side_by_side import side_by_side
-from baselines.work.sources import hashes
+from birthsim_env.files import finite, later_signals, write_json
+from birthsim_env.sources import hashes
 
 Result = dict[str, Any]
 

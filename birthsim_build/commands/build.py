@@ -12,11 +12,11 @@ from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
 from baselines.commands.tables import aligned
 from baselines.registry import LISTED, SLOW
-from baselines.work.files import make_folder, whole_results, write_json
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.code.targets import BUILT
+from birthsim_env.files import make_folder, whole_results, write_json
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters

@@ -5,10 +5,10 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from baselines.work.files import whole_file
 from birthsim_build.code.compiler import compile_object, link
 from birthsim_build.fmu.description import model_description
 from birthsim_build.fmu.model import Model
+from birthsim_env.files import whole_file
 
 HERE = Path(__file__).parent
 

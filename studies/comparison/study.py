@@ -29,6 +29,7 @@ from studies.comparison.grid import (
 )
 from studies.comparison.tables import (
     CIRCLE,
+    FORCEPS,
     IN_FULL,
     PROBE,
     RATIO,
@@ -179,4 +180,14 @@ HONEST = comparison(
     "honest", partial(_table_of, by_sensors, "honest"), env=(CIRCLE, PROBE), plant=("randomised", "described-sensors"),
     controller=("admittance-adaptive", "admittance-backstepping", "admittance-sensorless", "backstepping"), episodes=128,
     seed=70000,
+)  # fmt: skip
+LIMITED = comparison(
+    "limited", partial(_table_of, settled, "limited"), lambda where: not where.hand, env=(CIRCLE, FORCEPS),
+    plant=("randomised",), sensors=("lab", "honest"), episodes=100, seed=6_400_000,
+    controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
+)  # fmt: skip
+ACCELERATION = comparison(
+    "acceleration", partial(_table_of, by_sensors, "acceleration"), env=(CIRCLE, PROBE), sensors=("lab", "honest"),
+    plant=("randomised", "described-sensors"), controller=("admittance-adaptive",), episodes=128, seed=70000,
+    parameters="examples/acceleration_sensor_rig.toml",
 )  # fmt: skip

@@ -61,7 +61,7 @@ class Column:
         return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
 
 
-CIRCLE, PROBE = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2"
+CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 COLUMNS = (
     Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
     Column(f"over {REFERENCE}", CIRCLE, "ideal", "randomised", "settled_rms", "ratios"),
@@ -117,12 +117,16 @@ def losses(figures: Figures) -> str:
 
 
 def settled(figures: Figures) -> str:
-    """Settled error by controller and sensors: median and 95 %, and how many of the episodes were lost; the best is bold."""
-    kinds = list(dict.fromkeys(cell["sensors"] for cell in figures))
-    found = {(cell["controller"], cell["sensors"]): cell for cell in figures}
+    """Settled error by controller, environment and sensors: median and 95 %, and how many of the episodes were lost; the best
+    is bold."""
+    kinds = list(dict.fromkeys((cell["environment"], cell["sensors"]) for cell in figures))
+    several = len({environment for environment, _ in kinds}) > 1
+    titles = [f"{_short(environment)}, " * several + f"{sensors} sensors" for environment, sensors in kinds]
+    found = {(cell["controller"], (cell["environment"], cell["sensors"])): cell for cell in figures}
     names = controllers_of(figures)
     best = {kind: min(names, key=lambda name: found[name, kind]["metrics"]["settled_rms"]["median"]) for kind in kinds}
-    rows = [["controller", "uses the hand's force", *(f"{kind} sensors" for kind in kinds), f"lost, {' and '.join(kinds)}"]]
+    lost_of = "" if several else f", {' and '.join(sensors for _, sensors in kinds)}"
+    rows = [["controller", "uses the hand's force", *titles, f"lost{lost_of}"]]
     for name in names:
         own = [found[name, kind] for kind in kinds]
         errors = [[cell["metrics"]["settled_rms"][key] for key in ("median", "q95")] for cell in own]
@@ -132,6 +136,11 @@ def settled(figures: Figures) -> str:
         force = "no" if name.startswith("backstepping") or "sensorless" in name or "student" in name else "yes"
         rows.append([f"`{name}`", force, *cells, f"{lost} of {own[0]['episodes']}"])
     return markdown(rows)
+
+
+def _short(environment: str) -> str:
+    """The environment without prefix and version."""
+    return environment.removeprefix("BirthSIM/").rpartition("-")[0]
 
 
 KINDS = {

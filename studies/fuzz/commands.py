@@ -13,11 +13,11 @@ from unittest.mock import patch
 from baselines.commands.command import perform_with, program
 from studies.fuzz.harness import Case, Kind
 from studies.fuzz.mutations import Rng
+from studies.shelf import declared
 
 MODULES = {
     **{name: f"baselines.commands.{name}" for name in ("figure4", "animate", "tune", "identify", "evaluate", "train")},
     **{name: f"agents.commands.{name}" for name in ("export", "explain")},
-    "sweep": "studies.sweeps.command",
     "build": "birthsim_build.commands.build",
     **{name: f"birthsim_live.commands.{name}" for name in ("live", "log")},
 }
@@ -33,19 +33,20 @@ class BeganError(Exception):
     """A command has accepted its arguments."""
 
 
-def _options(module: Any) -> list[str]:
-    options = program("x", module.Settings).assemble_argument_collection()
+def _options(settings: type[Any]) -> list[str]:
+    options = program("x", settings).assemble_argument_collection()
     return [name for option in options for name in option.names if name.startswith("--")]
 
 
 def _commands(_: Path) -> dict[str, tuple[Any, list[str]]]:
-    modules = {name: importlib.import_module(place) for name, place in MODULES.items()}
-    return {name: (module, _options(module)) for name, module in modules.items()}
+    settings = {name: importlib.import_module(place).Settings for name, place in MODULES.items()}
+    settings["sweep"] = declared("sweep").settings("")
+    return {name: (one, _options(one)) for name, one in settings.items()}
 
 
 def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, case: Case) -> None:
     name = list(known)[rng.integers(len(known))]
-    module, options = known[name]
+    settings, options = known[name]
     forms = {"build": ["--to", "wasm"], "export": ["--to", "onnx"], "log": ["--to", "mcap", str(folder / "none.rec")]}
     line = forms.get(name, [])
     for option in dict.fromkeys(["--out", *(option for option in options if rng.random() < 0.3)]):
@@ -61,7 +62,7 @@ def _command(known: dict[str, tuple[Any, list[str]]], rng: Rng, folder: Path, ca
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said), patch.object(sys, "argv", [name, *line]):
-            perform_with(name, module.Settings, begin, "")
+            perform_with(name, settings, begin, "")
     except BeganError:
         return
     except SystemExit as end:

@@ -15,16 +15,12 @@ from baselines.figures.runs import ACCENT, DARK, MIDDLE, STYLE, legend_below, sa
 from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics import coupled
 from studies.haptics.coupled import stable_up_to
+from studies.haptics.kept import PEAK
 from studies.haptics.release import PULL, STIFFNESS
-from studies.haptics.rendering import PEAKS
-from studies.haptics.tables import PEAK
 from studies.looks import label_of, log_ticks, look
 from studies.stability.figure import stability_figure
 
 Runs = Sequence[dict[str, Any]]
-
-SHOWN = 2000.0
-"""N/m, the setpoint of the Bode plot and the energies, where it was measured."""
 
 COLOURS = (DARK, MIDDLE, "#8e5ea2", "#b8860b")
 """Of the kinds of sensors."""
@@ -52,23 +48,22 @@ def bode_figure(runs: Runs, folder: Path) -> list[Path]:
         for column, law in enumerate(laws):
             above, below = panels[:, column]
             for colour, run in zip(COLOURS, _of(runs, law), strict=False):
-                piece, frequency, felt = _felt(run["impedance"])
-                _band(above, frequency, np.abs(felt), colour, run["sensors"])
-                _band(below, frequency, _phase(piece, felt), colour, run["sensors"])
-            if piece["declared"] is not None:
-                declared = _complex(piece["declared"])
-                above.plot(frequency, np.median(np.abs(declared), axis=1), color=ACCENT, ls="--", lw=2, label="declared")
-                below.plot(frequency, np.median(np.degrees(np.angle(declared)), axis=1), color=ACCENT, ls="--", lw=2)
-            above.set(xscale="log", yscale="log", ylim=(300, 3e5))
-            below.set(xscale="log", xlabel="frequency (Hz)", ylim=(-60, 330), yticks=range(0, 271, 90))
-            log_ticks(above.xaxis)
-            log_ticks(below.xaxis)
+                stiffness, curves = _curves(run)
+                for axes, name in ((above, "magnitude"), (below, "phase")):
+                    low, middle, high = _numbers(curves[name])
+                    axes.fill_between(curves["frequency"], low, high, color=colour, alpha=0.2, lw=0)
+                    axes.plot(curves["frequency"], middle, color=colour, label=run["sensors"])
+            for axes, name in ((above, "magnitude"), (below, "phase")):
+                if curves["declared"] is not None:
+                    axes.plot(curves["frequency"], curves["declared"][name], color=ACCENT, ls="--", lw=2, label="declared")
+                axes.set_xscale("log")
+                log_ticks(axes.xaxis)
+            above.set(yscale="log", ylim=(300, 3e5))
+            below.set(xlabel="frequency (Hz)", ylim=(-60, 330), yticks=range(0, 271, 90))
             above.set_title(label_of(law), loc="left")
         panels[0, 0].set_ylabel("force over displacement (N/m)")
         panels[1, 0].set_ylabel("phase (degrees)")
-        figure.suptitle(
-            f"Impedance felt at {piece['stiffness']:g} N/m by a hand of {PEAK:g} N: median and quartiles", fontsize=10
-        )
+        figure.suptitle(f"Impedance felt at {stiffness:g} N/m by a hand of {PEAK:g} N: median and quartiles", fontsize=10)
         return _finished(figure, panels[0], folder, "haptics_impedance")
 
 
@@ -80,12 +75,11 @@ def energy_figure(runs: Runs, folder: Path) -> list[Path]:
         for column, law in enumerate(laws):
             above, below = panels[:, column]
             for colour, run in zip(COLOURS, _of(runs, law), strict=False):
-                piece, frequency, _ = _felt(run["impedance"])
-                energy = np.array(piece["energy_over_time"][PEAKS.index(PEAK)], dtype=np.float64)
-                above.plot(np.arange(len(energy)) * piece["energy_period"], energy, color=colour, label=run["sensors"])
-                damping = np.array(piece["port_damping"], dtype=np.float64)[:, _kept(piece)]
-                below.plot(frequency, np.nanmedian(damping, axis=1), color=colour)
-                below.plot(frequency, np.nanmin(damping, axis=1), color=colour, ls=":")
+                stiffness, curves = _curves(run)
+                energy, (middle, least) = _numbers(curves["energy"]), _numbers(curves["damping"])
+                above.plot(np.arange(len(energy)) * curves["energy_period"], energy, color=colour, label=run["sensors"])
+                below.plot(curves["frequency"], middle, color=colour)
+                below.plot(curves["frequency"], least, color=colour, ls=":")
             above.axhline(0, color="grey", lw=0.8)
             below.axhline(0, color="grey", lw=0.8)
             above.set(xlabel="time (s)")
@@ -95,7 +89,7 @@ def energy_figure(runs: Runs, folder: Path) -> list[Path]:
             above.set_title(label_of(law), loc="left")
         panels[0, 0].set_ylabel("energy given, worst lane (J)")
         panels[1, 0].set_ylabel("port damping (N s/m)\nmedian, and dotted the least")
-        figure.suptitle(f"Energy at the port, {piece['stiffness']:g} N/m, hand of {PEAK:g} N; below zero it takes", fontsize=10)
+        figure.suptitle(f"Energy at the port, {stiffness:g} N/m, hand of {PEAK:g} N; below zero it takes", fontsize=10)
         return _finished(figure, panels[0], folder, "haptics_energy")
 
 
@@ -106,13 +100,12 @@ def release_figure(runs: Runs, folder: Path) -> list[Path]:
         figure, panels = _panels(1, len(laws), height=3.6)
         for axes, law in zip(panels[0], laws, strict=True):
             for colour, run in zip(COLOURS, _of(runs, law), strict=False):
-                (piece,) = run["release"]
-                time, offset = np.array(piece["time"]), np.array(piece["offset_mm"], dtype=np.float64)
-                axes.plot(time, np.nanmedian(offset, axis=0), color=colour, label=run["sensors"])
-                axes.fill_between(time, np.nanmin(offset, axis=0), np.nanmax(offset, axis=0), color=colour, alpha=0.2, lw=0)
-            if piece["ideal"] is not None:
-                declared = np.median(piece["ideal"]["offset_mm"], axis=0)
-                axes.plot(time, declared, color=ACCENT, ls="--", lw=2, label="declared")
+                curves = run["release"][0]["curves"]
+                middle, least, largest = _numbers(curves["offset_mm"])
+                axes.plot(curves["time"], middle, color=colour, label=run["sensors"])
+                axes.fill_between(curves["time"], least, largest, color=colour, alpha=0.2, lw=0)
+            if curves["declared"] is not None:
+                axes.plot(curves["time"], curves["declared"], color=ACCENT, ls="--", lw=2, label="declared")
             axes.set(xlabel="time since the hand let go (s)")
             axes.axhline(0, color="grey", lw=0.8)
             axes.set_title(label_of(law), loc="left")
@@ -178,29 +171,11 @@ def _of(runs: Runs, law: str) -> list[dict[str, Any]]:
     return [run for run in runs if run["controller"] == law]
 
 
-def _kept(piece: dict[str, Any]) -> Array:
-    return np.asarray((np.array(piece["peak"]) == PEAK) & ~np.array(piece["lost"], dtype=bool))
+def _curves(run: dict[str, Any]) -> tuple[float, dict[str, Any]]:
+    """The setpoint at which the impedance's curves are kept, N/m, and they."""
+    return next((piece["stiffness"], piece["curves"]) for piece in run["impedance"] if "curves" in piece)
 
 
-def _complex(parts: Any) -> Any:
-    real, imaginary = np.array(parts, dtype=np.float64)
-    return real + 1j * imaginary
-
-
-def _felt(pieces: Sequence[dict[str, Any]]) -> tuple[dict[str, Any], Array, Any]:
-    """The piece at ``SHOWN``, or else the last; its frequencies (F,) and the impedance of its lanes at ``PEAK``, (F, N)."""
-    piece = next((one for one in pieces if one["stiffness"] == SHOWN), pieces[-1])
-    return piece, np.array(piece["frequency"]), _complex(piece["felt"])[:, _kept(piece)]
-
-
-def _phase(piece: dict[str, Any], felt: Any) -> Array:
-    """Degrees, (F, N): within half a turn of what is declared, or of 90 degrees where nothing is."""
-    about = 90.0 if piece["declared"] is None else np.degrees(np.angle(_complex(piece["declared"])[:, _kept(piece)]))
-    return np.asarray((np.degrees(np.angle(felt)) - about + 180) % 360 - 180 + about)
-
-
-def _band(axes: Axes, x: Array, y: Array, colour: str, label: str) -> None:
-    """Median and quartiles over lanes of y (F, N)."""
-    low, middle, high = np.percentile(y, (25, 50, 75), axis=1)
-    axes.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
-    axes.plot(x, middle, color=colour, label=label)
+def _numbers(values: Any) -> Array:
+    """JSON's null is NaN."""
+    return np.array(values, dtype=np.float64)

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings
-from baselines.work.files import finite
 from baselines.work.tasks import Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
+from studies.haptics.kept import kept
 from studies.haptics.measurements import SUBJECTS, Key, gathered, haptic_tasks
 from studies.haptics.tables import report
 from studies.results import Content
@@ -20,6 +20,7 @@ from studies.study import Found, Options, Study, no_pictures
 UNITS = {
     "stiffness": "N/m", "peak": "N", "bandwidth": "Hz", "unnoticed": "Hz", "unnoticed_without_work": "Hz", "energy": "J",
     "shortage": "J", "error_own_mm": "mm", "error_spring_mm": "mm", "air": "l/min", "saturation": "%", "motion_mm": "mm",
+    "frequency": "Hz", "magnitude": "N/m", "phase": "degrees", "damping": "N s/m", "time": "s", "offset_mm": "mm",
     "overshoot_mm": "mm", "speed": "m/s", "kinetic": "J", "stored": "J", "mean": "N", "most": "N",
 }  # fmt: skip
 
@@ -39,7 +40,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def _kept(options: Options, found: Found) -> Any:
-    return finite([gathered(key, tasks, dict(found)) for key, tasks in _by_law(options)])
+    return [kept(gathered(key, tasks, dict(found))) for key, tasks in _by_law(options)]
 
 
 def _shown(content: Content, name: str) -> dict[str, str]:
@@ -76,4 +77,8 @@ STUDY = _haptics("haptics", _pictures)
 LIMITS = _haptics(
     "limits", no_pictures, sensors=("lab", "honest"), subject=("hands", "release"), seed=6_400_000, rigs=24,
     controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
+)  # fmt: skip
+ACCELERATION = _haptics(
+    "acceleration-feel", no_pictures, sensors=("lab", "honest"), subject=("impedance", "release"), seed=70_000, rigs=8,
+    controller=("admittance-adaptive",), parameters="examples/acceleration_sensor_rig.toml",
 )  # fmt: skip

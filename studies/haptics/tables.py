@@ -10,13 +10,11 @@ import numpy as np
 from baselines.bench.statistics import number, quantile
 from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics.coupled import HANDS, SETPOINT, stable_up_to
+from studies.haptics.kept import PEAK
 from studies.haptics.release import PULL, STIFFNESS
 
 Runs = Sequence[dict[str, Any]]
-"""What ``studies.haptics.measurements.gathered`` gives, in the order of the rows."""
-
-PEAK = 10.0
-"""N: the hand's force of the tables."""
+"""What ``studies.haptics.kept.kept`` gives, in the order of the rows."""
 
 
 def report(runs: Runs) -> str:
@@ -40,13 +38,10 @@ def rendering_table(runs: Runs) -> str:
         for piece in run.get("impedance", ()):
             kept = np.array(piece["peak"]) == PEAK
             lost = np.array(piece["lost"], dtype=bool)[kept]
-            shortage = np.where(lost, np.inf, _numbers(piece["shortage"])[:, kept].max(axis=0))
             rows.append([
                 *_who(run), f"{piece['stiffness']:g}",
                 *(_pair(piece, name, kept, lost, least=True) for name in ("bandwidth", "unnoticed", "unnoticed_without_work")),
-                _at_one_hertz(piece, kept, lost),
-                *(_pair(piece, name, kept, lost) for name in ("error_own_mm", "error_spring_mm", "energy")),
-                _spread(shortage), *(_pair(piece, name, kept, lost) for name in ("air", "saturation")), str(int(lost.sum())),
+                *(_pair(piece, name, kept, lost) for name in UNDER_MULTISINES), str(int(lost.sum())),
             ])  # fmt: skip
     columns = (
         *WHO, "N/m", "bandwidth, Hz", "1 JND up to, Hz", "22 % up to, Hz", "JND at 1 Hz", "own error, mm", "error to (19), mm",
@@ -116,6 +111,9 @@ def stability_table(runs: Runs) -> str:
     return _table(title, columns, rows)
 
 
+UNDER_MULTISINES = ("noticed", "error_own_mm", "error_spring_mm", "energy", "shortage", "air", "saturation")
+"""Figures of a lane that the table of impedances has with their worst."""
+
 WHO = ("controller", "sensors", "uses the hand's force")
 
 
@@ -139,13 +137,6 @@ def _pair(piece: dict[str, Any], name: str, kept: Array, lost: Array, least: boo
     if name not in piece:
         return "-"
     return _spread(np.where(lost, 0.0 if least else np.inf, _numbers(piece[name])[kept]), least)
-
-
-def _at_one_hertz(piece: dict[str, Any], kept: Array, lost: Array) -> str:
-    if "differences" not in piece:
-        return "-"
-    line = int(np.argmin(np.abs(np.array(piece["frequency"]) - 1.0)))
-    return _spread(np.where(lost, np.inf, _numbers(piece["differences"])[line, kept]))
 
 
 def _beyond(piece: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from baselines.work.files import write_json, write_text
+from birthsim_env.files import write_json, write_text
 from studies.kills.tries import SCENARIOS, Outcome
 
 COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")

@@ -14,9 +14,9 @@ from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import merged
 from baselines.bench.evaluation_data import DATA, data
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
-from baselines.work.sources import ROOT
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import load_parameters
+from birthsim_env.sources import ROOT
 from studies.results import Content
 from studies.study import Found, Options, Study
 

@@ -18,8 +18,8 @@ from agents.residual.settings import LAWS, is_one_of
 from agents.training.validation import validate
 from baselines.bench.pieces import file_hash
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, number, quantile
-from baselines.work.files import finite
 from baselines.work.tasks import Result, Task
+from birthsim_env.files import finite
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters

@@ -17,7 +17,7 @@ from baselines.figures.runs import STYLE, legend_below, save
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import field_of
 from studies.sweeps.plan import HeatMap
-from studies.sweeps.report import short
+from studies.sweeps.report import as_float, short
 
 LOST_COLOUR = "#303030"
 
@@ -29,7 +29,7 @@ def draw_map(name: str, chart: HeatMap, found: Sequence[dict[str, Any]], folder:
     """One picture of what ``studies.sweeps.report.figures`` found; a cell is the mean over what else varies."""
     panels = list(dict.fromkeys(row["point"].get(chart.per) for row in found)) if chart.per else [None]
     shown = [[row for row in found if not chart.per or row["point"].get(chart.per) == panel] for panel in panels]
-    values = [np.array([row["metrics"][chart.metric][chart.statistic] for row in rows]) for rows in shown]
+    values = [np.array([as_float(row["metrics"][chart.metric][chart.statistic]) for row in rows]) for rows in shown]
     finite = np.concatenate([size[np.isfinite(size)] for size in values])
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     norm = LogNorm(low, high) if low > 0 and high > 5 * low else Normalize(low, high)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.metrics import UNITS
-from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
+from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.work.tasks import Result
 from studies.comparison.tables import markdown
 from studies.sweeps.plan import Point
 
-SHOWN_POINTS = 500
+SHOWN_POINTS = 100
 """Rows of the table; the Parquet file has all."""
 
 STATISTICS = ("median", "mean", "q95", "max")
@@ -76,24 +76,24 @@ def figures(points: Sequence[Point], results: Sequence[Sequence[Result]]) -> lis
 
 
 def table(found: Sequence[dict[str, Any]]) -> str:
-    """Markdown: what varies, lost episodes, settled error, successes and mean return."""
+    """Markdown of ``figures`` as a result keeps them: what varies, lost episodes, settled error, successes and mean return."""
     names = list(dict.fromkeys(name for row in found for name in row["point"]))
     head = [*names, "lost", "settled error, mm: median", "95 %", "largest", "success", "return, mean"]
     rows = [head]
     for row in found[:SHOWN_POINTS]:
         varied = [short(row["point"].get(name)) for name in names]
-        error = [number(row["metrics"]["settled_rms"][key]) for key in ("median", "q95", "max")]
+        error = [number(as_float(row["metrics"]["settled_rms"][key])) for key in ("median", "q95", "max")]
         count = row["episodes"]
         rows.append([
-            *varied, f"{row['lost']} of {count}", *error, f"{row['success']} of {count}", number(row["return"]),
+            *varied, f"{row['lost']} of {count}", *error, f"{row['success']} of {count}", number(as_float(row["return"])),
         ])  # fmt: skip
     text = markdown(rows)
     return text if len(found) <= SHOWN_POINTS else f"{text}\n\n{len(found) - SHOWN_POINTS} more points are in episodes.parquet."
 
 
-def summary_json(found: Sequence[dict[str, Any]]) -> Any:
-    """``figures`` as JSON takes them; "lost" where a figure is infinite."""
-    return jsonable(list(found))
+def as_float(value: Any) -> float:
+    """A figure as a result keeps it: "lost" for infinity, None for none."""
+    return float("inf" if value == "lost" else "nan" if value is None else value)
 
 
 def short(value: Any) -> str:

@@ -4,19 +4,55 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash
 from baselines.commands.worlds import policy_of
-from baselines.work.files import own_folder
 from baselines.work.tasks import Result, Task
+from birthsim_env.files import own_folder
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from studies.sweeps.plan import Point, Sweep
 
 WORLD = ("sensors", "randomize", "reference", "user_force")
 """Names that are arguments of the environment."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What a task is for: the ``number`` of a ``point``, which has ``count`` pieces."""
+
+    number: int
+    point: Point
+    count: int
+
+
+def pieces_of(points: Sequence[Point], sweep: Sweep, first: int = 0) -> dict[Piece, Task]:
+    """The pieces of points, which are numbered from ``first``; that of a point that cannot be fails and says why."""
+    pieces = dict[Piece, Task]()
+    for number, point in enumerate(points, first):
+        try:
+            tasks = tasks_of(point, sweep)
+        except ValueError as error:
+            tasks = [Task(f"point {number}", "refused", refuse, {"why": str(error)})]
+        pieces |= {Piece(number, point, len(tasks)): task for task in tasks}
+    return pieces
+
+
+def complete(found: Mapping[Piece, Result]) -> tuple[list[Point], list[list[Result]]]:
+    """The points that have all their pieces, and these."""
+    pieces: dict[int, list[Piece]] = {}
+    for piece in found:
+        pieces.setdefault(piece.number, []).append(piece)
+    whole = [own for _, own in sorted(pieces.items()) if len(own) == own[0].count]
+    return [own[0].point for own in whole], [[found[piece] for piece in own] for own in whole]
+
+
+def refuse(why: str) -> Result:
+    """Raises ``ValueError``."""
+    raise ValueError(why)
 
 
 def tasks_of(point: Point, sweep: Sweep) -> list[Task]:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from baselines.registry import LISTED, SLOW
-from baselines.work.files import write_json
 from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
 from birthsim_build.code.compiler import require_linker, require_llvm
 from birthsim_build.estimate import CYCLES, HOST
+from birthsim_env.files import write_json
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array

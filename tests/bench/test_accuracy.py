@@ -80,7 +80,7 @@ def found() -> dict:
             short.setattr(accuracy, name, value)
         rigs = {name: rig for name, rig in accuracy.rigs_to_measure(Parameters(), 1, 0).items() if "corner 1" not in name}
         measured = accuracy.measure(rigs, MOTIONS)
-    from baselines.work.files import finite
+    from birthsim_env.files import finite
 
     return json.loads(json.dumps(finite(measured), allow_nan=False))
 

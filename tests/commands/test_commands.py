@@ -11,9 +11,9 @@ import pytest
 
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import policy_folders
-from baselines.work.files import write_json
 from birthsim.door import COMMANDS
 from birthsim.export import FORMS
+from birthsim_env.files import write_json
 from tests.console import OWN, RESIDUAL, ROOT, assert_picture, assert_says, call, run, strict, words
 
 HELP = [(name,) for name in COMMANDS] + [("export", "--to", form) for form in FORMS]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.work.files import whole_results
+from birthsim_env.files import whole_results
 from tests.console import PATIENCE, ROOT
 
 LOADING = """

@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 
 from baselines.bench.metrics import UNITS
-from baselines.work.files import own_folder
+from birthsim_env.files import own_folder
 from studies.comparison import stiffness as studies
 from studies.comparison.study import figures_of
 from tests.console import OWN, assert_picture, call, interrupted, strict

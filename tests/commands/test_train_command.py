@@ -5,7 +5,7 @@ import pytest
 
 from agents.policy.files import WEIGHTS, load_policy
 from agents.training.checkpoint import NAME as CHECKPOINT
-from baselines.work.files import own_folder
+from birthsim_env.files import own_folder
 from tests.console import RESIDUAL, assert_picture, call, interrupted, run, strict
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.haptics import backdriving, coupled, rendering
-from studies.haptics import figures as figures
 from studies.haptics.coupled import measure_hands, measure_z_width, stable_up_to
+from studies.haptics.kept import kept, phase
 from studies.haptics.tables import backdriving_table, release_table
 from studies.stability import maps as stability
 from tests.console import OWN, call, strict
@@ -90,9 +90,37 @@ def test_tables_say_lost_and_refused() -> None:
 
 def test_the_phase_is_shown_near_the_declared_one() -> None:
     """190 degrees beside 170, not -170."""
-    piece = {"declared": [[[-1.0]], [[0.1]]], "peak": [10.0], "lost": [False]}
-    felt = np.exp(1j * np.radians([[190.0]]))
-    np.testing.assert_allclose(figures._phase(piece, felt), 190.0)
+    felt, declared = np.exp(1j * np.radians([[190.0]])), np.exp(1j * np.radians([[174.0]]))
+    np.testing.assert_allclose(phase(felt, declared), 190.0)
+
+
+def test_a_result_keeps_quantiles_of_lanes_that_are_not_lost() -> None:
+    """Three lanes of 10 N, of which one is lost, and one of 20 N: a spring of 1 and of 3 N/m, two frequencies."""
+    springs, lines = np.array([1.0, 3.0, np.nan, 50.0]), [0.2, 1.0]
+    piece = {
+        "stiffness": 2000.0, "frequency": lines, "peak": [10.0, 10.0, 10.0, 20.0], "lost": [False, False, True, False],
+        "felt": [[springs, springs], np.zeros((2, 4))], "declared": [[np.full(4, 2.0)] * 2, np.zeros((2, 4))],
+        "port_damping": [springs, 2 * springs], "shortage": [[0.0, 1.0, None, 2.0], [1.0, 0.0, None, 3.0]],
+        "differences": [springs, 1 / springs], "energy_over_time": [[0.5], [1.5], [2.5]], "energy_period": 0.1,
+        "bandwidth": [1 / 3, 2.0, 0.0, 4.0],
+    }  # fmt: skip
+    softer = {**piece, "stiffness": 1000.0}
+    first, found = kept({"controller": "mine", "impedance": [softer, piece]})["impedance"]
+    assert "curves" not in first
+    assert found["curves"] == {
+        "frequency": lines, "magnitude": [[1.5] * 2, [2.0] * 2, [2.5] * 2], "phase": [[0.0] * 2] * 3,
+        "declared": {"magnitude": [2.0] * 2, "phase": [0.0] * 2}, "damping": [[2.0, 4.0], [1.0, 2.0]], "energy": [1.5],
+        "energy_period": 0.1,
+    }  # fmt: skip
+    assert (found["shortage"], found["noticed"]) == ([1.0, 1.0, None, 3.0], [1.0, 0.333333, None, 0.02])
+    assert found["bandwidth"] == [0.333333, 2.0, 0.0, 4.0]
+    pull = {"lost": [False] * 3, "time": [0.0], "offset_mm": [[1.0], [2.0], [6.0]], "ideal": None, "given_back": [0.0] * 3}
+    (let_go,) = kept({"release": [pull]})["release"]
+    assert let_go == {
+        "lost": [False] * 3, "ideal": None, "curves": {"time": [0.0], "offset_mm": [[2.0], [1.0], [6.0]], "declared": None}
+    }  # fmt: skip
+    nobody = kept({"impedance": [{**piece, "lost": [True] * 4}]})["impedance"][0]["curves"]
+    assert nobody["magnitude"] == [[None] * 2] * 3
 
 
 @pytest.mark.slow
@@ -112,7 +140,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     (middle,) = best["impedance"]
     assert middle["stiffness"] == 2000.0
     assert np.median(np.array(middle["bandwidth"])[np.array(middle["peak"]) == 10.0]) > 3.0
-    assert still["impedance"][0]["declared"] is None
+    assert still["impedance"][0]["curves"]["declared"] is None
     assert still["backdriving"][-1]["refused"] is None
     assert best["backdriving"][-1]["refused"].startswith("stiffness setpoint")
     for name in ("haptics_impedance", "haptics_energy", "haptics_release", "stability_hand_mass_held_ideal", "haptics_z_width"):

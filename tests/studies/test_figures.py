@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from baselines.work.sources import ROOT
+from birthsim_env.sources import ROOT
 from studies.figures import figure
 from studies.results import read_result
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from baselines.work.sources import ROOT, hashes
+from birthsim_env.sources import ROOT, hashes
 from studies import shelf
 from studies.door import OWN
 from studies.results import changed, provenance, read_result, written

@@ -45,11 +45,17 @@ def swept(tmp_path, monkeypatch, capsys):
     return done
 
 
+def found(folder):
+    return json.loads((folder / "sweep.json").read_text())["figures"]
+
+
 def same(one, other):
+    """The same files, and all the same bytes but in what says when and how the result was made."""
     names = {path.name for path in one.iterdir() if path.is_file()}
     assert names == {path.name for path in other.iterdir() if path.is_file()}
-    for name in names:
+    for name in names - {"sweep.json"}:
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    assert found(one) == found(other)
 
 
 @pytest.mark.slow
@@ -68,10 +74,9 @@ def test_a_grid_gives_the_same_bytes_with_one_process_with_two_and_after_a_longe
     )
     np.testing.assert_array_equal([row["settled_rms"] for row in rows[6:]], plain.metrics["settled_rms"])
     assert rows[6]["return_0.9"] == plain.returns[0.9][0]
-    content = json.loads((out / "sweep.json").read_text())
-    assert [point["point"]["rig.mechanics.mass"] for point in content["points"]] == [3.0, 4.0, 3.0, 4.0]
+    assert [point["point"]["rig.mechanics.mass"] for point in found(out)["points"]] == [3.0, 4.0, 3.0, 4.0]
     assert "| backstepping | 3 | 0 of 2 |" in (out / "sweep.md").read_text()
-    assert (out / "map_0.png").read_bytes()[:4] == b"\x89PNG"
+    assert (out / "sweep_0.png").read_bytes()[:4] == b"\x89PNG"
     same(out, swept(GRID, "--jobs", 2, out="two")[2])
     longer = GRID.replace("[3.0, 4.0]", "[2.5, 3.0, 4.0]")
     _, said, _ = swept(longer, "--jobs", 1)
@@ -94,18 +99,21 @@ def test_a_search_proposes_the_same_whatever_has_been_kept(swept):
     """
     status, said, out = swept(text, "--jobs", 1)
     assert status == 0, said
-    assert "best of 4 trials: number " in said
-    # As after a kill: the journal ends early, pieces are there.
-    journal = out / "trials.journal"
-    lines = journal.read_text().splitlines(keepends=True)
-    whole = {name: (out / name).read_bytes() for name in ("sweep.json", "episodes.parquet")}
-    journal.write_text("".join(lines[:-1]))
+    best = found(out)["best"]
+    values = [point["metrics"]["settled_rms"]["q95"] for point in found(out)["points"]]
+    assert best["settled_rms q95"] == min(values) == values[best["trial"]]
+    # As after a kill: one piece of the second batch is missing.
+    whole = {name: (out / name).read_bytes() for name in ("sweep.md", "episodes.parquet")}
+    bandwidth = found(out)["points"][3]["point"]["gain.bandwidth"]
+    (last,) = [path for path in (out / "pieces").rglob("*.json") if f"{bandwidth!r}" in path.read_text()]
+    last.unlink()
     status, said, _ = swept(text, "--jobs", 2)
     assert status == 0, said
-    assert "trials 0 to 1: 2 of 2 are there" in said
+    assert "sweep: 1 of 2 are there" in said
     assert {name: (out / name).read_bytes() for name in whole} == whole
-    storage = JournalStorage(JournalFileBackend(str(journal)))
-    assert len(optuna.load_study(study_name="birthsim-sweep", storage=storage).trials) == 4
+    storage = JournalStorage(JournalFileBackend(str(out / "trials.journal")))
+    trials = optuna.load_study(study_name="birthsim-sweep", storage=storage).trials
+    assert [trial.value for trial in trials] == values
 
 
 @pytest.mark.slow
@@ -134,7 +142,7 @@ def test_points_that_cannot_be_are_named_and_cost_no_other(swept):
     text = GRID.replace('["backstepping", "pid"]', '["nobody"]').replace("episodes = 2", "episodes = 1")
     status, said, _ = swept(text, "--jobs", 1)
     assert status == 2
-    assert "error: 2 of 2 points failed, the first point 0: controller = 'nobody'; allowed: " in said
+    assert "error: 2 of 2 pieces failed, the first point 0: ValueError: controller = 'nobody'; allowed: " in said
 
 
 @pytest.mark.parametrize(

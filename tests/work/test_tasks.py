@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from baselines.work import tasks
-from baselines.work.sources import hashes
 from baselines.work.tasks import Task, code_stamp, run_tasks
+from birthsim_env.sources import hashes
 
 
 def square(log, number):

@@ -14,7 +14,6 @@ import contextlib
 import hashlib
 import os
 import pickle
-import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -31,6 +30,8 @@ from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher
 
 import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
+from birthsim_env.files import whole_file
+from birthsim_env.sources import PACKAGES, ROOT, source_stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -39,49 +40,7 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
 
-_ROOT = Path(__file__).resolve().parents[3]
-_PACKAGES = ("birthsim_env", "baselines", "agents", "birthsim_build", "birthsim_live", "studies")
 _DIGEST = hashlib.sha256().digest_size
-
-
-def _file_of(module: str) -> Path | None:
-    """The source file of one of this project's modules, or None."""
-    place = _ROOT.joinpath(*module.split("."))
-    found = (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
-    return next(found, None) if module.split(".")[0] in _PACKAGES else None
-
-
-_LINE = r"(?:[^\n;\\]|\\\n)*"
-_IMPORT = re.compile(
-    rf"(?:^|[;:])[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]*(\([^)]*\)|{_LINE})|import[ \t]+({_LINE}))", re.MULTILINE
-)
-"""An import statement, once comments and new names are gone: syntax trees would take longer than all the rest of an import."""
-
-
-@cache
-def _imports(path: Path) -> frozenset[Path]:
-    """The project's own files that a source file imports anywhere in it."""
-    files: set[Path | None] = set()
-    for module, names, modules in _IMPORT.findall(re.sub(r"#[^\n]*|\bas[ \t]+\w+", "", path.read_text(encoding="utf-8"))):
-        files.update(_file_of(word) for word in re.findall(r"[\w.]+", modules))
-        # What is no module of its own stands in the one that it is imported from.
-        files.update(_file_of(f"{module}.{name}") or _file_of(module) for name in re.findall(r"\w+", names))
-    return frozenset(file for file in files if file)
-
-
-@cache
-def source_stamp(path: Path) -> str:
-    """SHA-256 of a source file and of every file of this project that it imports, directly or not."""
-    seen, waiting = {path}, [path]
-    while waiting:
-        found = _imports(waiting.pop()) - seen
-        seen |= found
-        waiting += found
-    digest = hashlib.sha256()
-    for file in sorted(seen):
-        # A user's own kernel may lie anywhere.
-        digest.update(str(file.relative_to(_ROOT) if file.is_relative_to(_ROOT) else file).encode() + file.read_bytes())
-    return digest.hexdigest()
 
 
 @cache
@@ -89,7 +48,7 @@ def cache_folder() -> Path | None:
     """The first writable folder: $NUMBA_CACHE_DIR, beside the sources, the user's cache; None when there is none."""
     chosen, home = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
     folders = [Path(chosen)] if chosen else []
-    folders.append(_ROOT / "birthsim_env" / "__pycache__")
+    folders.append(ROOT / "birthsim_env" / "__pycache__")
     with contextlib.suppress(RuntimeError):  # of a user without a home directory
         folders.append(Path(home or Path.home() / ".cache") / "birthsim")
     for folder in folders:
@@ -116,16 +75,12 @@ def keep(path: Path, content: bytes) -> None:
 
     Files of older sources, whose names differ only after the last ``-``, go.
     """
-    partial = path.with_suffix(f".{os.getpid()}.partial")
-    try:
-        partial.write_bytes(hashlib.sha256(content).digest() + content)
-        partial.replace(path)
+    with contextlib.suppress(OSError):
+        with whole_file(path) as file:
+            file.write(hashlib.sha256(content).digest() + content)
         for other in path.parent.glob(f"{path.stem.rpartition('-')[0]}-*{path.suffix}"):
             if other != path:
                 other.unlink(missing_ok=True)
-    except OSError:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 class _DiskCache(NullCache):
@@ -163,7 +118,7 @@ class _Announcer(event.Listener):
 
     def on_start(self, event: Any) -> None:
         module = getattr(event.data["dispatcher"].py_func, "__module__", "") or ""
-        if not self._said and module.split(".")[0] in _PACKAGES:
+        if not self._said and module.split(".")[0] in PACKAGES:
             self._said = True
             then = "the result is cached" if cache_folder() else "no folder is writable, so every process compiles anew"
             print(f"BirthSIM: compiling numerical kernels, usually 10 to 40 s; {then}.", file=sys.stderr, flush=True)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from numba import types
 from numba.extending import intrinsic
 
+from birthsim_env.files import write_text
 from birthsim_env.physics.compiled.compilation import cache_folder
 from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
 
@@ -110,9 +111,7 @@ def module_of(text: str) -> ModuleType:
     folder = cache_folder() or Path(tempfile.mkdtemp())
     path = folder / f"{name}.source"
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        partial = path.with_suffix(f".{id(text)}.partial")
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        write_text(path, text)
     spec = importlib.util.spec_from_file_location(name, path, loader=SourceFileLoader(name, str(path)))
     assert spec is not None
     assert spec.loader is not None

@@ -12,7 +12,7 @@ from baselines.bench import pieces
 from baselines.logs import writing
 from baselines.logs.log import Log
 from baselines.work import tasks
-from baselines.work.files import write_json
+from birthsim_env.files import write_json
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs import reading
 from birthsim_live.logs import recording as recordings

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from birthsim_env.physics.compiled import compilation
-from birthsim_env.physics.compiled.compilation import source_stamp
+from birthsim_env.sources import PACKAGES, dependencies, file_of, imports, source_stamp
 
 ROOT = Path(__file__).parents[3]
 PROBE = """
@@ -38,6 +38,8 @@ def package(tmp_path):
     folder = tmp_path / "birthsim_env"
     folder.mkdir()
     for name in (
+        "files",
+        "sources",
         "loop/signals",
         *(f"physics/{part}" for part in ("electronics", "valves")),
         *(f"physics/compiled/{part}" for part in ("compilation", "lanes", "exact", "records", "record_types", "resolution")),
@@ -83,13 +85,7 @@ def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(pack
 
 def test_the_stamp_is_of_all_that_a_kernel_imports():
     def imported(name):
-        seen, waiting = set(), [(ROOT / "birthsim_env" / name).resolve()]
-        while waiting:
-            path = waiting.pop()
-            if path not in seen:
-                seen.add(path)
-                waiting += compilation._imports(path)
-        return {path.stem for path in seen}
+        return {path.stem for path in dependencies([(ROOT / "birthsim_env" / name).resolve()])}
 
     assert {"dynamics", "chambers", "friction", "geometry", "mechanics", "valves", "lanes"} <= imported("physics/dynamics.py")
     assert "signals" in imported("reward.py"), "compliance is made there"
@@ -118,16 +114,16 @@ def test_no_import_that_the_syntax_tree_has_is_overlooked(tmp_path):
     def of_tree(path):
         for node in ast.walk(ast.parse(path.read_bytes())):
             if isinstance(node, ast.Import):
-                yield from (compilation._file_of(alias.name) for alias in node.names)
+                yield from (file_of(alias.name) for alias in node.names)
             elif isinstance(node, ast.ImportFrom):
                 for alias in node.names:
-                    yield compilation._file_of(f"{node.module}.{alias.name}") or compilation._file_of(node.module)
+                    yield file_of(f"{node.module}.{alias.name}") or file_of(node.module)
 
     odd = tmp_path / "odd.py"
     odd.write_text(ODD)
-    for path in [odd, *(path for package in compilation._PACKAGES for path in (ROOT / package).rglob("*.py"))]:
-        assert set(filter(None, of_tree(path))) <= compilation._imports(path), path
-    stems = {path.parent.name if path.stem == "__init__" else path.stem for path in compilation._imports(odd)}
+    for path in [odd, *(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))]:
+        assert set(filter(None, of_tree(path))) <= imports(path), path
+    stems = {path.parent.name if path.stem == "__init__" else path.stem for path in imports(odd)}
     assert stems == {"reward", "info", "success", "lanes", "exact", "rows"}
 
 
@@ -139,7 +135,7 @@ def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
-    monkeypatch.setattr(compilation, "_ROOT", tmp_path / "file")
+    monkeypatch.setattr(compilation, "ROOT", tmp_path / "file")
     assert compilation.cache_folder.__wrapped__() is None
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
     assert compilation.cache_folder.__wrapped__() == tmp_path / "own"

@@ -13,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from filelock import FileLock, Timeout
-
 _PARTIAL = ".partial"
 """Ending of the hidden names of what is not complete."""
 
@@ -42,6 +40,8 @@ def own_folder(path: Path) -> Iterator[Path]:
 
     The system frees the folder when the process ends, whatever ends it.
     """
+    from filelock import FileLock, Timeout  # which loads asyncio
+
     make_folder(path)
     try:
         with FileLock(path / ".lock", timeout=0):

@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from baselines.work.files import whole_file, write_json
+from birthsim_env.files import whole_file, write_json
 
 
 def test_what_is_raised_leaves_the_file_as_it_was_and_nothing_beside_it(tmp_path):
