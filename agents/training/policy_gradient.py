@@ -11,6 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 from torch import Tensor
@@ -18,6 +19,7 @@ from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork
+from agents.residual.settings import LAWS, NO_LAW, ResidualSettings
 from agents.training.checkpoint import read_checkpoint, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
@@ -29,6 +31,9 @@ from birthsim_env.reward import LARGEST_COST
 
 LEAST_RATE = 0.01
 """Fraction of the learning rate at the end, to which it falls linearly."""
+
+OBSERVED, LEAST = 64, 0.4
+"""Rigs whose observations, during an episode, say how to normalise; the least standard deviation of an entry, in its scale."""
 
 MET = 5.0
 """s: mean time that a rig is met; assumed."""
@@ -45,23 +50,25 @@ def _cost(reward: Tensor, period: float) -> Tensor:
     return torch.exp(LARGEST_COST * (1.0 - reward * (0.01 / period)))
 
 
-class Normalized:
-    """Running mean and variance (D,) of observations."""
+def _statistics(settings: TrainingSettings, env: Any) -> tuple[Any, Any]:
+    """Mean and variance (D,) of observations under the controller inside, the paper's where there is none.
 
-    def __init__(self, size: int) -> None:
-        self.mean, self.variance, self.count = np.zeros(size), np.ones(size), EPSILON
-
-    def __call__(self, observation: Tensor) -> Tensor:
-        """Observations (N, D) in standard deviations, as ``PolicyNetwork`` takes them."""
-        mean, deviation = torch.from_numpy(self.mean), torch.from_numpy(np.sqrt(self.variance + EPSILON))
-        return ((observation - mean) / deviation).clamp(-CLIP, CLIP).float()
-
-    def add(self, seen: Any) -> None:
-        """Count observations (M, D)."""
-        count, mean = self.count + len(seen), seen.mean(axis=0)
-        off, share = mean - self.mean, len(seen) / count
-        self.variance = (1 - share) * self.variance + share * seen.var(axis=0) + share * (1 - share) * off * off
-        self.mean, self.count = self.mean + share * off, count
+    They stay as they are: running ones would remember what the first policies see, beside which a millimetre is nothing.
+    """
+    given = env.spec.kwargs
+    law = {"law": LAWS[0], "impedance": ResidualSettings.impedance} if given["law"] == NO_LAW else {}
+    driven: Any = gymnasium.make_vec(settings.environment, **{**given, **law, "num_envs": OBSERVED})
+    seed = TRAINING_SEED + SEED_SPACING * settings.seed
+    observation, _ = driven.reset(seed=[seed + lane for lane in range(OBSERVED)])
+    zero, seen = np.zeros(driven.action_space.shape, dtype=np.float32), []
+    for _ in range(driven.steps):
+        seen.append(observation.copy())
+        observation, *_ = driven.step(zero)
+    found = np.concatenate(seen).astype(np.float64)
+    known = dict(zip(driven.observation_names, zip(found.mean(axis=0), found.var(axis=0), strict=True), strict=True))
+    driven.close()
+    mean, variance = np.array([known.get(name, (0.0, 0.0)) for name in env.observation_names]).T
+    return mean.copy(), np.maximum(variance, LEAST**2)
 
 
 class PolicyGradient:
@@ -78,7 +85,7 @@ class PolicyGradient:
         torch.nn.init.zeros_(layers[-1].bias)
         self._policy = torch.nn.Sequential(*(part for layer in layers for part in (layer, torch.nn.Tanh())))
         self._adam = torch.optim.Adam(self._policy.parameters(), lr=settings.learning_rate, betas=MOMENTS)
-        self._normalized = Normalized(inputs)
+        self._mean, self._variance = _statistics(settings, env)
         seed = TRAINING_SEED + SEED_SPACING * settings.seed
         self._now = self._worlds.reset(seed=[seed + lane for lane in range(settings.lanes)], options={"staggered": True})
 
@@ -89,8 +96,7 @@ class PolicyGradient:
     def _restore(self, content: dict[str, Any]) -> dict[str, Any]:
         self._policy.load_state_dict(tensors(content["policy"]))
         self._adam.load_state_dict(tensors(content["adam"]))
-        running, self.steps = self._normalized, int(content["steps"])
-        running.mean, running.variance, running.count = content["observations"]
+        self.steps = int(content["steps"])
         self._worlds.env.set_state(content["lanes"])
         self._now = self._worlds.now(content["last"])
         past: dict[str, Any] = content["past"]
@@ -133,12 +139,11 @@ class PolicyGradient:
 
     def _update(self) -> float:
         """One horizon forward and back; returns the time in the environment, s."""
-        settings, stepping, seen = self._settings, 0.0, []
+        settings, stepping = self._settings, 0.0
         simulation = self._worlds.env.simulation
         period = simulation.periods * simulation.period
         now, loss = self._now.detached(), torch.zeros((), dtype=torch.float64)
         for k in range(settings.rollout):
-            seen.append(now.observation.detach().numpy().astype(np.float64))
             action = self._policy(self._normalized(now.observation))
             started = time.perf_counter()
             now = self._worlds.step(now, action)
@@ -157,7 +162,6 @@ class PolicyGradient:
             left = max(0.0, 1.0 - self.steps / settings.steps)
             self._adam.param_groups[0]["lr"] = settings.learning_rate * (LEAST_RATE + (1 - LEAST_RATE) * left)
             self._adam.step()
-        self._normalized.add(np.concatenate(seen))
         self._begin_some()
         return stepping
 
@@ -169,6 +173,11 @@ class PolicyGradient:
         if chosen.any():
             self._now = self._worlds.now(env.reset(options={"reset_mask": chosen})[0])
 
+    def _normalized(self, observation: Tensor) -> Tensor:
+        """Observations (N, D) in standard deviations, as ``PolicyNetwork`` takes them."""
+        mean, deviation = torch.from_numpy(self._mean), torch.from_numpy(np.sqrt(self._variance + EPSILON))
+        return ((observation - mean) / deviation).clamp(-CLIP, CLIP).float()
+
     def network(self) -> PolicyNetwork:
         """The policy as plain arrays, a copy."""
         layers = tuple(
@@ -176,13 +185,11 @@ class PolicyGradient:
             for layer in self._policy
             if isinstance(layer, torch.nn.Linear)
         )
-        return PolicyNetwork(self._normalized.mean.copy(), self._normalized.variance.copy(), layers, squashed=True)
+        return PolicyNetwork(self._mean, self._variance, layers, squashed=True)
 
     def _save(self, reached: Reached) -> None:
-        running = self._normalized
         content = {
             "past": reached.past(), "policy": self._policy.state_dict(), "adam": self._adam.state_dict(), "steps": self.steps,
-            "observations": [running.mean, running.variance, float(running.count)], "lanes": self._worlds.env.get_state(),
-            "last": self._now.observation.detach(),
+            "lanes": self._worlds.env.get_state(), "last": self._now.observation.detach(),
         }  # fmt: skip
         write_checkpoint(self._folder, reached.describe(), content)

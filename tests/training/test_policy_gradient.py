@@ -14,7 +14,7 @@ from agents.training.configuration import TrainingSettings, load_configuration
 from agents.training.trainer import train
 
 SHORT = TrainingSettings(
-    environment="BirthSIM/ProbeResidual-v2", algorithm="apg", steps=40_960, lanes=64, rollout=8, learning_rate=5e-3,
+    environment="BirthSIM/ProbeResidual-v2", algorithm="apg", steps=20_480, lanes=32, rollout=8, learning_rate=5e-3,
     discount=1.0, hidden=(32, 32), validation_lanes=8, validations=2,
 )  # fmt: skip
 PURE = ResidualSettings(law="none", policy_period=0.02)
@@ -28,8 +28,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:  # typ
 
 def test_a_policy_from_scratch_learns_in_80_updates(whole: tuple[Path, dict]) -> None:  # type: ignore[type-arg]
     folder, reached = whole
-    # Between 4 and 12 mm, by the beginning, where shut valves have 21.
-    assert reached["policy"]["pooled_mm"] < 0.7 * reached["law"]["pooled_mm"]
+    # 1.3 to 4.6 mm, by the seed, where shut valves have 21.
+    assert reached["policy"]["pooled_mm"] < 0.5 * reached["law"]["pooled_mm"]
     assert reached["policy"]["lost"] == 0
     policy = load_policy(folder)
     assert policy.network.squashed
