@@ -6,8 +6,7 @@ from typing import Any
 import gymnasium
 
 from agents.residual.settings import NO_LAW
-from baselines.bench.evaluation import merged, overview, table
-from baselines.bench.evaluation_data import data
+from baselines.bench.evaluation import data, merged, overview, table
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
 from baselines.commands.evaluate import Settings
 from baselines.commands.settings import RANDOMIZE
