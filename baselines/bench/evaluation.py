@@ -97,15 +97,11 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
     """All episodes of several evaluations as one."""
     whole = Evaluation(name)
     for one in evaluations:
-        whole.seeds += one.seeds
-        whole.lost += one.lost
-        whole.required_strength_ratio += one.required_strength_ratio
-        whole.success += one.success
-        for discount, values in one.returns.items():
-            whole.returns[discount] += values
-        for metric in UNITS:
-            whole.metrics[metric] += one.metrics[metric]
-        whole.traces += one.traces
+        for name in ("seeds", "lost", "required_strength_ratio", "success", "traces"):
+            getattr(whole, name).extend(getattr(one, name))
+        for name in ("returns", "metrics"):
+            for key, values in getattr(one, name).items():
+                getattr(whole, name)[key].extend(values)
     whole.cost = float(np.median([one.cost for one in evaluations]))
     return whole
 

@@ -1,7 +1,5 @@
 """What the shipped policies take off their controllers' errors, on worlds that no training used."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence
