@@ -66,18 +66,9 @@ SLOW = frozenset({"nonlinear-mpc"})
 """Controllers far from real time, which ``birthsim study comparison`` leaves out unless they are named."""
 
 
-def _others() -> list[str]:
-    return [*UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
-
-
 def controller_names() -> list[str]:
     """Every registered name; options, and what ``SHORT_NAMES`` abbreviates, come on top."""
-    return [*CONTROLLERS, *_others()]
-
-
-def listed_names() -> list[str]:
-    """What there is to choose from in a list: ``LISTED`` and all others."""
-    return [*LISTED, *_others()]
+    return [*CONTROLLERS, *UNCONTROLLED, *(point.name for point in entry_points(group=ENTRY_POINTS))]
 
 
 def split_options(name: str) -> tuple[str, dict[str, Any]]:

@@ -260,7 +260,6 @@ class CompiledDriving(Driving):
         return [(feedforward_rows(lanes, force, rate, factor, taken=self.controller.COMMAND_OPTIONS), FEEDFORWARD), *own]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the law."""
         self.controller.explain(measurement, reference)
 
     def check(self, measurement: Measurement) -> None:

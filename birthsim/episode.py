@@ -1,7 +1,5 @@
 """What ``birthsim run`` does: one episode, its error over time printed, its motion drawn."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -24,7 +22,7 @@ FIELDS = ("time", "position", "compliant_target", "tracking_error", "user_force"
 """What is kept of ``info``: s, m, m, m, N."""
 
 
-def run(settings: Settings) -> None:
+def run(settings: "Settings") -> None:
     """Run an episode, print and draw it."""
     rig = load_parameters(settings.parameters)
     check_environment(settings.env)

@@ -1,5 +1,6 @@
 """The single environment: one lane of the simulation."""
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -144,16 +145,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def measurement(self) -> Measurement:
         """What the sensors say now: the input of a controller. Arrays without a lane axis."""
         seen = self.simulation.measurement
-        return Measurement(
-            seen.time[0],
-            seen.position[:, 0],
-            seen.position_time[0],
-            seen.velocity[:, 0],
-            seen.pressures[:, 0],
-            seen.user_force[:, 0],
-            seen.sampled,
-            None if seen.acceleration is None else seen.acceleration[:, 0],
-        )
+        return replace(seen, **{name: rows.T[0] for name, rows in vars(seen).items() if isinstance(rows, np.ndarray)})
 
     @property
     def reference(self) -> Reference:

@@ -1,7 +1,5 @@
 """Folders and files that appear whole or not at all, and folders that one process has to itself."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

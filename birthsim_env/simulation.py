@@ -20,7 +20,7 @@ from birthsim_env.loop.world import jump_stage, no_force_stage, plant_stage
 from birthsim_env.parts.actuation import Actuation
 from birthsim_env.parts.courses import checked_start
 from birthsim_env.parts.drawn.randomization import Ranges, draw_columns
-from birthsim_env.parts.drawn.worlds import begin, worlds
+from birthsim_env.parts.drawn.streams import begin, worlds
 from birthsim_env.parts.hands.user_forces import UserForce, forces_of
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.sensors.sensors import SENSORS, drawn_by, put_out

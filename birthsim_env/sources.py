@@ -1,7 +1,5 @@
 """The project's own files that a source file depends on: imports are read as text, and nothing is run."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """``birthsim study NAME``: what the project measures of itself and of its controllers; it comes with a clone."""
 
-from __future__ import annotations
-
 import sys
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ way ends with cells that only one row has, and a column: ``circle:lab/admittance
 two slashes is an empty cell. Environments are named without ``BirthSIM/``. ``circle:settings/episodes`` is what was asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the figures of studies share beyond those of the packages: looks of many controllers, their names, logarithmic ticks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from matplotlib.axis import Axis

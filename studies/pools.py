@@ -1,7 +1,5 @@
 """What it costs to have pieces computed by other processes, two workers, of joblib and of a cluster."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

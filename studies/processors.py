@@ -7,8 +7,6 @@ same instructions. What this machine's processor lacks is left out, and said. A 
     python -m studies.processors here                        the numeric tests on this processor as it is: ``make oldest``
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

@@ -1,7 +1,5 @@
 """Results: one JSON file a study, with what made it, and whether the sources are still those."""
 
-from __future__ import annotations
-
 import json
 import platform
 import subprocess

@@ -1,7 +1,5 @@
 """The results of all studies: which are stale, what shows them, and their renewal."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

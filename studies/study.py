@@ -1,7 +1,5 @@
 """The engine of studies: pieces are computed side by side, figures kept as one JSON file, and shown from there."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 import time

@@ -6,8 +6,7 @@ from typing import Any
 import gymnasium
 
 from agents.residual.settings import NO_LAW
-from baselines.bench.evaluation import merged, overview, table
-from baselines.bench.evaluation_data import data
+from baselines.bench.evaluation import data, merged, overview, table
 from baselines.bench.pieces import controller_settings, evaluate_piece, evaluation_tasks, file_hash, gathered
 from baselines.commands.evaluate import Settings
 from baselines.commands.settings import RANDOMIZE
@@ -68,12 +67,12 @@ def run(settings: Settings) -> None:
     classical, learned = evaluations[:known], evaluations[known:]
     seeds, pictures = "", "error_over_time"
     if len(learned) > 1:
-        from agents.policy.seeds import seed_table
+        from agents.policy.seeds import as_table, seed_figures
         from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
         together = merged(learned, f"residual, {len(learned)} seeds")
         evaluations = [*classical, together]
-        seeds = "".join(f"\n{seed_table(one, learned)}\n" for one in classical)
+        seeds = "".join(f"\n{as_table(seed_figures(one, learned))}\n" for one in classical)
         pictures += ", learning_curves"
     lines = [caption, "", overview(evaluations)]
     results = [evaluation.to_dict() for evaluation in (*classical, *learned)]

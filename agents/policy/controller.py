@@ -64,7 +64,6 @@ class ResidualController(ResidualLaw):
         return self._function is None
 
     def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         super().reset(lanes)
         if lanes is None:
             self._calls = 0
@@ -75,7 +74,6 @@ class ResidualController(ResidualLaw):
             forget(lanes)
 
     def prepare(self, lanes: int, sampled: bool) -> None:
-        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
         if (lanes, sampled) != (self._lanes, self._sampled):
             self._cells, self._before = np.zeros((0, lanes)), [] if self.settings.force_sensor else [no_force_stage()]
             if self._network is not None:

@@ -5,8 +5,6 @@ The network is evaluated by a kernel of ours, in double precision and with a fix
 one lane and for many, on every processor. A library's matrix product sums in an order that depends on both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -129,7 +127,7 @@ class PolicyNetwork:
         _answer(about.ctypes.data, len(self.layers), self.squashed, observations, self.room(lanes), memory, actions)
         return actions
 
-    def acting(self) -> Acting:
+    def acting(self) -> "Acting":
         """The network at the beginning of an episode in every lane."""
         return Acting(self)
 

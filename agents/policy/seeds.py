@@ -74,11 +74,6 @@ def pooled(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(penalize_lost(values, np.isinf(values), True, LOST_ERROR)))))
 
 
-def seed_table(law: Evaluation, residuals: Sequence[Evaluation]) -> str:
-    """A Markdown table of ``seed_figures``."""
-    return as_table(seed_figures(law, residuals))
-
-
 def seed_figures(law: Evaluation, residuals: Sequence[Evaluation]) -> dict[str, Any]:
     """Law and residual over training seeds, on the episodes that the rig's strength suffices for, as JSON takes it.
 

@@ -13,29 +13,17 @@ from birthsim_env.vector_env import BirthSIMVectorEnv
 class _LawInside:
     """Puts the law between the policy and the valves of the environment that it is mixed into."""
 
-    def __init__(
-        self,
-        scenario: str,
-        law: str = ResidualSettings.law,
-        impedance: str = ResidualSettings.impedance,
-        authority: float = ResidualSettings.authority,
-        time_constant: float = ResidualSettings.time_constant,
-        force_sensor: bool = ResidualSettings.force_sensor,
-        **arguments: Any,
-    ) -> None:
+    def __init__(self, scenario: str, **arguments: Any) -> None:
         inside = ("action_mode", "valves", "actuation")
         for name in inside:
             if name in arguments:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
-        own = ("law", "impedance", "authority", "time_constant", "num_envs", "max_episode_steps", "autoreset_mode")
-        refuse_unknown(arguments, own, inside)
+        own = ("law", "impedance", "authority", "time_constant")
+        refuse_unknown(arguments, (*own, "num_envs", "max_episode_steps", "autoreset_mode"), inside)
         rig = load_parameters(arguments.pop("parameters", None))
-        period = arguments.get("policy_period", ResidualSettings.policy_period)
-        settings = ResidualSettings(law, impedance, authority, time_constant, period, force_sensor)
-        actuation = ResidualActuation(rig, settings)
-        super().__init__(  # type: ignore[call-arg]
-            scenario, parameters=rig, actuation=actuation, force_sensor=force_sensor, **arguments
-        )
+        shared = {name: arguments[name] for name in ("policy_period", "force_sensor") if name in arguments}
+        settings = ResidualSettings(**shared, **{name: arguments.pop(name) for name in own if name in arguments})
+        super().__init__(scenario, parameters=rig, actuation=ResidualActuation(rig, settings), **arguments)  # type: ignore[call-arg]
 
 
 class ResidualEnv(_LawInside, BirthSIMEnv):

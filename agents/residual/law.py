@@ -214,7 +214,6 @@ class ResidualLaw(StagedController):
         self._law.explain(measurement, reference)
 
     def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         super().reset(lanes)
         self._begin(np.zeros(0, dtype=np.bool_) if lanes is None else lanes)
 
@@ -225,7 +224,6 @@ class ResidualLaw(StagedController):
         self.shown[self.settings.size : self.settings.size + 2, lanes] = 1.0
 
     def prepare(self, lanes: int, sampled: bool) -> None:
-        """Make room for ``lanes`` lanes and one kind of sensors, where that is new."""
         if self.action.shape[1] != lanes:
             self._begin(np.ones(lanes, dtype=np.bool_))
         super().prepare(lanes, sampled)

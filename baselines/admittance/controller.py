@@ -136,5 +136,4 @@ class AdmittanceController(StagedController):
         return [inertial.law_stage(rig), law] if inert else [law]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the first lane whose stiffness is not positive definite."""
         require_stiffness(reference, 0.0)

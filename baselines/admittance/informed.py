@@ -40,7 +40,6 @@ class Informed(StagedController):
         return [(self.known.rows, HANDED)]
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the first lane whose stiffness is not positive definite."""
         require_stiffness(reference, 0.0)
 
     def update(self, measurement: Measurement, reference: Reference) -> None:

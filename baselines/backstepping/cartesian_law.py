@@ -7,7 +7,7 @@ In components along cylinder 2 (n) and across it (t), u1 = -kappa t, u2 = n, t' 
 The law is that of equal gains with a matrix in the place of the gain, C = (3 K/m - 2)^(1/2), which solves the cubic of
 ``gains`` without friction, K = m (C^3 + 2 C)/(3 C). Written out, with e = x - xt and the model's acceleration a,
     j = jt - 3 C (a - at + K e/m) - (3 C^2 + 2) (v - vt) + D K e/m^2,   D = J^-T diag(Fv) J^-1.
-The last term stands for Fv in ``gains.closed_loop_stiffness``. At rest under a force Fu, a = -Fu/m, and the law's rate of
+The last term stands for Fv in the K of ``gains``. At rest under a force Fu, a = -Fu/m, and the law's rate of
 friction Fv J^-1 a leaves (3 C - D/m)(K e - Fu) = 0: the hand feels K, whatever the size of e.
 """
 

@@ -16,7 +16,6 @@ c1 = c3 > c2, the largest root of a quartic, and it exists for any damping above
 """
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -99,21 +98,6 @@ def damped_gains_miss(
     return 1.0 if (k <= 1.0 or outer * outer <= k or inner <= 0.0 or pole <= 0.0 or abs(left) > TOLERANCE * b * pole) else 0.0
 
 
-def closed_loop_stiffness(c1: float, c2: float, c3: float, apparent_mass: float, viscous: float) -> float:
-    """Kcl (N/m) that gains c1, c2, c3 (1/s) render; raises ``ValueError`` where they render none."""
-    denominator = c1 + c2 + c3 - viscous / apparent_mass
-    if denominator <= 0:
-        raise ValueError(f"c1 + c2 + c3 = {c1 + c2 + c3:g} 1/s; allowed: more than Fv/m_e = {viscous / apparent_mass:g} 1/s")
-    return apparent_mass * (c1 + c3 + c1 * c2 * c3) / denominator
-
-
-def closed_loop_damping(c1: float, c2: float, c3: float, apparent_mass: float, viscous: float) -> float:
-    """B (N s/m) that gains c1, c2, c3 (1/s) render to slow pushes; raises ``ValueError`` where they render no stiffness."""
-    stiffness = closed_loop_stiffness(c1, c2, c3, apparent_mass, viscous)
-    a1 = c1 * c2 + c1 * c3 + c2 * c3 + 2
-    return (apparent_mass * a1 - stiffness) / (c1 + c2 + c3 - viscous / apparent_mass)
-
-
 def least_stiffness(apparent_mass: float, viscous: float) -> float:
     """The smallest Kcl (N/m) that equal gains can render: the minimum of m_e (c^3 + 2 c) / (3 c - Fv/m_e) over c.
 
@@ -144,7 +128,8 @@ def least_damping(stiffness: float, apparent_mass: float, viscous: float) -> flo
 
     def damping(log_excess: float) -> float:
         outer = max(math.sqrt(k), k * drag / (2 * (k - 1))) * (1 + math.exp(log_excess))
-        return closed_loop_damping(outer, inner_gain(outer, stiffness, apparent_mass, viscous), outer, apparent_mass, viscous)
+        inner = inner_gain(outer, stiffness, apparent_mass, viscous)
+        return (apparent_mass * ((outer + 2 * inner) * outer + 2) - stiffness) / (2 * outer + inner - drag)
 
     grid = np.linspace(-16, 6, 221)
     middle = grid[int(np.argmin([damping(x) for x in grid]))]
@@ -152,104 +137,34 @@ def least_damping(stiffness: float, apparent_mass: float, viscous: float) -> flo
     return float(min(found.fun, damping(middle)))
 
 
-def damping_range(stiffness: float, apparent_mass: float, viscous: float, gain_sum: float) -> tuple[float, float] | None:
-    """Smallest and largest B (N s/m) that positive gains of sum a2 = ``gain_sum`` (1/s) render with ``stiffness`` (N/m).
-
-    All in between can be had. None where no positive gains of this sum render the stiffness.
-    """
-    pole = gain_sum - viscous / apparent_mass
-    nodes = _inner_gains(stiffness / apparent_mass * pole, gain_sum) if pole > 0 else []
-    if not nodes:
-        return None
-    a1 = [_a1(x, stiffness / apparent_mass * pole, gain_sum) for x in nodes]
-    low, high = ((apparent_mass * a - stiffness) / pole for a in (min(a1), max(a1)))
-    return low, high
-
-
-def _a1(c2: float, a0: float, a2: float) -> float:
-    """a1 of the gains with this c2, a0 and a2: c1 + c3 = a2 - c2 and c1 c3 = 1 + (a0 - a2)/c2."""
-    return c2 * (a2 - c2) + 3 + (a0 - a2) / c2
-
-
-def _inner_gains(a0: float, a2: float) -> list[float]:
-    """Ends and turning points, in order, of ``_a1`` over the interval of c2 where c1 and c3 are real and positive; or nothing.
-
-    They are where (a2 - c2)^2 >= 4 (1 + (a0 - a2)/c2) > 0: one interval, since this cubic has one maximum below a2.
-    """
-    excess = a0 - a2
-
-    def roots(*coefficients: float) -> list[float]:
-        return [float(x.real) for x in np.roots(coefficients) if abs(x.imag) <= 1e-7 * abs(x) and 0 < x.real < a2]
-
-    ends = [x for x in roots(1, -2 * a2, a2 * a2 - 4, -4 * excess) if x > -excess]
-    if excess <= 0:
-        ends.append(max(-excess * (1 + 1e-9), 1e-300))  # where c1 or c3 vanishes, so that the end itself is out
-    if len(ends) < 2:
-        return []
-    return sorted([*ends, *(x for x in roots(2, -a2, 0, excess) if min(ends) < x < max(ends))])
-
-
 def gains_for(
-    stiffness: float, apparent_mass: float, viscous: float, damping: float | None = None, gain_sum: float | None = None
-) -> tuple[float, float, float]:
+    stiffness: float, apparent_mass: float, viscous: float, damping: float | None = None
+) -> tuple[float, float, float]:  # fmt: skip
     """Positive gains c1, c2, c3 (1/s) that render ``stiffness`` (N/m) and, where given, ``damping`` (N s/m).
 
-    Without a damping they are equal; with one their sum is ``gain_sum`` (1/s), or without that as small as c1 = c3 allows.
-    Of several solutions, which are one law, that with the largest c3. Raises ``ValueError`` for arguments that are not positive
-    (``viscous``: negative) and where no positive gains exist, naming what does: stiffnesses for equal gains, else dampings.
+    Without a damping they are equal; with one their sum is as small as c1 = c3 allows. Raises ``ValueError`` for arguments that
+    are not positive (``viscous``: negative) and where no positive gains exist, naming what does: stiffnesses for equal gains,
+    else dampings.
     """
-    given = {"stiffness": stiffness, "apparent_mass": apparent_mass, "damping": damping, "gain_sum": gain_sum}
-    for name, value in given.items():
+    for name, value in (("stiffness", stiffness), ("apparent_mass", apparent_mass), ("damping", damping)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value!r}; allowed: a positive number")
     if not (math.isfinite(viscous) and viscous >= 0):
         raise ValueError(f"viscous = {viscous!r}; allowed: a number >= 0")
     rig = f"m_e = {apparent_mass:g} kg and Fv = {viscous:g} N s/m"
     if damping is None:
-        if gain_sum is not None:
-            raise ValueError(f"gain_sum = {gain_sum:g} without a damping; allowed: None, for equal gains have their own sum")
         if equal_gain_misses(stiffness, apparent_mass, viscous):
             least = least_stiffness(apparent_mass, viscous)
             raise ValueError(f"stiffness = {stiffness:g} N/m has no equal gains with {rig}; allowed: more than {least:g} N/m")
         c = equal_gain(stiffness, apparent_mass, viscous)
         return c, c, c
-    if gain_sum is None:
-        outer = outer_gain(stiffness, damping, apparent_mass, viscous)
-        inner = inner_gain(outer, stiffness, apparent_mass, viscous)
-        if damped_gains_miss(outer, inner, stiffness, damping, apparent_mass, viscous):
-            least = least_damping(stiffness, apparent_mass, viscous)
-            critical = 2 * math.sqrt(stiffness * apparent_mass)
-            raise ValueError(
-                f"damping = {damping:g} N s/m (ratio {damping / critical:.4g}) has no positive gains at {stiffness:g} N/m with "
-                f"{rig}; allowed: at least {least:.6g} N s/m (ratio {least / critical:.4g})"
-            )
-        return outer, inner, outer
-    span = damping_range(stiffness, apparent_mass, viscous, gain_sum)
-    if span is None or not span[0] <= damping <= span[1]:
-        allowed = "none with this sum" if span is None else f"{max(span[0], 0.0):.6g} to {span[1]:.6g} N s/m"
+    outer = outer_gain(stiffness, damping, apparent_mass, viscous)
+    inner = inner_gain(outer, stiffness, apparent_mass, viscous)
+    if damped_gains_miss(outer, inner, stiffness, damping, apparent_mass, viscous):
+        least = least_damping(stiffness, apparent_mass, viscous)
+        critical = 2 * math.sqrt(stiffness * apparent_mass)
         raise ValueError(
-            f"damping = {damping:g} N s/m has no positive gains of sum {gain_sum:g} 1/s at {stiffness:g} N/m with {rig}; "
-            f"allowed: {allowed}"
+            f"damping = {damping:g} N s/m (ratio {damping / critical:.4g}) has no positive gains at {stiffness:g} N/m with "
+            f"{rig}; allowed: at least {least:.6g} N s/m (ratio {least / critical:.4g})"
         )
-    drag = viscous / apparent_mass
-    return _gains_of_sum(
-        stiffness / apparent_mass * (gain_sum - drag), (damping * (gain_sum - drag) + stiffness) / apparent_mass, gain_sum
-    )
-
-
-def _gains_of_sum(a0: float, a1: float, a2: float) -> tuple[float, float, float]:
-    """The gains with the largest c3, for an a1 that ``_a1`` takes between its nodes (rounding aside)."""
-    from scipy.optimize import brentq  # late, as above
-
-    nodes, found = _inner_gains(a0, a2), []
-    for left, right in pairwise(nodes):
-        at_left, at_right = _a1(left, a0, a2) - a1, _a1(right, a0, a2) - a1
-        if at_left * at_right < 0:
-            c2 = float(brentq(lambda x: _a1(x, a0, a2) - a1, left, right, xtol=1e-14, rtol=1e-14))
-        else:
-            c2 = left if abs(at_left) < abs(at_right) else right
-        half, product = (a2 - c2) / 2, 1 + (a0 - a2) / c2
-        c3 = half + math.sqrt(max(half * half - product, 0.0))
-        found.append((abs(_a1(c2, a0, a2) - a1), (product / c3, c2, c3)))
-    nearest = min(miss for miss, _ in found) + 1e-9 * abs(a1)
-    return max((gains for miss, gains in found if miss <= nearest), key=lambda gains: gains[2])
+    return outer, inner, outer

@@ -1,5 +1,7 @@
 """Runs a controller over seeded episodes of an environment and measures it."""
 
+import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -95,15 +97,11 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
     """All episodes of several evaluations as one."""
     whole = Evaluation(name)
     for one in evaluations:
-        whole.seeds += one.seeds
-        whole.lost += one.lost
-        whole.required_strength_ratio += one.required_strength_ratio
-        whole.success += one.success
-        for discount, values in one.returns.items():
-            whole.returns[discount] += values
-        for metric in UNITS:
-            whole.metrics[metric] += one.metrics[metric]
-        whole.traces += one.traces
+        for name in ("seeds", "lost", "required_strength_ratio", "success", "traces"):
+            getattr(whole, name).extend(getattr(one, name))
+        for name in ("returns", "metrics"):
+            for key, values in getattr(one, name).items():
+                getattr(whole, name)[key].extend(values)
     whole.cost = float(np.median([one.cost for one in evaluations]))
     return whole
 
@@ -184,3 +182,27 @@ def table(evaluations: list[Evaluation], statistic: str = "median") -> str:
         success += [f"{sum(evaluation.success)} of {len(evaluation.success)}", "", ""]
         paid += [f"{np.mean(evaluation.returns[1.0] or [np.nan]):.4g}", "", ""]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in (lost, success, paid))])
+
+
+DATA = ("metric", "unit", "controller", "value", "q95", "max")
+"""Columns: the median over the episodes, their 95th percentile and the largest; of lost and successful episodes the number."""
+
+
+def data(evaluations: Sequence[Evaluation]) -> str:
+    """CSV with the columns ``DATA``; metrics of which the environment says nothing are left out, "lost" is infinite."""
+    summaries = [evaluation.summary() for evaluation in evaluations]
+    rows: list[Sequence[str]] = [DATA]
+    for name, unit in UNITS.items():
+        if all(np.isnan(summary[name]["max"]) for summary in summaries):
+            continue
+        for evaluation, summary in zip(evaluations, summaries, strict=True):
+            rows.append([name, unit, evaluation.controller, *(number(summary[name][key]) for key in ("median", "q95", "max"))])
+    for name, kept in (("lost episodes", "lost"), ("successful episodes", "success")):
+        for one in evaluations:
+            values = getattr(one, kept)
+            rows.append([name, f"of {len(values)}", one.controller, str(sum(values)), "", ""])
+    for one in evaluations:
+        rows.append(["return, mean", "", one.controller, f"{np.mean(one.returns[1.0] or [np.nan]):.4g}", "", ""])
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -193,7 +193,6 @@ class PortLimiter(StagedController):
 
     @property
     def asks(self) -> bool:  # type: ignore[override]
-        """As of the law."""
         return self._stages is not None and self._stages.asks
 
     @property
@@ -225,13 +224,11 @@ class PortLimiter(StagedController):
         return [LawStage(limit, about, fresh)]
 
     def prepare(self, lanes: int, sampled: bool) -> None:
-        """Make room for ``lanes`` lanes and one kind of sensors, where that is new; for the law too."""
         if self._stages is not None:
             self._stages.prepare(lanes, sampled)
         super().prepare(lanes, sampled)
 
     def policy_stages(self) -> list[Stage]:
-        """Those of the law."""
         return [] if self._stages is None else self._stages.policy_stages()
 
     def stages(self) -> list[Stage]:
@@ -240,21 +237,17 @@ class PortLimiter(StagedController):
         return [*([] if self._stages is None else self._stages.stages()), own]
 
     def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
-        """Those of the law."""
         return [] if self._stages is None else self._stages.more_rows(lanes)
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        """Raise the error of the law."""
         if self._stages is not None:
             self._stages.explain(measurement, reference)
 
     def require_acceleration(self, measurement: Measurement) -> None:
-        """Raise that of the law."""
         if self._stages is not None:
             self._stages.require_acceleration(measurement)
 
     def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
         self.law.reset(lanes)
         super().reset(lanes)
 

@@ -5,8 +5,6 @@ Jacobian (16) at the reference pose, F* = J^T P + Fext + Fv vd + fraction Fc sig
 part of A that the admittance owes to it, so that dF*/dt needs no rate of that force.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

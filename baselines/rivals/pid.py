@@ -13,8 +13,6 @@ second started from what the first had found:
     birthsim tune --controller pid --trials 45 --seed 1 --sensors ideal --start out/first/gains.json --out out/again
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from baselines.rivals.feedforward import Tracked

@@ -10,8 +10,6 @@ the end effector's distance from the motion, its speed relative to it, and the e
 nodes the changes of the commanded flows. Each is divided by its tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -10,8 +10,6 @@ used Optuna. It was as short as its trials are long; the best was the same for b
     birthsim tune --controller nonlinear-mpc --trials 9 --lanes 4 --seed 0 --sensors ideal --out out/tune
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, ClassVar
 

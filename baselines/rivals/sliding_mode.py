@@ -13,8 +13,6 @@ These commands found the gains (with ideal, then with lab) by the search that bi
     birthsim tune --controller sliding-mode --trials 75 --seed 0 --sensors ideal --out out/tune/sliding-mode-ideal
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from baselines.backstepping.controller import PNEUMATIC_GAIN

@@ -1,7 +1,5 @@
 """What the rivals share: the stages before the law, its signals, and the memory of its integrals."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Work in several processes at once: on this machine by joblib's, on several by Ray's."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """Long work in pieces: each is written as soon as it is complete, and taken from there when the same is asked for again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

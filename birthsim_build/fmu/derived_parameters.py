@@ -1,7 +1,5 @@
 """What the plant computes from a rig's parameters, as C: the Python that does it is run on names instead of numbers."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +21,7 @@ class Expression(np.lib.mixins.NDArrayOperatorsMixin):
     def __init__(self, text: str) -> None:
         self.text = text
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Expression:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> "Expression":
         terms = [_text(term) for term in inputs]
         if ufunc.__name__ in _INFIX:
             return Expression(f"({terms[0]} {_INFIX[ufunc.__name__]} {terms[1]})")
@@ -33,7 +31,7 @@ class Expression(np.lib.mixins.NDArrayOperatorsMixin):
             return Expression(f"sqrt({terms[0]})")
         return NotImplemented  # type: ignore[no-any-return]
 
-    def __array_function__(self, function: Any, types: Any, terms: tuple[Any, ...], options: Any) -> Expression:
+    def __array_function__(self, function: Any, types: Any, terms: tuple[Any, ...], options: Any) -> "Expression":
         if function is np.where:
             return Expression("({} ? {} : {})".format(*map(_text, terms)))
         return NotImplemented  # type: ignore[no-any-return]

@@ -1,10 +1,11 @@
 """``modelDescription.xml`` of FMI 2.0 and 3.0: what a tool reads of a model before it loads it."""
 
 import math
+import re
+from collections import Counter
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from birthsim_build.fmu.units import exponents
 from birthsim_env import __version__
 
 
@@ -37,6 +38,14 @@ class Description:
 
 
 _VARIABILITY = {"independent": "continuous", "parameter": "fixed", "input": "continuous", "output": "continuous"}
+
+
+_BASE = {"kg": {"kg": 1}, "m": {"m": 1}, "s": {"s": 1}, "K": {"K": 1}, "rad": {"rad": 1}}
+_DERIVED = {
+    "N": {"kg": 1, "m": 1, "s": -2}, "Pa": {"kg": 1, "m": -1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3}, "Hz": {"s": -1},
+}  # fmt: skip
+_SYMBOL = re.compile(r"([A-Za-z]+)(\d*)")
 
 
 def model_description(model: Description, version: int) -> bytes:
@@ -80,6 +89,21 @@ def model_description(model: Description, version: int) -> bytes:
     ElementTree.indent(root)
     content: bytes = ElementTree.tostring(root, "utf-8", xml_declaration=True)
     return content
+
+
+def exponents(unit: str) -> dict[str, int]:
+    """``"W/(m2 K)"`` -> ``{"kg": 1, "s": -3, "K": -1}``; ``"-"`` and ``"1"`` have none. ``ValueError`` for unknown symbols."""
+    total: Counter[str] = Counter()
+    above, _, below = unit.partition("/")
+    for part, sign in ((above, 1), (below, -1)):
+        for symbol in part.strip("()").split():
+            found = _SYMBOL.fullmatch(symbol)
+            if found and found[1] in _BASE | _DERIVED:
+                for base, power in (_BASE | _DERIVED)[found[1]].items():
+                    total[base] += sign * power * int(found[2] or 1)
+            elif symbol not in ("1", "-"):
+                raise ValueError(f"unit = {unit!r}; allowed: products and one quotient of {', '.join(_BASE | _DERIVED)}")
+    return {base: power for base, power in total.items() if power}
 
 
 def _units(root: ElementTree.Element, model: Description) -> None:

@@ -4,8 +4,6 @@ pygame is imported when the first ``Renderer`` is made, so that training without
 needs no display.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 import os
@@ -44,7 +42,7 @@ def _load() -> Any:
     return importlib.import_module("pygame")
 
 
-def _pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
+def _pixels(surface: "pygame.Surface") -> NDArray[np.uint8]:
     """A fresh copy (height, width, 3), RGB."""
     width, height = surface.get_size()
     pixels = np.empty((height, width, 3), dtype=np.uint8)

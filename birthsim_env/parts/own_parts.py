@@ -198,14 +198,20 @@ class PlainHand(UserForce):
         return forces
 
 
-def _made(kind: str, part: Any, expected: str) -> Any:
-    """An instance of a class that a user named; anything else is itself."""
-    if not inspect.isclass(part):
-        return part
-    try:
-        return part()
-    except Exception as error:
-        raise ValueError(f"{kind}: {part.__name__}() fails ({problem(error)}); allowed: {expected}") from error
+def _made(kind: str, part: Any, base: type, expected: str) -> Any:
+    """A ``base`` or a function: what a user gave, or named as file.py:Name; of a class an instance."""
+    if isinstance(part, (str, Path)):
+        if ".py:" not in str(part):
+            raise ValueError(f"{kind} = {shown(str(part))}; allowed: {expected}")
+        part = from_file(kind, str(part))
+    if inspect.isclass(part):
+        try:
+            part = part()
+        except Exception as error:
+            raise ValueError(f"{kind}: {part.__name__}() fails ({problem(error)}); allowed: {expected}") from error
+    if not (isinstance(part, base) or callable(part)):
+        raise ValueError(f"{kind} = {shown(part)}; allowed: None, {expected}")
+    return part
 
 
 def trajectory_of(reference: Any, duration: float) -> Trajectory:
@@ -214,18 +220,12 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
-    if isinstance(reference, (str, Path)):
-        if Path(reference).suffix.lower() == ".csv":
-            rows = _numbers("reference", Path(reference), "time, x, y (s, m, m), with or without stiffness (N/m)", (3, 4))
-            return Through(rows[:, 0], rows[:, 1:3])
-        if ".py:" not in str(reference):
-            raise ValueError(f"reference = {shown(str(reference))}; allowed: {expected}")
-        reference = from_file("reference", str(reference))
-    reference = _made("reference", reference, expected)
+    if isinstance(reference, (str, Path)) and Path(reference).suffix.lower() == ".csv":
+        rows = _numbers("reference", Path(reference), "time, x, y (s, m, m), with or without stiffness (N/m)", (3, 4))
+        return Through(rows[:, 0], rows[:, 1:3])
+    reference = _made("reference", reference, Trajectory, expected)
     if isinstance(reference, Trajectory):
         return reference
-    if not callable(reference):
-        raise ValueError(f"reference = {shown(reference)}; allowed: None, {expected}")
     times = np.linspace(0.0, duration, max(7, round(duration / GRID) + 1))
     wanted = "a function of time (s) that returns (x, y) in m"
     return Through(times, np.array([_called("reference", f"function({t:g})", reference, (float(t),), wanted) for t in times]))
@@ -254,18 +254,10 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
     expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
-    if isinstance(user_force, (str, Path)):
-        if str(user_force) in HANDS:
-            return HANDS[str(user_force)][varied]()
-        if Path(user_force).suffix.lower() == ".csv":
-            rows = _numbers("user_force", Path(user_force), "time, Fx, Fy (s, N, N)")
-            return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
-        if ".py:" not in str(user_force):
-            raise ValueError(f"user_force = {shown(str(user_force))}; allowed: {expected}")
-        user_force = from_file("user_force", str(user_force))
-    user_force = _made("user_force", user_force, expected)
-    if isinstance(user_force, UserForce):
-        return user_force
-    if not callable(user_force):
-        raise ValueError(f"user_force = {shown(user_force)}; allowed: None, {expected}")
-    return PlainHand(user_force)
+    if isinstance(user_force, (str, Path)) and str(user_force) in HANDS:
+        return HANDS[str(user_force)][varied]()
+    if isinstance(user_force, (str, Path)) and Path(user_force).suffix.lower() == ".csv":
+        rows = _numbers("user_force", Path(user_force), "time, Fx, Fy (s, N, N)")
+        return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
+    user_force = _made("user_force", user_force, UserForce, expected)
+    return user_force if isinstance(user_force, UserForce) else PlainHand(user_force)

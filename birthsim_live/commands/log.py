@@ -1,7 +1,5 @@
 """birthsim export: a recording or an evaluation as Parquet or MCAP, with units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The server's run, of the page and of a replay."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -31,7 +29,7 @@ def need_server() -> None:
         raise ValueError(f"{error}; the page needs the extra: pip install 'birthsim[live]'") from error
 
 
-def serve(packed: Packed, rig: Parameters, listening: socket.socket, settings: Settings, title: str) -> None:
+def serve(packed: Packed, rig: Parameters, listening: socket.socket, settings: "Settings", title: str) -> None:
     """Serve the page of what is ``packed`` on a socket of ``listen`` until a signal asks it to end; after ``need_server``."""
     import uvicorn
 

@@ -4,8 +4,6 @@ The reference is ``second_model``: the same rig in other coordinates, integrated
 error of a run is the largest difference at any of its 10 ms marks.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

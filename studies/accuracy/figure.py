@@ -1,7 +1,5 @@
 """Figure of the integrator's error: against the step, a panel per motion, and against the cost of a millisecond."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

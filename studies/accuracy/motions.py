@@ -1,7 +1,5 @@
 """Motions in which integrators are compared: opening commands and pushes of a hand, each held for 10 ms, 0.5 s in all."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -6,8 +6,6 @@ forces act between points, chambers obey conservation of mass and energy, and no
 a rig. End stops are left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

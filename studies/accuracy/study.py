@@ -1,7 +1,5 @@
 """The error of the plant's integrator, over a rig and rigs drawn around it, against a model with adaptive steps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Markdown tables of what ``accuracy`` has measured."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@
 and its packages, and runs its tests. Then the environment is removed, unless ``--keep`` is given: the disk holds one at a time.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

@@ -1,7 +1,5 @@
 """How the stiffness of every controller feels: pushes at the stiffness test's poses, kept as they are and drawn."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of the bench: error in every environment, and what it costs in air."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from textwrap import fill

@@ -4,8 +4,6 @@ A cell is one controller in one environment, with one sensor model and one plant
 episode to episode in every cell; the plant is the rig as its owner describes it, or drawn anew for every episode.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Figures of many episodes beside those of another controller: ratios episode by episode, and intervals of the median."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

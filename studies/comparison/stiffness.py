@@ -4,8 +4,6 @@ Every study is one controller on many lanes at once (``baselines.bench.probes``)
 lost.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from itertools import product

@@ -1,7 +1,5 @@
 """Figures of the studies: what the stiffness that a hand feels depends on, controller by controller."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every controller in the same worlds: what is compared where, and the figures that are kept of it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

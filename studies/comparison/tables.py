@@ -1,7 +1,5 @@
 """The bench as Markdown, an overview with one row per controller, and as CSV, with every figure."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

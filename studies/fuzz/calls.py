@@ -1,7 +1,5 @@
 """Kinds of calls: environments, parts, controllers, parameters and settings, made with odd arguments."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from pathlib import Path

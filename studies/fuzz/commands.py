@@ -1,7 +1,5 @@
 """The kind of command lines: options of every command with odd words, up to where work would begin."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import io

@@ -1,7 +1,5 @@
 """Kinds of files: each is written by the project, altered or damaged, and read again."""
 
-from __future__ import annotations
-
 import json
 import struct
 import tomllib

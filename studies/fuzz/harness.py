@@ -8,8 +8,6 @@ A case is what a kind draws from its own random generator, so that a case is its
   ``MEMORY`` more than the process had, one that does what reading must not do, and the death of the process.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import json
 import os
@@ -58,7 +56,7 @@ class Kind:
     """
 
     prepare: Callable[[Path], Any]
-    attempt: Callable[[Any, np.random.Generator, Path, Case], None]
+    attempt: Callable[[Any, np.random.Generator, Path, "Case"], None]
     runs_code: bool = False
 
 

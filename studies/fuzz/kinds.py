@@ -1,7 +1,5 @@
 """All kinds by name."""
 
-from __future__ import annotations
-
 from studies.fuzz.calls import CALLS
 from studies.fuzz.commands import COMMANDS
 from studies.fuzz.files import FILES

@@ -1,7 +1,5 @@
 """Odd values, and damage to text, bytes and JSON."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -4,8 +4,6 @@ Bores are 16 to 63 mm, strokes 50 to 600 mm, masses 0.5 to 20 kg, rods, friction
 else. Exits with 1 where a command ends in anything but success or one line.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

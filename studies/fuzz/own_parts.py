@@ -1,7 +1,5 @@
 """Kinds of a user's own parts: CSV files of references and forces, and Python files with a controller."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

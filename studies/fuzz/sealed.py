@@ -1,7 +1,5 @@
 """Kinds of sealed files, policies and checkpoints: with other arrays or values under a right checksum, and damaged."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Backdrivability: the force beyond ``K x`` that a hand needs to move the end effector slowly to and fro."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

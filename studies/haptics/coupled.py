@@ -4,8 +4,6 @@ Z-width is the range of impedances that can be rendered stably (Colgate and Brow
 damping in units of the law's own, each against every hand of ``HANDS``. A cell is stable where it is with every rig drawn.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any

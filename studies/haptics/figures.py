@@ -1,7 +1,5 @@
 """Figures of what a hand feels: the impedance as Bode plot, energy at the port, a pull let go, maps of hands, Z-width."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

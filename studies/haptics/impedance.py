@@ -3,8 +3,6 @@
 Impedances are complex, N/m, (F, N) over frequencies (F,), Hz, and lanes.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.impedance import Complex

@@ -1,7 +1,5 @@
 """What a result keeps of a run: figures of every lane, and curves over frequency and time as a few quantiles of the lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a hand feels of several laws and sensors, in pieces that several processes and interrupted runs put together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

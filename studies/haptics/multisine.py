@@ -5,8 +5,6 @@ transform gives force and motion at each line without leakage. Only odd multiple
 geometry, then fall between the lines (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 2 and 4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.impedance import Complex

@@ -1,7 +1,5 @@
 """Own error: the end effector minus what the declared impedance would do under the same force."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import expm
 

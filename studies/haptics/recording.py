@@ -1,7 +1,5 @@
 """A port followed over time: motion, force and energy at every period."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +19,7 @@ class Recording:
     force: Array
     energy: Array
 
-    def part(self, begin: float, end: float) -> Recording:
+    def part(self, begin: float, end: float) -> "Recording":
         """What lies between two times, s, the last one excluded."""
         # Half a period of tolerance: times are products with a period that is no binary number.
         slack = 0.5 * float(self.time[1] - self.time[0])

@@ -1,7 +1,5 @@
 """A pull that is let go: how far the end effector flies past its target, how fast, and with how much energy."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

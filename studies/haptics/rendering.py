@@ -1,7 +1,5 @@
 """One piece of the bench: multisine hands at several poses and amplitudes, and all that they tell of the impedance felt."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

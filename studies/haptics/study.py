@@ -1,7 +1,5 @@
 """What a hand feels at the end effector: impedance, own error, energy, stability, friction and the release of a pull."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a hand feels, in Markdown: a table for each subject, a row for each law under each kind of sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

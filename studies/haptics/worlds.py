@@ -1,7 +1,5 @@
 """The rigs, targets and laws that the measurements share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What the errors of honest sensors leave to the best controller on randomised rigs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

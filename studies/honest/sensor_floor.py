@@ -5,8 +5,6 @@ rig tells position to a millimetre, or a hand's force from friction. Noise, dela
 switched off, and so is the bias of the force, which a law may tare.
 """
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

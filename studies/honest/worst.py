@@ -1,7 +1,5 @@
 """The worst of many drawn worlds, and which of its figures makes it so."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Kills commands at random moments and says what that leaves: ``python -m studies.kills --target evaluate --kills 10``."""
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import tempfile

@@ -1,7 +1,5 @@
 """What a folder holds after a command: whole files, leftovers, and whether results are equal to others."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

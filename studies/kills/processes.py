@@ -1,7 +1,5 @@
 """Commands in sessions of their own: begun, watched, ended by signals, and who of a session still lives."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

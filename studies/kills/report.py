@@ -1,7 +1,5 @@
 """Outcomes as JSON, as lines on the screen and as a table."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """What is killed: commands with arguments that take seconds, and which files may differ from run to run."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path

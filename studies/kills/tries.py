@@ -1,7 +1,5 @@
 """One try: a command is killed at random moments, meets a full disk or another process, and is then run again to its end."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess

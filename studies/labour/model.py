@@ -21,8 +21,6 @@ The model neglects the head's mass (quasi-static: 3 kg at these accelerations ta
 moulding and the different paths of head and shoulders.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the shipped policies take off their controllers' errors, on worlds that no training used."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence
@@ -11,8 +9,7 @@ from typing import Any, NamedTuple
 from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import as_table, policy_folders, seed_figures
-from baselines.bench.evaluation import merged
-from baselines.bench.evaluation_data import DATA, data
+from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import load_parameters

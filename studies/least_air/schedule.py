@@ -14,8 +14,6 @@ quarters of that at low pressure.
 ``least_air`` chooses the stiffness phase by phase by dynamic programming. Noise that moves the valves is not in the model.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from itertools import pairwise

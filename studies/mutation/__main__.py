@@ -7,8 +7,6 @@ tests of its module until one fails, and ends. The tests that are quick enough u
 An error that compiled code would not raise, such as the root of a negative number, counts as a failure.
 """
 
-from __future__ import annotations
-
 import gc
 import importlib
 import json

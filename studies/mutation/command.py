@@ -1,7 +1,5 @@
 """``birthsim study mutation``: in a process that compiles nothing."""
 
-from __future__ import annotations
-
 from studies.alone import only_under
 from studies.mutation.uncompiled import SETTINGS
 

@@ -1,7 +1,5 @@
 """The modules whose tests the mutation tester examines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -4,8 +4,6 @@
 address, are then looked up in a table.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 import os

@@ -1,7 +1,5 @@
 """Randomised rigs, identified from logs of their own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recovery: rigs drawn at random, an experiment on each, and what comes back of their parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

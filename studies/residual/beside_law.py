@@ -1,7 +1,5 @@
 """Residual policies of several seeds beside the controller that they sit on, in the same worlds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

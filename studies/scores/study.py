@@ -1,7 +1,5 @@
 """What every environment pays to shut valves, to every controller and to the shipped policies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The scores as Markdown, an overview with one row per environment and condition, and as CSV, with every controller."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

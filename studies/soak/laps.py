@@ -1,7 +1,5 @@
 """A lap of the soak: one world, drawn from its number, run for ``STEPS`` policy steps over ``LANES`` lanes."""
 
-from __future__ import annotations
-
 import gc
 import resource
 import time

@@ -4,8 +4,6 @@ Every process runs ``stopwatch.py`` under one checkout with ``OMP_NUM_THREADS=1`
 on the machine disturb least; those of two threads against one are wall times.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -5,8 +5,6 @@ checkout of the project that PYTHONPATH names, so it imports nothing of it but t
 evaluates laws.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

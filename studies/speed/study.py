@@ -1,7 +1,5 @@
 """How fast things are here, each figure beside what it is to be compared with, in one run."""
 
-from __future__ import annotations
-
 import os
 import re
 import tempfile

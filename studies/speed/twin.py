@@ -1,7 +1,5 @@
 """The plant's twin: its right-hand side and integrator written by hand in C (``twin.c``), compiled where it is wanted."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Figures of the stability maps: filled cells for what remains of a push, and the border of what is stable."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -5,8 +5,6 @@ is the rig. From rest it is pushed with 40 N, more than stiction, for 0.3 s. Fiv
 remains is judged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,8 +5,6 @@ that it takes half a step ahead: else a spring would gain energy. A mass of the 
 its own weight.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
 from typing import Protocol

@@ -6,8 +6,6 @@ Per law and rig: the last of a row of setpoints from 1 to 64 kN/m, each 1.2 time
 leaves the nominal rig within 20 mm, over m/(tau + latency/4).
 """
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

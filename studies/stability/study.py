@@ -1,7 +1,5 @@
 """Where a controller is stable, over rigs that are not as believed and over hands that hold it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

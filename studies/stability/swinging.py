@@ -1,7 +1,5 @@
 """Up to which setpoint a controller rests after a push, on one rig."""
 
-from __future__ import annotations
-
 from typing import cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Heat maps of a sweep: cells for values on a grid, points for drawn ones."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Names of what a sweep varies, what each may be, and which of them belong together."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import fields
 from typing import Any

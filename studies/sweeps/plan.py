@@ -5,8 +5,6 @@ combination gets ``count`` points drawn at random, ``[search]`` ranges in which 
 ``[[map]]`` is a heat map. ``docs/sweeps.md`` has the table of names.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Collection

@@ -1,7 +1,5 @@
 """A sweep's results: one row per episode as Parquet, and a table with one row per point."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

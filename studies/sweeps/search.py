@@ -1,7 +1,5 @@
 """Optuna's search in batches: the same proposals whatever the number of processes and kills."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """birthsim study sweep: grids, random draws and searches over controllers, rigs, sensors, scenarios, policies and trainings."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The pieces of a sweep: a point's evaluation, and where it trains a policy, the training before it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping, Sequence

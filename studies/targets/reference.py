@@ -1,7 +1,5 @@
 """The loops in Python: what every target is compared with."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Runs built loops: WebAssembly in Node, the shared library in this process, objects for other processors under qemu."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import subprocess

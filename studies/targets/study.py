@@ -1,7 +1,5 @@
 """Every target is built, its bits are compared with Python's, and its size and speed are taken."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import time

@@ -3,8 +3,6 @@
 birthsim study verification balances
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Balances of mass and energy of the chambers, kept beside the plant by bookkeeping of flows, work and heat."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

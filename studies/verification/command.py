@@ -1,7 +1,5 @@
 """``birthsim study verification``: measurements and page of the verification report."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal

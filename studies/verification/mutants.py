@@ -3,8 +3,6 @@
 birthsim study mutation --out out/mutation.json && birthsim study verification mutation out/mutation.json
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

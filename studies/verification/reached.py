@@ -5,8 +5,6 @@
 Machine code hides its lines from ``coverage``. The tests are those that the mutation tester found quick enough uncompiled.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The page docs/verification.md from stored measurements and tables."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a stored measurement was measured on: hashes of sources by what they do, and whether they are still the same."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import json

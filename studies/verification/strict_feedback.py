@@ -4,8 +4,6 @@ State X, (8, N), in the order of (12): y2, v2, F2, K2, y1, v1, F1, K1; F is the 
 pneumatic stiffness (9). Input U, (4, N): qA2, qT2, qA1, qT1, the active and pressurisation mass flows of (8), kg/s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -9,7 +9,6 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from baselines import BacksteppingController
-from baselines.backstepping.gains import closed_loop_damping, closed_loop_stiffness
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics import mechanics
 from birthsim_env.physics.compiled.lanes import Array
@@ -17,6 +16,7 @@ from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import closed_loop
 from tests.oracles import derived_law as derived
 from tests.oracles import linkage_by_points as by_points
+from tests.oracles.gain_range import closed_loop_damping, closed_loop_stiffness
 
 
 def random_situations(

@@ -4,21 +4,14 @@ import numpy as np
 import pytest
 
 from baselines import BacksteppingController
-from baselines.backstepping.gains import (
-    closed_loop_damping,
-    closed_loop_stiffness,
-    damping_range,
-    equal_gain,
-    gains_for,
-    least_damping,
-    least_stiffness,
-)
+from baselines.backstepping.gains import equal_gain, gains_for, least_damping, least_stiffness
 from baselines.bench.probes import POSES
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.backstepping.test_gains import rigs
 from tests.oracles import closed_loop
 from tests.oracles.closed_loop import FRICTIONLESS
+from tests.oracles.gain_range import closed_loop_damping, closed_loop_stiffness, damping_range
 
 
 def random_gains(count: int, seed: int) -> list[tuple[Array, float, float]]:
@@ -31,24 +24,13 @@ def random_gains(count: int, seed: int) -> list[tuple[Array, float, float]]:
     return found
 
 
-def test_gains_render_stiffness_and_damping_anywhere_in_the_range() -> None:
-    """Every triple lies in the range of its stiffness and sum; positive gains render the range, ends included."""
-    checked = 0
+def test_every_gains_lie_in_the_range_of_their_sum() -> None:
     for gains, mass, viscous in random_gains(200, 6):
         stiffness, damping = closed_loop_stiffness(*gains, mass, viscous), closed_loop_damping(*gains, mass, viscous)
         span = damping_range(stiffness, mass, viscous, gains.sum())
         assert span is not None
         slack = 1e-7 * max(map(abs, span))
         assert span[0] - slack <= damping <= span[1] + slack
-        for wanted in (*span, damping, np.mean(span)):
-            if wanted > 0:
-                c = gains_for(stiffness, mass, viscous, float(wanted), gains.sum())
-                assert min(c) > 0
-                assert sum(c) == pytest.approx(gains.sum(), rel=1e-9)
-                assert closed_loop_stiffness(*c, mass, viscous) == pytest.approx(stiffness, rel=1e-7)
-                assert closed_loop_damping(*c, mass, viscous) == pytest.approx(wanted, rel=1e-7)
-                checked += 1
-    assert checked > 500
 
 
 @pytest.mark.parametrize(
@@ -66,20 +48,9 @@ def test_the_range_has_no_hole_and_nothing_lies_beyond(stiffness: float, mass: f
     assert dampings[0] == pytest.approx(low, rel=0.005)
     assert dampings[-1] == pytest.approx(high, rel=0.005)
     assert np.diff(dampings).max() < 0.02 * (high - low)
-    for beyond, allowed in ((low * 0.999, rf"allowed: {low:.6g} to {high:.6g} N s/m"), (high * 1.001, "allowed: ")):
-        with pytest.raises(ValueError, match=rf"damping = .* no positive gains of sum {gain_sum} 1/s .*{allowed}"):
-            gains_for(stiffness, mass, viscous, beyond, gain_sum)
 
 
-@pytest.mark.parametrize(("gain_sum", "why"), [(100.0, "too small"), (11.0, "below Fv/m_e")])
-def test_an_empty_range_is_named(gain_sum: float, why: str) -> None:
-    """The sum of equal gains is 128 1/s for 2000 N/m, 3 kg and 35 N s/m."""
-    assert damping_range(2000, 3, 35, gain_sum) is None, why
-    with pytest.raises(ValueError, match="allowed: none with this sum"):
-        gains_for(2000, 3, 35, 120, gain_sum)
-
-
-def test_without_a_sum_it_is_as_small_as_possible() -> None:
+def test_the_sum_of_the_gains_is_as_small_as_possible() -> None:
     """c1 = c3 >= c2; no sum smaller by 0.2 % (of setpoints above 300 N/m) has positive gains for this stiffness and damping."""
     rng = np.random.default_rng(8)
     for _ in range(60):

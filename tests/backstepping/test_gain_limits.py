@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.backstepping import gains
+from tests.oracles.gain_range import closed_loop_damping, closed_loop_stiffness
 
 MASS = 3.0
 
@@ -15,7 +16,7 @@ def test_the_least_damping_is_the_least_of_a_fine_search(stiffness: float, visco
     outer = max(np.sqrt(k), k * drag / (2 * (k - 1))) * (1 + np.exp(np.linspace(-14, 6, 40001)))
     inner = gains.inner_gain(outer, stiffness, MASS, viscous)
     assert np.all(inner > 0)
-    searched = min(gains.closed_loop_damping(c1, c2, c1, MASS, viscous) for c1, c2 in zip(outer[::4], inner[::4], strict=True))
+    searched = min(closed_loop_damping(c1, c2, c1, MASS, viscous) for c1, c2 in zip(outer[::4], inner[::4], strict=True))
     assert gains.least_damping(stiffness, MASS, viscous) == pytest.approx(searched, rel=1e-6)
 
 
@@ -25,8 +26,8 @@ def test_soft_setpoints_get_their_damping_too(stiffness: float, viscous: float) 
     damping = 1.5 * gains.least_damping(stiffness, MASS, viscous)
     outer = gains.outer_gain(stiffness, damping, MASS, viscous)
     inner = gains.inner_gain(outer, stiffness, MASS, viscous)
-    assert gains.closed_loop_stiffness(outer, inner, outer, MASS, viscous) == pytest.approx(stiffness, rel=1e-9)
-    assert gains.closed_loop_damping(outer, inner, outer, MASS, viscous) == pytest.approx(damping, rel=1e-9)
+    assert closed_loop_stiffness(outer, inner, outer, MASS, viscous) == pytest.approx(stiffness, rel=1e-9)
+    assert closed_loop_damping(outer, inner, outer, MASS, viscous) == pytest.approx(damping, rel=1e-9)
 
 
 def test_gains_miss_where_they_render_another_damping_by_more_than_a_millionth() -> None:

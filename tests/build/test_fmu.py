@@ -16,7 +16,7 @@ from baselines.registry import make_controller
 from birthsim_build.commands import fmu
 from birthsim_build.fmu import archive
 from birthsim_build.fmu.derived_parameters import derived_parameters, parameter_names
-from birthsim_build.fmu.units import exponents
+from birthsim_build.fmu.description import exponents
 from birthsim_env import Parameters
 from birthsim_env.loop.rows import FORCE, STATE
 from birthsim_env.loop.signals import REFERENCE_NAMES

@@ -10,7 +10,7 @@ import pytest
 
 from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
-from baselines.registry import LIMITED, SLOW, known_options, listed_names, make_controller
+from baselines.registry import CONTROLLERS, LIMITED, LISTED, SLOW, controller_names, known_options, make_controller
 from baselines.staged import COMMAND_OPTIONS
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -21,7 +21,8 @@ from tests.oracles import derived_law as derived
 RIG = Parameters()
 FELT = RIG.replace({"electronics.acceleration_bandwidth": 300.0})
 POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
-NAMES = [*listed_names(), *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
+CHOICES = [*LISTED, *(name for name in controller_names() if name not in CONTROLLERS)]
+NAMES = [*CHOICES, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
     pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW))
     for name in NAMES for sensors in SENSORS
@@ -151,7 +152,7 @@ def test_a_spring_that_pushes_is_refused_by_its_lane(name):
 
 @pytest.mark.parametrize(
     ("name", "option"),
-    [(name, option) for name in (*listed_names(), "limited:pid") for option in known_options(name) or ()],
+    [(name, option) for name in (*CHOICES, "limited:pid") for option in known_options(name) or ()],
 )
 def test_every_option_refuses_what_it_cannot_be(name, option):
     for value in (-1.0, math.nan, math.inf):

@@ -12,8 +12,7 @@ from birthsim_env import Circle, Hold, Parameters, StiffnessSchedule
 from birthsim_env.parts import courses
 from birthsim_env.parts.drawn.randomization import draw_columns, draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, stream, vectorised
-from birthsim_env.parts.drawn.streams import Streams
-from birthsim_env.parts.drawn.worlds import TOGETHER, begin, worlds
+from birthsim_env.parts.drawn.streams import TOGETHER, Streams, begin, worlds
 from birthsim_env.parts.hands.contractions import Contractions
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, Ramp

@@ -10,7 +10,7 @@ from pathlib import Path
 import gymnasium
 import pytest
 
-from baselines.bench import evaluation_data
+from baselines.bench import evaluation
 from baselines.bench.metrics import UNITS
 from birthsim.door import COMMANDS
 from birthsim_env import Parameters
@@ -161,7 +161,7 @@ def test_data_files_are_those_that_pages_link_and_have_the_columns_that_commands
     }
     assert set(columns) <= linked
     compared = {f"{name}.csv": comparison_tables.DATA for name in ("comparison", "bound")}
-    others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation_data.DATA)}
+    others = {"scores.csv": score_tables.DATA, "learned.csv": ("policy", *evaluation.DATA)}
     assert columns == compared | others
 
 

@@ -1,7 +1,5 @@
 """``birthsim study beside-law``: several seeds of a policy beside their controller, in the same worlds."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Figures in prose come from results: every name that docs and README quote leads to one figure."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

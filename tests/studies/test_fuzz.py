@@ -1,7 +1,5 @@
 """Everything that is read or called with odd input: a valid object or a clear error, within limits, without other deeds."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

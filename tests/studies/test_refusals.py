@@ -1,7 +1,5 @@
 """What a study cannot do it says with status 2, before it writes anything."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.console import call

@@ -1,7 +1,5 @@
 """A result says which sources changed since it was measured, and every table is that of its result."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The engine of studies: pieces that are kept, times that are measured anew, options of the kinds of their defaults."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

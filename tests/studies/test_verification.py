@@ -1,7 +1,5 @@
 """The verification report: its tables name what exists, its measurements are whole, its page is the one that they make."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

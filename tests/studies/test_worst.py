@@ -1,7 +1,5 @@
 """``studies.honest.worst``: the worst drawn worlds, and what one of them owes to each of its figures."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -11,7 +11,7 @@ from scipy import stats
 
 from agents.commands import evaluate as command
 from agents.policy.files import load_policy, save_policy
-from agents.policy.seeds import best_policy, policy_folders, pooled, seed_table, shipped_names
+from agents.policy.seeds import as_table, best_policy, policy_folders, pooled, seed_figures, shipped_names
 from agents.reports import inspection
 from agents.reports.inspection import friction_along_circle, weight_over_workspace
 from agents.reports.learning_curves import learning_curves, over_seeds
@@ -63,7 +63,7 @@ def test_the_crossed_interval_knows_that_seeds_are_a_sample_too():
 def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
     law = evaluation("law", [2.0, 2.0, 2.0, 50.0], beyond=(3,))
     residuals = [evaluation("a", [1.0, 1.0, 1.0, 50.0], beyond=(3,)), evaluation("b", [1.0, 1.0, 7.0, 50.0], (2,), (3,))]
-    text = seed_table(law, residuals)
+    text = as_table(seed_figures(law, residuals))
     assert "3 of 4 episodes are within the rig's strength; 2 training seeds" in text
     assert f"| pooled RMS of each seed | | 1, {np.sqrt((1 + 1 + 100**2) / 3):.3g} | |" in text
     assert "| lost | | episodes; 100 mm in a pooled RMS | 0 | 0, 1 | |" in text
@@ -75,7 +75,7 @@ def test_the_table_leaves_out_what_is_beyond_the_rig_and_counts_what_is_lost():
 
 def test_where_most_episodes_are_lost_the_table_says_so():
     law = evaluation("law", [1.0, 2.0, 3.0, 4.0])
-    text = seed_table(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2)
+    text = as_table(seed_figures(law, [evaluation("seed", [1.0, 2.0, 3.0, 4.0], lost=(0, 1, 2))] * 2))
     assert "less, interquartile mean | | most episodes are lost |" in text
     assert "inf" not in text
 

@@ -1,7 +1,5 @@
 """Optuna's journal after a kill: a line without an end, a lock without an owner, trials that nobody has begun."""
 
-from __future__ import annotations
-
 import optuna
 import pytest
 

@@ -1,7 +1,5 @@
 """Work in several processes: one thread each, an end at once, and no worker that outlives its parent."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

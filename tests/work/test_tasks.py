@@ -1,7 +1,5 @@
 """Long work in pieces: what is kept, what is computed anew, and that an interrupted run ends as if nothing had happened."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

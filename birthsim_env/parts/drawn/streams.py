@@ -5,14 +5,14 @@ A lane's stream is PCG64 (O'Neill 2014: 128-bit congruential steps, "XSL RR" out
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.parts.drawn.seeding import STREAMS, stream
+from birthsim_env.parts.drawn.seeding import STREAMS, served, stream
 from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
@@ -207,3 +207,27 @@ class Streams:
                 halves = [half for name in ("state", "inc") for half in divmod(numbers[name], 2**64)]
                 state[:, lane] = np.array([*halves, 0], dtype=np.uint64)
         return state
+
+
+TOGETHER = 1024
+"""Lanes that begin together; what they draw on the way stays in a processor's cache."""
+
+
+def worlds(
+    lanes: NDArray[np.intp], seeds: Sequence[int], episodes: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.intp], dict[str, Streams]]]:
+    """Blocks of ``lanes`` (L,) with the streams of each, by name; seeds and episodes are those of all lanes, (N,)."""
+    for first in range(0, len(lanes), TOGETHER):
+        block = lanes[first : first + TOGETHER]
+        chosen = [seeds[lane] for lane in block.tolist()]
+        try:
+            numbers: NDArray[Any] = np.array(chosen, dtype=np.uint64)
+        except OverflowError:
+            numbers = np.array(chosen, dtype=object)
+        yield block, {name: Streams(numbers, episodes[block], name) for name in STREAMS}
+
+
+def begin(part: Any, lanes: NDArray[np.intp], streams: Streams) -> None:
+    """Start new episodes of a part: in all lanes (L,) at once if it can, else lane by lane with NumPy's generators."""
+    for lane, rng in served(part.begin, lanes, streams):
+        part.begin(lane, rng)

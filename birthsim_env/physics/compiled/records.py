@@ -10,8 +10,6 @@ A stage of a closed loop says in its annotations of which layouts it is handed b
 constant shape. ``Numbers`` are the same for all lanes, and ``number`` is one of them.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator
 from typing import Any, ClassVar, Generic, Self, TypeVar, overload
@@ -33,7 +31,7 @@ class Group(Generic[V]):
     """
 
     def __init__(
-        self, count: int, units: tuple[str, ...], about: str, names: tuple[str, ...] = (), layout: type[Rows] | None = None,
+        self, count: int, units: tuple[str, ...], about: str, names: tuple[str, ...] = (), layout: "type[Rows] | None" = None,
         single: bool = False,
     ) -> None:  # fmt: skip
         self.count, self.units, self.about, self.names, self.layout, self.single = count, units, about, names, layout, single
@@ -46,12 +44,12 @@ class Group(Generic[V]):
         return slice(self.first, None if open_ended else self.first + self.count)
 
     @overload
-    def __get__(self, record: None, layout: type[Rows]) -> Self: ...
+    def __get__(self, record: None, layout: "type[Rows]") -> Self: ...
 
     @overload
-    def __get__(self, record: Rows, layout: type[Rows]) -> V: ...
+    def __get__(self, record: "Rows", layout: "type[Rows]") -> V: ...
 
-    def __get__(self, record: Rows | None, layout: type[Rows]) -> Any:
+    def __get__(self, record: "Rows | None", layout: "type[Rows]") -> Any:
         if record is None:
             return self
         own = record.rows[self.first if self.single else self.place]

@@ -1,11 +1,9 @@
 """The rig as data: a frozen, validated dataclass of sections, what they must fulfil together, and its TOML file."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import tomli_w
 
@@ -95,7 +93,7 @@ class Parameters:
                 f"{damping / FASTEST_RATE:.3g} kg, or less friction, so that steps of 0.25 ms follow the motion"
             )
 
-    def replace(self, changes: dict[str, Any]) -> Parameters:
+    def replace(self, changes: dict[str, Any]) -> Self:
         """A copy with changes given by dotted names, for example ``{"mechanics.mass": 4.0}``.
 
         Three figures depend on bores and strokes, and follow where ``changes`` do not name them. The dead volume grows with the
@@ -122,7 +120,7 @@ class Parameters:
         return {**sections, **({RANDOMIZE: {name: [low, high] for name, low, high in self.ranges}} if self.ranges else {})}
 
     @classmethod
-    def from_dict(cls, sections: dict[str, dict[str, Any]]) -> Parameters:
+    def from_dict(cls, sections: dict[str, dict[str, Any]]) -> Self:
         """Inverse of ``to_dict``; what is not named keeps its default."""
         changes = {}
         for section, values in sections.items():
@@ -139,7 +137,7 @@ class Parameters:
         Path(path).write_text(tomli_w.dumps(self._sections(options=True)), encoding="utf-8")
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Parameters:
+    def from_toml(cls, path: str | Path) -> Self:
         """Read a TOML file; raises ``ValueError`` naming the file and what is wrong in it."""
         tables = read_toml("parameters", path)
         try:
