@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from birthsim_env.loop.gradients.plant import motion_traced, plant_adjoint
+from birthsim_env.loop.gradients.plant import ROWS, motion_traced, plant_adjoint
 from birthsim_env.loop.gradients.taped import TapedLoop
-from birthsim_env.loop.gradients.traced import Adjoint, Traced, trace
+from birthsim_env.loop.gradients.traced import Traced, trace
 from birthsim_env.loop.rows import ACTION, MOTION, STATE, WORLD
 from birthsim_env.loop.stage import Stage
 from birthsim_env.physics.compiled.lanes import STATES, Array
@@ -26,11 +26,11 @@ from birthsim_env.physics.gradients.plant import require_plain
 from birthsim_env.reward import Terms
 from birthsim_env.simulation import Simulation
 
-OF_TIME = ("target", "setpoints", "hand", "jumps")
-"""Parts of a period that are functions of time alone, for a hand that feels nothing."""
+OF_TIME = ("target", "setpoints", "jumps")
+"""Parts of a period that are functions of time alone, or conditions; so is a hand that feels nothing."""
 
 REWARDED, OBSERVED = 0, 3
-"""Tables of what closes a policy step (``outcome.Outcome``) whose gradients are known."""
+"""Tables of what closes a policy step (``outcome.Outcome``) that get gradients from outside."""
 
 Pullback = Callable[..., tuple[Array, Array]]
 
@@ -44,10 +44,6 @@ class Recorder:
 
     def __init__(self, simulation: Simulation) -> None:
         require_plain(simulation.plant)
-        if simulation.user_force.closed_loop:
-            raise ValueError(
-                f"user_force = {type(simulation.user_force).__name__}, which feels the rig; allowed: a hand that does not"
-            )
         self._simulation, self._made = simulation, object()
         simulation.recorder = self
 
@@ -66,27 +62,20 @@ class Recorder:
         ``reward`` (N,), ``observation`` (N, D), ``state`` (18, N) and ``motion`` (4, N), x, y, vx, vy. It returns those carried
         to the step before, and those to the action (size, N).
         """
-        (tape, periods), rig, loop = self._last, self._simulation.plant.lane_parameters.copy(), self._loop
-        size, lanes = len(self._simulation.action), self._simulation.plant.num_envs
-        first = self._extras
+        (tape, periods), rig, loop, at = self._last, self._simulation.plant.lane_parameters.copy(), self._loop, self._at
+        lanes = self._simulation.plant.num_envs
 
         def back(
             carried: Array | None = None, reward: Array | None = None, observation: Any = None, state: Array | None = None,
             motion: Array | None = None,
         ) -> tuple[Array, Array]:  # fmt: skip
-            bars = np.zeros((first + self._outputs, lanes))
-            if carried is not None:
-                bars[self.carried] = carried
-            for where, given in ((STATE, state), (MOTION, motion)):
-                if given is not None:
-                    bars[where : where + len(given)] += given
-            if reward is not None:
-                bars[first] = reward
-            if observation is not None:
-                bars[first + 1 : first + 1 + observation.shape[1]] = observation.T
+            bars, seen = np.zeros((len(at["live"]), lanes)), None if observation is None else observation.T
+            given = {"carried": carried, "reward": reward, "observation": seen, "state": state, "motion": motion}
+            for name, gradient in given.items():
+                if gradient is not None:
+                    bars[at[name]] += gradient
             loop.back(periods, tape, rig, bars, self._simulation.threads)
-            action = WORLD + ACTION
-            return bars[self.carried], bars[action : action + size]
+            return bars[at["carried"]], bars[at["action"]]
 
         return back
 
@@ -100,41 +89,50 @@ class Recorder:
         if own:
             raise ValueError(f"{own[0]}, a user's own part, cannot be differentiated; allowed: those of the package")
         named = [(name, one) for name, group in parts.items() for one in group if isinstance(one, Stage)]
-        stages = [one for _, one in named]
-        self._loop = TapedLoop(simulation.plant.num_envs, *places, stages, simulation.closing)
-        memories, self._extras = self._loop.memories, self._loop.rows
-        pieces: list[tuple[int, Traced | None]] = []
-        for k, (name, stage) in enumerate(named):
+        stages, closing = [one for _, one in named], list(simulation.closing)
+        self._loop = loop = TapedLoop(simulation.plant.num_envs, *places, stages, closing)
+        free = OF_TIME if simulation.user_force.closed_loop else (*OF_TIME, "hand")
+        pieces: list[tuple[int, Stage | Traced]] = []
+        for k, (name, stage) in enumerate([*named, *(("closing", one) for one in closing)]):
             if name == "plant":
-                pieces += [(k, None), (k, motion_traced())]
-            elif name not in OF_TIME:
-                pieces.append((k, trace(stage, memories[k])))
-        self._outputs = 0
-        for k, stage in enumerate(simulation.closing, len(stages)):
-            closing = trace(stage, memories[k], self._extras, _wanted)
-            self._outputs += len(closing.extras)
-            pieces.append((k, closing))
-        self._loop.differentiate(self._adjoints(pieces, stages))
+                pieces += [(k, stage), (k, motion_traced())]
+            elif name not in free:
+                pieces.append((k, trace(stage, loop.memories[k], loop.place)))
+        action = WORLD + ACTION
+        rows = {
+            "state": range(STATE, STATE + STATES), "motion": range(MOTION, MOTION + 4),
+            "action": range(action, action + len(simulation.action)),
+        }  # fmt: skip
+        for one in closing:
+            rows["reward"] = [loop.place(one.tables[REWARDED]) + Terms.total.first]
+            observed = loop.place(one.tables[OBSERVED], True)
+            rows["observation"] = range(observed, observed + one.tables[OBSERVED].shape[1])
+        self._adjoin(pieces, rows)
         self._made = simulation.made
 
-    def _adjoints(self, pieces: Sequence[tuple[int, Traced | None]], stages: Sequence[Stage]) -> list[tuple[int, Adjoint]]:
-        """Adjoints for the rows that depend on state or action, or on what these have led to."""
-        state = set(range(STATE, STATE + STATES))
-        actions = set(range(WORLD + ACTION, WORLD + ACTION + len(self._simulation.action)))
-        active, before = state | actions, -1
-        while len(active) > before:
-            before = len(active)
-            for _, traced in pieces:
-                if traced is not None:
-                    active |= traced.depends(active)
-        self.carried = np.array(sorted(row for row in active - actions if row < self._extras))
+    def _adjoin(self, pieces: Sequence[tuple[int, Stage | Traced]], rows: dict[str, Sequence[int]]) -> None:
+        """Adjoints for the rows that depend on state or action and on which depends what gets gradients from outside."""
+        traced = [one for _, one in pieces if isinstance(one, Traced)]
+        active = _grown({*rows["state"], *rows["action"]}, [one.depends for one in traced])
+        given = {*ROWS, *(row for group in rows.values() for row in group)}
+        live = sorted(active & _grown(set(given), [one.feeds for one in reversed(traced)]) | given)
+        read = set(ROWS).union(*(one.feeds(set(live)) for one in traced))
+        rows["carried"], rows["live"] = [row for row in live if row in read and row not in rows["action"]], live
+        self.carried, self._at = np.array(rows["carried"]), {name: np.searchsorted(live, own) for name, own in rows.items()}
         found = []
-        for k, traced in pieces:
-            one = plant_adjoint(stages[k]) if traced is None else traced.adjoint(active)
-            one.after = traced is not None and traced.name == "motion"
-            found.append((k, one))
-        return found
+        for k, piece in pieces:
+            one = piece.adjoint(set(live)) if isinstance(piece, Traced) else plant_adjoint(piece)
+            if one is not None:
+                one.after = isinstance(piece, Traced) and piece.name == "motion"
+                found.append((k, one))
+        self._loop.differentiate(found, live)
 
 
-def _wanted(table: int, row: int) -> bool:
-    return table == OBSERVED or (table == REWARDED and row == Terms.total.first)
+def _grown(rows: set[int], ways: Sequence[Callable[[set[int]], set[int]]]) -> set[int]:
+    """Rows with all that ``ways`` lead to from them."""
+    before = -1
+    while len(rows) > before:
+        before = len(rows)
+        for way in ways:
+            rows |= way(rows)
+    return rows

@@ -6,7 +6,7 @@ all periods of a policy step are one call; the loop stops only for what a user h
 """
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.physics.strength import require_carried
+
+if TYPE_CHECKING:
+    from birthsim_env.gradients import Pullback
 
 Part = Stage | Callable[[int], None]
 
@@ -217,6 +220,14 @@ class Simulation:
         self.actuation.accept(actions)
         self.impacts[:] = 0.0
         self.run(self.periods)
+
+    def vjp(self, actions: Array) -> "Pullback":
+        """``step``, with its bits; returns its pullback, see ``gradients.Recorder.taken``. Later steps are taped too."""
+        from birthsim_env.gradients import Recorder  # late: it generates code
+
+        recorder = self.recorder if isinstance(self.recorder, Recorder) else Recorder(self)
+        self.step(actions)
+        return recorder.taken()
 
     def watch(self, commanded: list[Stage], moved: list[Stage]) -> bool:
         """Add stages to every control period, in place of those that close a policy step: ``commanded`` run when the actuation

@@ -99,8 +99,9 @@ def _fill(tank: Tank, work: Work, asked: Reference, about: Limits, i: int) -> No
     """Carries tanks and authority of lane ``i`` on by one period, in which the hand did ``work``."""
     last, (x, y) = tank.stiffness, (tank.energy.offset[0, i], tank.energy.offset[1, i])
     kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
-    stored = _spring_energy(kx, ky, kxy, x, y)
-    before = stored if math.isnan(last[0, i]) else _spring_energy(last[0, i], last[1, i], last[2, i], x, y)
+    if math.isnan(last[0, i]):
+        last[0, i], last[1, i], last[2, i] = kx, ky, kxy
+    stored, before = _spring_energy(kx, ky, kxy, x, y), _spring_energy(last[0, i], last[1, i], last[2, i], x, y)
     last[0, i], last[1, i], last[2, i] = kx, ky, kxy
     least = math.inf
     for count in range(2):

@@ -1,7 +1,8 @@
 """The plant alone: N rigs side by side, without Gymnasium."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,9 @@ from birthsim_env.physics.compiled.lanes import PRESSURES, STATES, TEMPERATURES,
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import checked_count, is_within, shown
+
+if TYPE_CHECKING:
+    from birthsim_env.physics.gradients.plant import Derivatives
 
 MOST_LANES = 2**20
 """Lanes side by side; a million take some gigabytes."""
@@ -100,11 +104,14 @@ class Plant:
         (2, num_envs), constant, or (K, 2, num_envs), each of K samples held for an equal fraction of the duration.
         Raises ``ValueError`` for wrong shapes, values that are not finite or not allowed, and a duration that is not positive.
         """
-        if not is_within(duration, above=0.0, most=LONGEST):
-            raise ValueError(f"duration = {shown(duration)}; allowed: a positive number, at most {LONGEST:g} (s)")
-        command, forces = self._openings(opening_command), self._force_samples(user_force)
-        self.advance_unchecked(command, forces, float(duration))
+        self.advance_unchecked(*self._inputs(opening_command, user_force, duration))
         return self.state
+
+    def vjp(self, opening_command: ArrayLike, user_force: ArrayLike, duration: float) -> "Callable[..., Derivatives]":
+        """``advance``, with its arguments and bits; returns its pullback, see ``physics.gradients.plant.vjp``."""
+        from birthsim_env.physics.gradients.plant import vjp  # late: it generates code
+
+        return vjp(self, *self._inputs(opening_command, user_force, duration))
 
     def advance_unchecked(self, command: Array, forces: Array, duration: float) -> None:
         """``advance`` for arrays known to be right: command (4, num_envs), forces (K, 2, num_envs), contiguous float64."""
@@ -153,6 +160,11 @@ class Plant:
         motion = np.empty((4, self.num_envs))
         options.port_motion(self.state, self.memory[4:], self.lane_parameters, motion)
         return motion
+
+    def _inputs(self, opening_command: ArrayLike, user_force: ArrayLike, duration: float) -> tuple[Array, Array, float]:
+        if not is_within(duration, above=0.0, most=LONGEST):
+            raise ValueError(f"duration = {shown(duration)}; allowed: a positive number, at most {LONGEST:g} (s)")
+        return self._openings(opening_command), self._force_samples(user_force), float(duration)
 
     def _openings(self, opening_command: ArrayLike) -> Array:
         command = checked("opening_command", opening_command, (4, self.num_envs), "1")

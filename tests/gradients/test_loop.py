@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import gymnasium
@@ -9,85 +10,88 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
+from baselines.registry import LIMITED, LISTED, SLOW, make_controller
+from baselines.staged import driving
 from birthsim_env.gradients import Recorder
-from birthsim_env.parts.hands.moving_hands import Guided
 from birthsim_env.parts.hands.user_forces import UserForce
+from birthsim_env.parts.sensors.sensors import SENSORS
+from birthsim_env.physics.rig.parameters import Parameters
+from studies.gradients.loops import SMOOTH, begun, compared
 
-STEPS, LANES = 4, 40
+COMPILED = [name for name in LISTED if name not in SLOW] + [f"{LIMITED}{name}" for name in ("pid", "admittance-adaptive")]
 
-LOOPS: dict[str, tuple[str, dict[str, Any]]] = {
-    "valves": ("BirthSIM/Circle-v1", {}),
-    "one valve, flows": ("BirthSIM/Forceps-v1", {"action_mode": "flow", "valves": "one_valve"}),
-    "no law": ("BirthSIM/VacuumResidual-v0", {"law": "none"}),
-    "paper's law": ("BirthSIM/ProbeResidual-v2", {"law": "backstepping"}),
-    "residual of 5": ("BirthSIM/DystociaResidual-v1", {"law": "backstepping-force-first", "impedance": "variable"}),
-    "admittance": ("BirthSIM/DescentResidual-v1", {"law": "admittance-backstepping"}),
+SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
+    "valves": {"world": "BirthSIM/Circle-v1"},
+    "one valve, flows": {"world": "BirthSIM/Forceps-v1", "action_mode": "flow", "valves": "one_valve"},
+    "no law": {"world": "BirthSIM/VacuumResidual-v0", "law": "none"},
+    "paper's law": {"world": "BirthSIM/ProbeResidual-v2", "law": "backstepping", "sensors": "honest"},
+    "residual of 5": {"world": "BirthSIM/DystociaResidual-v1", "law": "backstepping-force-first", "impedance": "variable"},
+    "admittance": {"world": "BirthSIM/DescentResidual-v1", "law": "admittance-backstepping"},
+    "a hand that feels": {"world": "BirthSIM/Probe-v2", "user_force": "guided"},
+    "an accelerometer": {
+        "world": "BirthSIM/Circle-v1", "controller": "admittance", "sensors": "honest",
+        "parameters": SMOOTH.replace({"electronics.acceleration_bandwidth": 300.0}),
+    },
+}  # fmt: skip
+LAW_LOOPS = {
+    f"{name}, {sensors}": {"world": "BirthSIM/Circle-v1", "controller": name, "sensors": sensors}
+    for name, sensors in zip(COMPILED, itertools.cycle(SENSORS), strict=False)
 }
-
-
-def lanes_of(name: str, state: Any = None) -> Any:
-    world, arguments = LOOPS[name]
-    env: Any = gymnasium.make_vec(world, num_envs=LANES, randomize=True, **arguments).unwrapped
-    env.reset(seed=5)
-    if state is not None:
-        env.set_state(state)
-    return env
-
-
-def size_of(env: Any) -> int:
-    return int(env.single_action_space.shape[0])
-
-
-FAST = ("valves",)
+LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
+FAST = ("valves", "a hand that feels")
 
 
 @pytest.mark.parametrize("name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LOOPS])
-def test_gradients_of_what_is_paid_are_differences(name: str) -> None:
-    """Of rewards over four policy steps to their actions, drawn rigs: median 1e-7, nine in ten 1e-6, whatever the law; the rest
-    stands on kinks, of rewards |e| and |change of action|, and of friction."""
-    rng, plain = np.random.default_rng(0), lanes_of(name)
-    for _ in range(20):
-        plain.step(0.1 * rng.standard_normal((LANES, size_of(plain))))
-    start = plain.get_state()
-    taped = lanes_of(name, start)
-    recorder = Recorder(taped.simulation)
-    actions = 0.1 * rng.standard_normal((STEPS, LANES, size_of(plain)))
-    way, weights = rng.standard_normal(actions.shape), rng.standard_normal((STEPS, LANES))
-    backs = []
-    for action in actions:
-        (seen, paid, *_), (its, its_pay, *_) = plain.step(action), taped.step(action)
-        assert np.array_equal(seen, its)
-        assert np.array_equal(paid, its_pay)
-        backs.append(recorder.taken())
-    assert np.array_equal(plain.simulation.plant.state, taped.simulation.plant.state)
-    carried, parts = None, np.zeros((STEPS, LANES))
-    for k in reversed(range(STEPS)):
-        carried, by_action = backs[k](carried=carried, reward=weights[k])
-        parts[k] = (by_action.T * way[k]).sum(axis=1)
+def test_gradients_are_differences(name: str) -> None:
+    """Over four policy steps, rewards, motion and state to actions and state, randomised rigs, whatever law and sensors: median
+    1e-7; the rest stands on kinks, of rewards |e| and |change of action|, of friction and of laws, which the smallest
+    difference steps over in 19 of 20 lanes."""
+    off, equal = compared(begun(lanes=40, **LOOPS[name]))
+    assert equal
+    assert off.shape[1] >= 38
+    least = off.min(axis=0)
+    assert np.quantile(least, 0.5) < 1e-7
+    assert np.mean(least < 1e-6) >= 0.94
 
-    def earned(size: float) -> Any:
-        plain.set_state(start)
-        return sum(weights[k] * plain.step(actions[k] + size * way[k])[1] for k in range(STEPS))
 
-    difference = (earned(1e-6) - earned(-1e-6)) / 2e-6
-    off = np.abs(difference - parts.sum(axis=0)) / np.abs(parts).sum(axis=0)
-    assert np.quantile(off, 0.5) < 1e-7
-    assert np.quantile(off, 0.9) < 1e-6
+def lanes_of(lanes: int, **arguments: Any) -> Any:
+    env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=lanes, randomize=True, **arguments).unwrapped
+    env.reset(seed=5)
+    return env
+
+
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_gradients_are_numbers_where_episodes_begin(sensors: str) -> None:
+    """Memories begin with what is no number."""
+    simulation = lanes_of(3, sensors=sensors, actuation=driving(make_controller("limited:pid", Parameters()), None)).simulation
+    carried, _ = simulation.vjp(np.zeros((0, 3)))(motion=np.ones((4, 3)))
+    assert np.isfinite(carried).all()
+    assert np.abs(carried).max() > 0.0
+
+
+@pytest.mark.slow
+def test_converters_of_many_bits_have_the_gradients_of_none() -> None:
+    """What is rounded passes straight through."""
+    found = []
+    for bits in (0.0, 40.0):
+        rig = Parameters().replace({"electronics.adc_bits": bits, "electronics.dac_bits": bits})
+        env = begun("BirthSIM/Circle-v1", 8, "pid", sensors="honest", parameters=rig)
+        found.append(env.simulation.vjp(np.zeros((0, 8)))(motion=np.ones((4, 8)))[0])
+    none, fine = found
+    np.testing.assert_allclose(fine, none, rtol=1e-4, atol=1e-6 * np.abs(none).max(axis=1, keepdims=True))
 
 
 def test_observations_state_and_motion_have_gradients() -> None:
     """Openings drive pistons: what an observed error, the true place and a piston say of it is the same."""
-    env = lanes_of("valves")
-    recorder = Recorder(env.simulation)
-    env.step(np.zeros((LANES, 4)))
-    back = recorder.taken()
-    seen, motion = np.zeros(env.observation_space.shape), np.zeros((4, LANES))
+    env = lanes_of(40)
+    back = env.simulation.vjp(np.zeros((4, 40)))
+    seen, motion = np.zeros(env.observation_space.shape), np.zeros((4, 40))
     seen[:, 0], motion[0] = 0.01, 1.0
     _, by_observed = back(observation=seen)
     _, by_motion = back(motion=motion)
     assert np.abs(by_motion).max() > 0
     np.testing.assert_allclose(by_observed, by_motion, rtol=1e-9, atol=1e-12 * np.abs(by_motion).max())
-    state = np.zeros((18, LANES))
+    state = np.zeros((18, 40))
     state[2] = 1.0
     _, by_piston = back(state=state)
     assert np.abs(by_piston).max() > 0
@@ -96,8 +100,7 @@ def test_observations_state_and_motion_have_gradients() -> None:
 def test_threads_change_no_bit() -> None:
     found = []
     for threads in (1, 2):
-        env: Any = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=100, randomize=True, num_threads=threads).unwrapped
-        env.reset(seed=1)
+        env = lanes_of(100, num_threads=threads)
         recorder = Recorder(env.simulation)
         env.step(np.full((100, 4), 0.03))
         found.append(recorder.taken()(reward=np.ones(100)))
@@ -112,12 +115,10 @@ def test_what_has_no_gradients_is_refused_by_name() -> None:
             return np.zeros((*time.shape[:1], 2, time.shape[1]))
 
     for arguments, words in (
-        ({"sensors": "lab"}, "_lab_stage.*allowed"),
-        ({"user_force": Guided()}, "Guided.*allowed"),
         ({"user_force": Own()}, "user's own part.*allowed"),
         ({"parameters": None, "randomize": {"valves.deadband": (0.01, 0.02)}}, r"valves\.deadband.*allowed"),
     ):
-        env: Any = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, **arguments).unwrapped
+        env = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, **arguments)
         env.reset(seed=0)
         with pytest.raises(ValueError, match=words):
-            Recorder(env.simulation).prepare()
+            Recorder(env.unwrapped.simulation).prepare()  # type: ignore[attr-defined]

@@ -6,16 +6,17 @@ Forward it runs the stages themselves, so that every bit is that of ``loop.Loop`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from birthsim_env.loop.gradients.traced import Adjoint
 from birthsim_env.loop.loop import Loop, Place, load_rows, run_stage, store_rows
-from birthsim_env.loop.stage import Stage
+from birthsim_env.loop.stage import Stage, carray, pointer
 from birthsim_env.loop.stage import call as call_stage
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, kernel
+from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 
 Whole = NDArray[np.int64]
@@ -23,12 +24,20 @@ Whole = NDArray[np.int64]
 ADJOINT, CONSTANTS, READS, FIRST, COUNT, CLOSES = range(6)
 """Columns of ``_backward``'s entries."""
 
+TABLE, ROW = range(2)
+"""Columns of what is read: the address of a table's row, or 0 and a row of the space."""
 
-@kernel
-def _keep(space: Array, reads: Whole, first: int, count: int, tape: Array, n: int) -> None:
+
+@helper
+def _keep(space: Array, reads: Whole, first: int, count: int, tape: Array, lanes: int, start: int, n: int) -> None:
     for k in range(count):
-        for i in range(n):
-            tape[k, i] = space[reads[first + k], i]
+        table = carray(pointer(reads[first + k, TABLE], np.float64), (lanes,))
+        if reads[first + k, TABLE]:
+            for i in range(n):
+                tape[k, i] = table[start + i]
+        else:
+            for i in range(n):
+                tape[k, i] = space[reads[first + k, ROW], i]
 
 
 @kernel
@@ -37,7 +46,7 @@ def _forward(
     tape: Array,
 ) -> int:  # fmt: skip
     """``moves`` and ``stages`` as in ``loop._run``. ``kept`` (K, 4): a stage, 1 for after it, and where its rows stand
-    in ``reads`` and how many they are. ``tape`` (blocks, rows, BLOCK)."""
+    in ``reads`` (R, 2) and how many they are. ``tape`` (blocks, rows, BLOCK)."""
     space, missed = np.empty((rows, BLOCK)), 0
     base = np.int64(space.ctypes.data)
     for start in range(first, last, BLOCK):
@@ -49,7 +58,7 @@ def _forward(
                     for after in range(2):
                         for e in range(kept.shape[0]):
                             if kept[e, 0] == s and kept[e, 1] == after:
-                                _keep(space, reads, kept[e, 2], kept[e, 3], tape[start // BLOCK, place:], n)
+                                _keep(space, reads, kept[e, 2], kept[e, 3], tape[start // BLOCK, place:], lanes, start, n)
                                 place += kept[e, 3]
                         if after == 0:
                             missed += run_stage(stages, s, base, start, n)
@@ -94,7 +103,7 @@ def _backward(
 
 class TapedLoop(Loop):
     """A ``Loop`` with adjoints, by the index of their stage among ``stages`` and then ``closing``, in the order in which they
-    happen. ``extras`` rows follow those of the space in what ``back`` is given."""
+    happen. Rows of tables count on from those of the space."""
 
     def __init__(
         self, lanes: int, world: Sequence[Place], seen: Sequence[Place], stages: Sequence[Stage], closing: Sequence[Stage]
@@ -102,29 +111,37 @@ class TapedLoop(Loop):
         super().__init__(lanes, world, seen, stages, closing)
         self._open = len(stages)
         self._tape: Array = np.zeros((0, 0, 0))
+        self._addresses = [0] * self._rows
+        self._placed: dict[int, int] = {}
 
     @property
     def memories(self) -> list[int]:
         """Rows of the space at which the memory of each stage begins."""
         return [int(row) for row in self._stages[:, 3]]
 
-    @property
-    def rows(self) -> int:
-        """Rows of the space."""
-        return self._rows
+    def place(self, table: NDArray[Any], lanes_first: bool = False) -> int:
+        """The number of the first row of a stage's table. What is not float64 with lanes last can only be written."""
+        if table.shape[0 if lanes_first else -1] != self._lanes:
+            raise ValueError(f"a table {table.shape} of {self._lanes} lanes")
+        place = table.ctypes.data
+        if place not in self._placed:
+            self._placed[place] = len(self._addresses)
+            stride = 8 * self._lanes if table.dtype == np.float64 and not lanes_first else 0
+            self._addresses += [place + stride * row if stride else 0 for row in range(table.size // self._lanes)]
+        return self._placed[place]
 
-    def differentiate(self, adjoints: Sequence[tuple[int, Adjoint]]) -> None:
-        """Go back by these from now on."""
-        reads, touched, kept, entries = list[int](), list[int](), [], []
-        self._constants = [one.constants for _, one in adjoints]
+    def differentiate(self, adjoints: Sequence[tuple[int, Adjoint]], live: Sequence[int]) -> None:
+        """Go back by these from now on, with bars for ``live`` rows."""
+        reads, touched, kept, entries = list[tuple[int, int]](), list[int](), [], []
+        self._constants, at = [one.constants for _, one in adjoints], {row: k for k, row in enumerate(live)}
         for s, one in adjoints:
             kept.append((s, int(one.after), len(reads), len(one.reads)))
             address = 0 if one.constants is None else one.constants.ctypes.data
             entries.append((one.address, address, len(one.reads), len(touched), len(one.rows), int(s >= self._open)))
-            reads += one.reads
-            touched += one.rows
+            reads += [(self._addresses[row], row) for row in one.reads]
+            touched += [at[row] for row in one.rows]
         self._keeps, self._entries = np.array(kept, dtype=np.int64), np.array(entries, dtype=np.int64)
-        self._reads, self._touched = np.array(reads, dtype=np.int64), np.array(touched, dtype=np.int64)
+        self._reads, self._touched = np.array(reads, dtype=np.int64).reshape(-1, 2), np.array(touched, dtype=np.int64)
         self._most = max(len(one.rows) for _, one in adjoints)
 
     def new_tape(self, periods: int) -> Array:
@@ -143,7 +160,7 @@ class TapedLoop(Loop):
         return int(_forward(*how, periods, first, last, self._tape))
 
     def back(self, periods: int, tape: Array, rig: Array, bars: Array, threads: int = 1) -> None:
-        """Take ``bars``, gradients to the rows of the space at the end (rows, N), to its beginning."""
+        """Take ``bars``, gradients to the live rows at the end (rows, N), to the beginning."""
 
         def work(periods: int, first: int, last: int) -> int:
             _backward(self._entries, self._touched, periods, first, last, rig, tape, bars, self._most)

@@ -1,14 +1,15 @@
 """The adjoint of a stage, generated from its source.
 
 A stage is traced for one lane. What it reads and writes of the world, of what is seen and of its memory are rows of the space
-that ``loop.Loop`` lays out; tables are read as they are and get no gradient, and what is written to a table is an output with a
-gradient of its own. Constants are numbers while tracing, so that options cost nothing.
+that ``loop.Loop`` lays out, and rows of its tables count on from there. Constants are numbers while tracing, so that options
+cost nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,36 +63,34 @@ class Adjoint:
 
 @dataclass
 class Traced:
-    """A stage as a graph: values read (``inputs``) and written (``outputs``) by row of the space.
-
-    ``extras`` are those written to tables, by their rows.
-    """
+    """A stage as a graph: values read (``inputs``) and written (``outputs``) by row of the space and of tables."""
 
     name: str
     graph: Graph
     inputs: dict[int, Value]
     outputs: dict[int, Scalar]
-    extras: dict[int, Scalar] = field(default_factory=dict)
 
     def depends(self, active: set[int]) -> set[int]:
         """Rows whose values depend on those of ``active`` rows after this stage."""
-        sources = [value for row, value in self.inputs.items() if row in active]
-        live = self.graph.depends(sources)
-        outputs = {**self.outputs, **self.extras}
-        return {row for row, value in outputs.items() if isinstance(value, Value) and live[value.at]}
+        live = self.graph.depends([value for row, value in self.inputs.items() if row in active])
+        return {row for row, value in self.outputs.items() if isinstance(value, Value) and live[value.at]}
 
-    def adjoint(self, active: set[int]) -> Adjoint:
-        """Its adjoint for rows that are ``active`` before or after it."""
-        outputs = {**self.outputs, **self.extras}
-        rows = sorted(active & (outputs.keys() | self.inputs.keys()))
-        graph = self.graph
+    def feeds(self, live: set[int]) -> set[int]:
+        """Rows on which what this stage writes to ``live`` rows depends."""
+        needed = self.graph.within((value for row, value in self.outputs.items() if row in live), smooth=True)
+        return {row for row, value in self.inputs.items() if value.at in needed}
+
+    def adjoint(self, live: set[int]) -> Adjoint | None:
+        """Its adjoint for the bars of ``live`` rows; None for a stage that changes none of these."""
+        rows, graph = sorted(live & (self.outputs.keys() | self.feeds(live))), self.graph
+        if not rows:
+            return None
         bars = {row: graph.input("b", k) for k, row in enumerate(rows)}
-        now = {row: outputs.get(row, self.inputs.get(row)) for row in rows}
-        sources = {row: self.inputs[row] for row in rows if row in self.inputs}
-        weighed = [(value, bars[row]) for row, value in now.items()]
-        found = dict(zip(sources, reverse(graph, weighed, list(sources.values())), strict=True))
+        weighed = [(self.outputs.get(row, self.inputs.get(row)), bars[row]) for row in rows]
+        sources = [row for row in rows if row in self.inputs]
+        found = dict(zip(sources, reverse(graph, weighed, [self.inputs[row] for row in sources]), strict=True))
         results = [("o", k, found.get(row, 0.0)) for k, row in enumerate(rows)]
-        used = _used(graph, (value for _, _, value in results))
+        used = graph.within(found.values())
         reads = [row for row, value in self.inputs.items() if value.at in used]
         # What is read gets its place on the tape.
         for k, row in enumerate(reads):
@@ -99,17 +98,6 @@ class Traced:
         text = source.loop(graph, "back", ("a", "b", "o"), results)
         text = HEAD + text + KERNEL.format(reads=max(1, len(reads)), rows=len(rows))
         return Adjoint(address_of(source.module_of(text).adjoint), reads, rows)
-
-
-def _used(graph: Graph, values: Iterable[Scalar]) -> set[int]:
-    """Nodes that values are made of."""
-    used, waiting = set[int](), [value.at for value in values if isinstance(value, Value)]
-    while waiting:
-        k = waiting.pop()
-        if k not in used:
-            used.add(k)
-            waiting += [a.at for a in graph.nodes[k][1:] if isinstance(a, Value)]
-    return used
 
 
 class _Place:
@@ -120,18 +108,19 @@ class _Place:
 
 
 class _Tables:
-    """The tables of a stage, of one lane: rows that are written are outputs, and nothing is read before."""
+    """The tables of a stage, of one lane; ``place`` says at which row each stands."""
 
-    def __init__(self, tables: tuple[Any, ...]) -> None:
-        self._tables = tables
-        self.made: dict[int, Any] = {}
+    def __init__(self, graph: Graph, tables: tuple[Any, ...], place: Callable[[Any, bool], int]) -> None:
+        self._graph, self._tables, self._place = graph, tables, place
+        self.made: dict[str, tuple[int, Any]] = {}
 
     def get(self, k: int, lanes_first: bool) -> Any:
-        if k not in self.made:
-            shape = self._tables[k].shape
+        name, shape = f"t{k}", self._tables[k].shape
+        if name not in self.made:
             shape = (1, *shape[1:]) if lanes_first else (*shape[:-1], 1)
-            self.made[k] = np.full(shape, None, dtype=object).view(Symbols)
-        return self.made[k]
+            block = tracing.inputs(self._graph, name, math.prod(shape)).reshape(shape)
+            self.made[name] = self._place(self._tables[k], lanes_first), block
+        return self.made[name][1]
 
 
 def _block(place: _Place, rows: int) -> Any:
@@ -153,20 +142,19 @@ for _kind in (stages.table1, stages.table2, stages.table3, stages.table4):
     tracing.INSTEAD[_kind] = _table
 
 
-def trace(stage: Stage, memory: int, extra: int = 0, wanted: Callable[[int, int], bool] = lambda table, row: False) -> Traced:
-    """A stage whose memory begins at row ``memory`` of the space, as a graph.
+def trace(stage: Stage, memory: int, place: Callable[[Any, bool], int]) -> Traced:
+    """A stage whose memory begins at row ``memory`` of the space, and each of its tables where ``place`` says, as a graph.
 
-    Rows of tables for which ``wanted(table, row)`` holds are outputs, numbered from ``extra`` on. Raises ``ValueError`` that
-    names a stage that cannot be traced.
+    ``place(table, lanes_first)`` raises ``ValueError`` for a table whose lanes are not its first or last axis. Raises
+    ``ValueError`` that names a stage that cannot be traced.
     """
     graph = Graph()
-    sizes = {"w": WORLD, "s": SEEN, "m": 0 if stage.memory is None else stage.memory.shape[0]}
-    blocks = {name: tracing.inputs(graph, name, rows) if rows else tracing.empty(1) for name, rows in sizes.items()}
-    firsts = {"w": 0, "s": WORLD, "m": memory}
-    inputs = {firsts[name] + row: blocks[name][row, 0] for name, rows in sizes.items() for row in range(rows)}
-    tables = _Tables(stage.tables)
+    sizes = {"w": (0, WORLD), "s": (WORLD, SEEN), "m": (memory, 0 if stage.memory is None else stage.memory.shape[0])}
+    blocks = {name: (first, tracing.inputs(graph, name, rows)) for name, (first, rows) in sizes.items()}
+    tables = _Tables(graph, stage.tables, place)
     layouts: list[Any] = layouts_of(stage.function)
-    handed = (*blocks.values(), stage.constants, tables, 0, 1)
+    constants = np.array([*stage.constants], dtype=object).view(Symbols)
+    handed = (*(block for _, block in blocks.values()), constants, tables, 0, 1)
     arguments = [
         value if k in (5, 6) or value is tables else layouts[k](value) if layouts[k] else _Place(value)
         for k, value in enumerate(handed)
@@ -175,14 +163,11 @@ def trace(stage: Stage, memory: int, extra: int = 0, wanted: Callable[[int, int]
     try:
         tracing.rewritten(getattr(stage.function, "py_func", stage.function))(*arguments)
     except (UntraceableError, TypeError, AttributeError, IndexError, ValueError, KeyError) as error:
-        raise ValueError(
-            f"stage {name} cannot be differentiated ({error}); allowed: ideal sensors and compiled laws"
-        ) from error
-    now = {firsts[of] + row: blocks[of][row, 0] for of, rows in sizes.items() for row in range(rows)}
-    outputs = {row: value for row, value in now.items() if value is not inputs[row]}
-    extras: dict[int, Scalar] = {}
-    for k, made in sorted(tables.made.items()):
-        for row, value in enumerate(made.reshape(-1)):
-            if wanted(k, row) and value is not None:
-                extras[extra + len(extras)] = value
-    return Traced(name, graph, inputs, outputs, extras)
+        raise ValueError(f"stage {name} cannot be differentiated ({error}); allowed: stages of the package") from error
+    inputs, outputs = dict[int, Value](), dict[int, Scalar]()
+    for of, (first, block) in {**blocks, **tables.made}.items():
+        for row, value in enumerate(block.reshape(-1)):
+            inputs[first + row] = graph.input(of, row)
+            if value is not inputs[first + row]:
+                outputs[first + row] = value
+    return Traced(name, graph, inputs, outputs)

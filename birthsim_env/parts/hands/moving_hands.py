@@ -124,8 +124,8 @@ CALM = 1.0
 POINTS = 12
 """Places that it goes to, one after the other and again."""
 
-STEP = 0.001
-"""s, steps in which the hand's own motion is integrated."""
+STEP, MOST_STEPS = 0.001, 10
+"""s, steps in which the hand's own motion is integrated; how many they are in the longest control period."""
 
 
 class Arm(Rows):
@@ -164,7 +164,7 @@ def _guide(time: Array, motion: Point, arm: Arm, points: Array, hand: Hand, grip
                 hand.position[axis, i], hand.velocity[axis, i], hand.origin[axis, i] = place, speed, place
             hand.time[i] = time[i]
         passed = time[i] - hand.time[i]
-        steps = math.ceil(passed / STEP - 1e-6)
+        steps = min(math.ceil(passed / STEP - 1e-6), MOST_STEPS)
         for step in range(steps):
             h = passed / steps
             now = hand.time[i] + h * (step + 1)

@@ -59,7 +59,7 @@ class Kept(NamedTuple):
 @helper
 def _converted(value: float, step: float, least: float, most: float) -> float:
     """``value`` as a converter with a ``step`` tells it; a step of 0 is no converter."""
-    return max(least, min(most, step * math.floor(value / step + 0.5))) if step > 0.0 else value
+    return max(least, min(most, exact.rounded(value, step))) if step > 0.0 else value
 
 
 @helper

@@ -28,6 +28,12 @@ _LOG = tuple(2 / (2 * k + 3) for k in range(12))
 
 
 @helper
+def rounded(value: float, step: float) -> float:
+    """The multiple of ``step`` that is nearest to ``value``, the larger of two."""
+    return step * math.floor(value / step + 0.5)
+
+
+@helper
 def _series(square: float, coefficients: tuple[float, ...]) -> float:
     """Polynomial in ``square`` by Horner's rule, lowest coefficient first."""
     value = coefficients[-1]

@@ -2,6 +2,7 @@
 
 At kinks derivatives are one-sided: of a tie in ``max(a, b)`` or ``min(a, b)`` they are those of ``a``, of ``abs(0)`` that of
 its negative side; the square root of 0 has slope 0. So a spool at zero opens both of its orifices, either of which it can.
+What a converter rounds passes as it is (straight through).
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ RULES: dict[str, Callable[..., list[Term]]] = {
     "min": lambda graph, y, a, b, g: _larger(graph, a <= b, a, b, g),
     "where": _chosen,
     "copysign": lambda graph, y, a, b, g: [(a, graph.select(a == y, g, -g))],
+    "rounded": lambda graph, y, a, step, g: [(a, g)],
     "exp": lambda graph, y, a, g: [(a, g * y)],
     "exp2": lambda graph, y, a, g: [(a, g * y * math.log(2.0))],
     "log": lambda graph, y, a, g: [(a, g / a)],

@@ -6,13 +6,19 @@ alone are no nodes: Python computes them, with the bits that a kernel has.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
+
+import numpy as np
 
 CONDITIONS = frozenset({"<", ">", "<=", ">=", "==", "!=", "and", "or", "not", "isfinite"})
 """Operations whose result is a truth value. It has no derivative."""
 
-STEPS = frozenset({"int", "floor", *CONDITIONS})
+STEPS = frozenset({"int", "uint", "bits", "floor", "%", "^", ">>", *CONDITIONS})
 """Operations that are constant but for jumps."""
+
+MASKS: list[Value] = []
+"""Conditions of the ``if`` that are being traced: writes to arrays obey them."""
 
 
 class Value:
@@ -32,10 +38,15 @@ class Value:
     __add__, __radd__ = (lambda a, b: a.graph.node("+", a, b)), (lambda a, b: a.graph.node("+", b, a))
     __sub__, __rsub__ = (lambda a, b: a.graph.node("-", a, b)), (lambda a, b: a.graph.node("-", b, a))
     __mul__, __rmul__ = (lambda a, b: a.graph.node("*", a, b)), (lambda a, b: a.graph.node("*", b, a))
-    __truediv__, __rtruediv__ = (lambda a, b: a.graph.node("/", a, b)), (lambda a, b: a.graph.node("/", b, a))
+    __truediv__, __rtruediv__ = (
+        (lambda a, b: a.graph.node("/", a, _divisor(b))),
+        (lambda a, b: a.graph.node("/", b, _divisor(a))),
+    )
     __neg__, __pos__, __abs__ = (lambda a: a.graph.node("neg", a)), (lambda a: a), (lambda a: a.graph.node("abs", a))
     __lt__, __gt__ = (lambda a, b: a.graph.node("<", a, b)), (lambda a, b: a.graph.node(">", a, b))
     __le__, __ge__ = (lambda a, b: a.graph.node("<=", a, b)), (lambda a, b: a.graph.node(">=", a, b))
+    __mod__, __xor__ = (lambda a, b: a.graph.node("%", a, b)), (lambda a, b: a.graph.node("^", a, b))
+    __rshift__, __pow__ = (lambda a, b: a.graph.node(">>", a, b)), (lambda a, b: a if b == 1 else a ** (b - 1) * a)
 
     def __eq__(self, other: object) -> Any:
         return self.graph.node("==", self, other)
@@ -80,11 +91,30 @@ class Graph:
         for value in sources:
             active[value.at] = True
         for k, (operation, *arguments) in enumerate(self.nodes):
-            if operation not in STEPS:
-                counted = arguments[1:] if operation == "where" else arguments
-                active[k] = active[k] or any(isinstance(a, Value) and active[a.at] for a in counted)
+            active[k] = active[k] or any(isinstance(a, Value) and active[a.at] for a in _smooth(operation, arguments))
         return active
+
+    def within(self, values: Iterable[Scalar], smooth: bool = False) -> set[int]:
+        """Nodes that ``values`` are made of; ``smooth``: those to which their derivative may be other than zero."""
+        found, waiting = set[int](), [value.at for value in values if isinstance(value, Value)]
+        while waiting:
+            k = waiting.pop()
+            if k not in found:
+                found.add(k)
+                operation, *arguments = self.nodes[k]
+                waiting += [a.at for a in (_smooth(operation, arguments) if smooth else arguments) if isinstance(a, Value)]
+        return found
+
+
+def _smooth(operation: str, arguments: list[Any]) -> list[Any]:
+    """The arguments to which an operation has a derivative."""
+    return [] if operation in STEPS else arguments[1:] if operation == "where" else arguments
 
 
 def _number(value: Any) -> Any:
-    return value if isinstance(value, (bool, int)) else float(value)
+    return value if isinstance(value, (bool, int, np.uint64)) else float(value)
+
+
+def _divisor(value: Scalar) -> Scalar:
+    """A divisor, within an ``if`` 1 instead of 0: where an ``if`` keeps from dividing by zero, gradients stay numbers."""
+    return value.graph.select(value == 0.0, 1.0, value) if MASKS and isinstance(value, Value) else value

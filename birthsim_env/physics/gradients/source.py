@@ -50,11 +50,15 @@ from birthsim_env.physics.compiled.compilation import helper, kernel
 from birthsim_env.physics.gradients.source import choose
 '''
 
-_INFIX = {**{sign: sign for sign in ("+", "-", "*", "/", "<", ">", "<=", ">=", "==", "!=")}, "and": "&", "or": "|"}
+_INFIX = {
+    **{sign: sign for sign in ["+", "-", "*", "/", "%", "^", ">>", "<", ">", "<=", ">=", "==", "!="]},
+    "and": "&",
+    "or": "|",
+}
 _CALLS = {
     "where": "choose", "sqrt": "math.sqrt", "copysign": "math.copysign", "isfinite": "math.isfinite", "floor": "np.floor",
-    **{name: f"exact.{name}" for name in ("exp", "exp2", "log", "log1p", "tanh", "sine", "cosine")},
-    **{name: name for name in ("abs", "max", "min", "int")}, "neg": "-", "not": "not ",
+    **{name: f"exact.{name}" for name in ("exp", "exp2", "log", "log1p", "tanh", "sine", "cosine", "rounded")},
+    **{name: name for name in ("abs", "max", "min", "int")}, "neg": "-", "not": "not ", "uint": "np.uint64",
 }  # fmt: skip
 
 Output = tuple[str, int, Scalar]
@@ -72,6 +76,8 @@ def _statement(graph: Graph, k: int) -> str:
     if operation == "input":
         return f"{arguments[0]}[{arguments[1]}, i]"
     names = [_name(value) for value in arguments]
+    if operation == "bits":
+        return f"np.float64({names[0]}).view(np.uint64)"
     if operation in _INFIX:
         return f"{names[0]} {_INFIX[operation]} {names[1]}"
     return f"{_CALLS[operation]}({', '.join(names)})"

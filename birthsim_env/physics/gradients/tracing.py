@@ -16,42 +16,138 @@ import builtins
 import inspect
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
+from birthsim_env.physics.gradients.graph import MASKS, Graph, Scalar, Value
+from birthsim_env.physics.gradients.syntax import Continues, Rewriter
 
 
 class UntraceableError(ValueError):
     """What cannot be differentiated, and why."""
 
 
-MOST_PASSES = 8
-"""Passes into which a loop is unrolled whose number is computed; each happens under the condition that it is asked for."""
-
-_MASKS: list[Value] = []
-"""Conditions of the ``if`` that are being traced: writes to arrays obey them."""
-
-
 class Symbols(np.ndarray[Any, Any]):
-    """An array of ``Value``, numbers and, where nothing is written yet, None. Writes obey the conditions of the moment."""
+    """An array of ``Value``, numbers and, where nothing is written yet, None. Writes obey the conditions of the moment.
+
+    A computed index reads one of all rows, and writes to those under the condition that it is theirs.
+    """
+
+    def __getitem__(self, where: Any) -> Any:
+        rows = _rows(self.shape, where)
+        return super().__getitem__(where) if rows is None else _one_of([(mask, self[row]) for mask, row in rows])
 
     def __setitem__(self, where: Any, value: Any) -> None:
-        for mask in reversed(_MASKS):
+        rows = _rows(self.shape, where)
+        if rows is not None:
+            _write([(mask, self, row) for mask, row in rows], value)
+            return
+        for mask in reversed(MASKS):
             before = self[where]
             value = value if before is None else mask.graph.select(mask, value, before)
         super().__setitem__(where, value)
 
+    def view(self, kind: Any) -> Any:  # type: ignore[override]
+        """Numbers as the whole numbers that their bits are."""
+        bits = np.empty(self.shape, dtype=object)
+        for where, value in np.ndenumerate(self):
+            bits[where] = value.graph.node("bits", value)
+        return np.ndarray.view(bits, Symbols)
+
+
+class Picked:
+    """The one of several views, each with its condition, that a computed index means."""
+
+    def __init__(self, ways: list[tuple[Value, Any]]) -> None:
+        self._ways, self.shape = ways, ways[0][1].shape
+
+    def __getitem__(self, where: Any) -> Any:
+        return _one_of([(mask, view[where]) for mask, view in self._ways])
+
+    def __setitem__(self, where: Any, value: Any) -> None:
+        _write([(mask, view, where) for mask, view in self._ways], value)
+
+
+def _one_of(ways: list[tuple[Value, Any]]) -> Any:
+    """A view or a number, of those whose condition holds."""
+    if isinstance(ways[0][1], (Symbols, Picked)):
+        return Picked(ways)
+    (_, found), *others = reversed(ways)
+    for mask, value in others:
+        found = mask.graph.select(mask, value, found)
+    return found
+
+
+def _write(ways: list[tuple[Value, Any, Any]], value: Any) -> None:
+    """Write to each of several views under its condition."""
+    for mask, view, where in ways:
+        with under(mask):
+            view[where] = value
+
+
+def _rows(shape: tuple[int, ...], where: Any) -> list[tuple[Value, Any]] | None:
+    """The rows that an index can mean, with their conditions; None for one that Python knows."""
+    index = where if isinstance(where, tuple) else (where,)
+    axis = next((k for k, one in enumerate(index) if isinstance(one, Value)), None)
+    if axis is None:
+        return None
+    root, stride, offset = _affine(index[axis])
+    low, high = _bounds(root)
+    rows = ((row, (row - offset) // stride) for row in range(shape[axis]) if (row - offset) % stride == 0)
+    return [(root == whole, (*index[:axis], row, *index[axis + 1 :])) for row, whole in rows if low <= whole <= high]
+
+
+def _affine(index: Value) -> tuple[Value, int, int]:
+    """A value, and whole numbers by which it is multiplied and to which it is added to give ``index``."""
+    operation, a, b = (*index.graph.nodes[index.at], None)[:3]
+    if operation in ("+", "*") and isinstance(a, int):
+        a, b = b, a
+    if operation not in ("+", "-", "*") or not isinstance(b, int):
+        return index, 1, 0
+    root, stride, offset = _affine(a)
+    if operation == "*":
+        return root, stride * b, offset * b
+    return root, stride, offset + b if operation == "+" else offset - b
+
+
+def _bounds(value: Any) -> tuple[float, float]:
+    """The least and the most that a whole number can be, as far as its own operation says so."""
+    if not isinstance(value, Value):
+        return value, value
+    operation, *arguments = value.graph.nodes[value.at]
+    if operation == "int":
+        return _bounds(arguments[0])
+    if operation == "%" and isinstance(arguments[1], int):
+        return 0, arguments[1] - 1
+    if operation not in ("where", "max", "min"):
+        return -math.inf, math.inf
+    (low, high), (lower, higher) = map(_bounds, arguments[-2:])
+    if operation == "where":
+        return min(low, lower), max(high, higher)
+    choose = max if operation == "max" else min
+    return choose(low, lower), choose(high, higher)
+
+
+@contextmanager
+def under(mask: Value) -> Iterator[None]:
+    """What is written meanwhile is written where ``mask`` holds."""
+    MASKS.append(mask)
+    try:
+        yield
+    finally:
+        MASKS.pop()
+
 
 def inputs(graph: Graph, name: str, rows: int) -> Any:
     """The block ``name`` (rows, 1), of which all is read."""
-    block = np.empty((rows, 1), dtype=object).view(Symbols)
+    block = np.empty((rows, 1), dtype=object)
     for row in range(rows):
         block[row, 0] = graph.input(name, row)
-    return block
+    return block.view(Symbols)
 
 
 def empty(rows: int) -> Any:
@@ -62,7 +158,7 @@ def empty(rows: int) -> Any:
 def _is_traced(value: Any) -> bool:
     if isinstance(value, (tuple, list)):
         return any(map(_is_traced, value))
-    return isinstance(value, (Value, Symbols)) or isinstance(getattr(value, "rows", None), Symbols)
+    return isinstance(value, (Value, Symbols, Picked)) or isinstance(getattr(value, "rows", None), (Symbols, Picked))
 
 
 # What rewritten helpers call.
@@ -111,17 +207,17 @@ def branch(condition: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any
         return yes() if condition else no()
     results = []
     for mask, way in ((condition, yes), (denied(condition), no)):
-        _MASKS.append(mask)
-        try:
+        with under(mask):
             results.append(way())
-        finally:
-            _MASKS.pop()
     return _merged(condition, *results)
 
 
 def passes(count: Any) -> range:
-    """What a loop over ``range(count)`` goes through."""
-    return range(MOST_PASSES) if isinstance(count, Value) else range(count)
+    """What a loop over ``range(count)`` goes through: as many passes as a computed number may be."""
+    _, most = _bounds(count)
+    if most == math.inf:
+        raise UntraceableError("a loop over a computed number; allowed: min(number, the most that it can be)")
+    return range(int(most))
 
 
 def _extreme(name: str, values: Any) -> Scalar:
@@ -134,10 +230,17 @@ def _extreme(name: str, values: Any) -> Scalar:
 
 
 _UNARY: dict[Any, str] = {
-    math.sqrt: "sqrt", math.isfinite: "isfinite", np.floor: "floor", int: "int", np.int64: "int", exact.exp: "exp",
-    exact.exp2: "exp2", exact.log: "log", exact.log1p: "log1p", exact.tanh: "tanh", exact.sine: "sine", exact.cosine: "cosine",
+    math.sqrt: "sqrt", math.isfinite: "isfinite", np.floor: "floor", int: "int", np.int64: "int", np.uint64: "uint",
+    exact.exp: "exp", exact.exp2: "exp2", exact.log: "log", exact.log1p: "log1p", exact.tanh: "tanh", exact.sine: "sine",
+    exact.cosine: "cosine",
 }  # fmt: skip
 """Functions of one number that are operations of a graph."""
+
+_COMPOSED: dict[Any, Callable[[Value], Value]] = {
+    math.floor: lambda value: value.graph.node("int", value.graph.node("floor", value)),
+    math.ceil: lambda value: value.graph.node("int", -value.graph.node("floor", -value)),
+    math.isnan: lambda value: value != value,
+}
 
 INSTEAD: dict[Any, Callable[..., Any]] = {}
 """What stands for functions that make or read arrays in ways of their own; rooms above add theirs."""
@@ -158,106 +261,15 @@ def call(function: Any, *arguments: Any, **named: Any) -> Any:
         return next(a for a in arguments if isinstance(a, Value)).graph.node("copysign", *arguments)
     if function in _UNARY and isinstance(first, Value):
         return first.graph.node(_UNARY[function], first)
+    if function in _COMPOSED and isinstance(first, Value):
+        return _COMPOSED[function](first)
+    if function is exact.rounded:
+        return next(a for a in arguments if isinstance(a, Value)).graph.node("rounded", *arguments)
     if hasattr(function, "py_func"):
         return rewritten(function.py_func)(*arguments, **named)
     if function in (abs, len, zip, enumerate, range, slice) or isinstance(function, type) or inspect.ismethod(function):
         return function(*arguments, **named)
     raise UntraceableError(f"{getattr(function, '__name__', function)} of a computed value; allowed: helpers, +, -, *, /, sqrt")
-
-
-def _call(name: str, *arguments: ast.expr) -> ast.Call:
-    return ast.Call(ast.Name(f"__{name}", ast.Load()), list(arguments), [])
-
-
-def _later(expression: ast.expr) -> ast.Lambda:
-    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), expression)
-
-
-class _Rewriter(ast.NodeTransformer):
-    """Rewrites what asks for a truth value."""
-
-    def visit_IfExp(self, n: ast.IfExp) -> Any:
-        return _call("select", self.visit(n.test), *(_later(self.visit(way)) for way in (n.body, n.orelse)))
-
-    def visit_BoolOp(self, n: ast.BoolOp) -> Any:
-        name = ast.Constant("and" if isinstance(n.op, ast.And) else "or")
-        return _call("logic", name, *(_later(self.visit(value)) for value in n.values))
-
-    def visit_UnaryOp(self, n: ast.UnaryOp) -> Any:
-        self.generic_visit(n)
-        return _call("denied", n.operand) if isinstance(n.op, ast.Not) else n
-
-    def visit_Compare(self, n: ast.Compare) -> Any:
-        self.generic_visit(n)
-        if len(n.ops) == 1:
-            return n
-        sides = [n.left, *n.comparators]
-        pairs = [_later(ast.Compare(a, [op], [b])) for a, op, b in zip(sides, n.ops, sides[1:], strict=False)]
-        return _call("logic", ast.Constant("and"), *pairs)
-
-    def visit_Call(self, n: ast.Call) -> Any:
-        self.generic_visit(n)
-        return ast.Call(ast.Name("__call", ast.Load()), [n.func, *n.args], n.keywords)
-
-    def block(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """Statements with their loops and ``if`` rewritten."""
-        done: list[ast.stmt] = []
-        for k, statement in enumerate(statements):
-            if isinstance(statement, ast.If):
-                made, ends = self._if(statement, statements[k + 1 :])
-                done += made
-                if ends:
-                    return done
-            elif isinstance(statement, ast.For):
-                done += self._for(statement, k)
-            else:
-                done.append(self.visit(statement))
-        return done
-
-    def _for(self, loop: ast.For, k: int) -> list[ast.stmt]:
-        """A loop; over ``range(count)`` each pass happens only where the count asks for it."""
-        called = loop.iter if isinstance(loop.iter, ast.Call) and ast.unparse(loop.iter.func) == "range" else None
-        if called is None or len(called.args) != 1 or not isinstance(loop.target, ast.Name):
-            return [ast.For(loop.target, self.visit(loop.iter), self.block(loop.body), [])]
-        count, target = f"__n{k}_{loop.lineno}", loop.target.id
-        target = f"__k{loop.lineno}" if target == "_" else target
-        test = ast.Compare(ast.Name(target, ast.Load()), [ast.Lt()], [ast.Name(count, ast.Load())])
-        leaves = any(isinstance(x, (ast.Break, ast.Continue, ast.Return)) for x in ast.walk(loop))
-        body = self.block(loop.body if leaves else [ast.If(test, loop.body, [])])
-        again = _call("passes", ast.Name(count, ast.Load()))
-        return [
-            ast.Assign([ast.Name(count, ast.Store())], self.visit(called.args[0])),
-            ast.For(ast.Name(target, ast.Store()), again, body, []),
-        ]
-
-    def _if(self, statement: ast.If, rest: list[ast.stmt]) -> tuple[list[ast.stmt], bool]:
-        """An ``if`` as two local functions; one that returns takes the statements after it into both of them."""
-        if any(isinstance(x, (ast.Break, ast.Continue)) for x in ast.walk(statement)):
-            test = _call("known", self.visit(statement.test))
-            return [ast.If(test, self.block(statement.body), self.block(statement.orelse))], False
-        leaves = any(isinstance(x, ast.Return) for x in ast.walk(statement))
-        ways = [[*body, *(rest if leaves else [])] for body in (statement.body, statement.orelse)]
-        changed = sorted({
-            x.id for way in ways for s in way for x in ast.walk(s) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store)
-        })  # fmt: skip
-        done: list[ast.stmt] = []
-        for name, way in zip(("__yes", "__no"), ways, strict=True):
-            head = f"def {name}({', '.join(f'{one}=__local(locals(), {one!r})' for one in changed)}): pass"
-            function = ast.parse(head).body[0]
-            assert isinstance(function, ast.FunctionDef)
-            give = ast.Return(ast.Tuple([ast.Name(one, ast.Load()) for one in changed], ast.Load()))
-            function.body = [*self.block([_copied(s) for s in way]), *([] if leaves else [give])]
-            function.body = function.body or [ast.Pass()]
-            done.append(function)
-        merged = _call("branch", self.visit(statement.test), *(ast.Name(name, ast.Load()) for name in ("__yes", "__no")))
-        if leaves:
-            return [*done, ast.Return(merged)], True
-        target = ast.Tuple([ast.Name(one, ast.Store()) for one in changed], ast.Store())
-        return [*done, ast.Assign([target], merged) if changed else ast.Expr(merged)], False
-
-
-def _copied(statement: ast.stmt) -> ast.stmt:
-    return ast.parse(ast.unparse(ast.fix_missing_locations(statement))).body[0]
 
 
 def known(condition: Any) -> Any:
@@ -287,7 +299,8 @@ def rewritten(function: Any) -> Any:
         definition.decorator_list, definition.returns = [], None
         for argument in definition.args.args:
             argument.annotation = None
-        definition.body = _Rewriter().block(definition.body)
+        definition = Continues().visit(definition)
+        definition.body = Rewriter().block(definition.body)
         space = {**function.__globals__, **{f"__{name}": value for name, value in _NAMES.items()}}
         module = ast.fix_missing_locations(ast.Module([definition], []))
         exec(compile(module, f"<traced {function.__qualname__}>", "exec"), space)
