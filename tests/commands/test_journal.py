@@ -5,7 +5,7 @@ from __future__ import annotations
 import optuna
 import pytest
 
-from baselines.work.journal import open_journal
+from baselines.commands.tune import open_journal
 
 
 def study(path):
