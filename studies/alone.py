@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import sys
 
-ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
 
 def only_under(settings: dict[str, str], module: str = "") -> None:
     """Begin anew with these variables, unless they are as they should be; or go on as ``python -m module`` with them.

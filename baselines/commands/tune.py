@@ -15,10 +15,12 @@ gains of a file. The next trials are drawn at random; Optuna's TPE sampler propo
 from __future__ import annotations
 
 import math
+import os
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import numpy as np
 from cyclopts import Parameter
@@ -32,7 +34,6 @@ from baselines.commands.tables import aligned
 from baselines.commands.worlds import check_world, with_options
 from baselines.controller import Controller
 from baselines.registry import CONTROLLERS, make_controller, split_options
-from baselines.work.journal import open_journal
 from birthsim_env.files import own_folder, whole_results, write_json
 from birthsim_env.parts.drawn.randomization import described, documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -43,6 +44,7 @@ from birthsim_env.physics.rig.values import is_finite, is_within, problem, shown
 
 if TYPE_CHECKING:
     from optuna import Study
+    from optuna.storages import JournalStorage
     from optuna.trial import FrozenTrial
 
 TUNED_FOR = ("ideal", "lab")
@@ -134,6 +136,17 @@ def check_optuna() -> None:
         import optuna  # noqa: F401
     except ImportError as error:
         raise ValueError(f"{error}; tuning needs the extra: pip install 'birthsim[tune]'") from error
+
+
+def open_journal(path: Path) -> JournalStorage:
+    """Optuna's journal at ``path``, without a last line that has no end, as a killed process may have left it."""
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    if path.exists():
+        os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
+    # Optuna's own lock file outlives a process that is killed: the folder has one owner already.
+    return JournalStorage(JournalFileBackend(str(path), cast(Any, threading.Lock())))
 
 
 def open_study(folder: Path, setting: dict[str, Any]) -> Study:

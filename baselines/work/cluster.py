@@ -20,7 +20,7 @@ ONE_THREAD = {
 def on_cluster(
     call: Callable[..., Any], work: Callable[..., Any], pieces: Sequence[tuple[Any, ...]], cluster: str
 ) -> Iterator[Any]:
-    """``call(work, k, pieces[k])`` in the order in which they end, as many at once as the cluster has processors.
+    """``call(work, k, pieces[k])`` in the order in which they end; each takes a processor of the cluster.
 
     ``cluster`` is "ray:ADDRESS", or "ray" for this machine's own. Every host needs the same version of this package, and what
     a piece names by path, such as a controller's file.
@@ -33,40 +33,28 @@ def on_cluster(
     except ImportError as error:
         raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
     address = cluster.partition(":")[2]
-    if address:
-        _check_that_it_answers(cluster, address)
+    host, _, port = address.rpartition(":")
     try:
+        if address:  # Ray itself would try for minutes
+            socket.create_connection((host, int(port)), CONNECTING).close()
         ray.init(
             address=address or "local", log_to_driver=False, include_dashboard=None if address else False,
             runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
         )  # fmt: skip
-    except ConnectionError as error:
-        raise ValueError(f"--cluster {cluster!r}: no cluster answers there; allowed: ray, or the address of one") from error
-    waiting, begun = list(enumerate(pieces)), list[Any]()
-    width, remote = max(1, int(ray.cluster_resources().get("CPU", 1))), ray.remote(num_cpus=1)(call)
+    except (OSError, ValueError) as error:
+        said = f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
+        raise ValueError(said) from error
+    remote, waiting = ray.remote(num_cpus=1)(call), list[Any]()
     try:
-        while waiting or begun:
-            while waiting and len(begun) < width:
-                begun.append(remote.remote(work, *waiting.pop(0)))
-            ready, begun = ray.wait(begun, timeout=0.5)  # s, since a signal waits no longer
+        waiting = [remote.remote(work, k, piece) for k, piece in enumerate(pieces)]
+        while waiting:
+            ready, waiting = ray.wait(waiting, timeout=0.5)  # s, since a signal waits no longer
             yield from map(ray.get, ready)
     except ray.exceptions.RayTaskError as error:
         raise error.cause from None
     except ray.exceptions.RayError as error:
         raise OSError(f"a worker of the cluster has died ({type(error).__name__}); what is complete is kept") from error
     finally:
-        for one in begun:
+        for one in waiting:
             ray.cancel(one, force=True)
         ray.shutdown()
-
-
-def _check_that_it_answers(cluster: str, address: str) -> None:
-    """Ray itself would try for minutes."""
-    host, _, port = address.rpartition(":")
-    try:
-        with socket.create_connection((host, int(port)), CONNECTING):
-            pass
-    except (OSError, ValueError) as error:
-        raise ValueError(
-            f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
-        ) from error

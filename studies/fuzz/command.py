@@ -16,7 +16,8 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.commands.settings import MANY, Configured, Seed, whole
-from studies.alone import ONE_THREAD, only_under
+from baselines.work.cluster import ONE_THREAD
+from studies.alone import only_under
 from studies.fuzz.harness import Case, Figures, fuzz, generator
 from studies.fuzz.kinds import KINDS
 

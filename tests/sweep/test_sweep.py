@@ -1,6 +1,7 @@
 """birthsim study sweep: grids, draws, searches and trainings, kept pieces, and the same bytes however many processes work."""
 
 import json
+from dataclasses import asdict
 
 import numpy as np
 import optuna
@@ -12,7 +13,9 @@ from optuna.storages.journal import JournalFileBackend
 from baselines.bench.evaluation import evaluate
 from baselines.registry import make_controller
 from birthsim_env import Parameters
+from studies.results import read_result
 from studies.sweeps.plan import load_sweep
+from studies.sweeps.study import EXAMPLE
 from studies.sweeps.work import tasks_of
 from tests.console import call
 
@@ -136,6 +139,13 @@ def test_a_point_may_train_the_policy_that_it_evaluates(swept):
     rows = pq.read_table(out / "episodes.parquet").to_pylist()
     assert [row["training.seed"] for row in rows] == [0, 0, 1, 1]
     assert "trainings 2" in swept(text)[1]
+
+
+def test_the_stored_result_is_of_the_example_as_it_is():
+    kept, sweep = read_result("sweep")["figures"], load_sweep(EXAMPLE)
+    assert kept["base"] == sweep.base
+    assert [point["point"] for point in kept["points"]] == sweep.points
+    assert kept["maps"] == [asdict(chart) for chart in sweep.maps]
 
 
 def test_points_that_cannot_be_are_named_and_cost_no_other(swept):

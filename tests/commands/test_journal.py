@@ -3,7 +3,7 @@
 import optuna
 import pytest
 
-from baselines.work.journal import open_journal
+from baselines.commands.tune import open_journal
 
 
 def study(path):
