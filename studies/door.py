@@ -19,6 +19,7 @@ STUDIES = {
     "acceleration": Entry("comparison.study", "ACCELERATION", "what an acceleration sensor adds"),
     "acceleration-feel": Entry("haptics.study", "ACCELERATION", "what a hand feels with an acceleration sensor"),
     "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
+    "air": Entry("least_air.study", "STUDY", "how much air the schedule of least air saves"),
     "beside-law": Entry("residual.beside_law", "STUDY", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),

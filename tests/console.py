@@ -23,6 +23,7 @@ STUDIES = {
     "beside-law",
     "worst",
     "pools",
+    "air",
 }
 """Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long
