@@ -8,7 +8,7 @@ evaluates laws.
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import cycle
 from typing import Any
 
@@ -81,7 +81,7 @@ def first_step(environment: str, **arguments: Any) -> float:
     return time.process_time()
 
 
-def _actions(space: gymnasium.Space[Any], count: int) -> cycle[Any]:
+def _actions(space: gymnasium.Space[Any], count: int) -> Iterator[Any]:
     """Random actions that keep the air moving and the pistons away from the end stops for a second."""
     return cycle(np.random.default_rng(0).uniform(-0.3, 0.3, (count, *(space.shape or ()))).astype(np.float32))
 
