@@ -9,32 +9,8 @@ from birthsim_env.parts.drawn.seeding import Range, draw, vectorised
 from birthsim_env.parts.hands.user_forces import MOST, STRONGEST, ForceProfile
 from birthsim_env.parts.references import TURNED
 from birthsim_env.physics.compiled import exact
-from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.values import checked_count, checked_number, checked_range, shown
-
-
-@kernel
-def _contraction(
-    time: Array, lasts: float, size: Array, fraction: Array, bumps: NDArray[np.int64], along: tuple[float, float],
-    lanes: NDArray[np.int64], knots: Array,
-) -> None:  # fmt: skip
-    """Writes the forces of one contraction into the lanes (L,) of ``knots`` (M, 3, N), at ``time`` (M,), s since it began.
-
-    It carries 1 - ``fraction``, so that the sum with its ``bumps`` pushes peaks near ``size``, N; all three (L,). ``along`` is
-    a unit vector.
-    """
-    least = bumps.min()
-    pushes, (x, y) = np.empty(bumps.max() - least + 1), along
-    for k in range(time.shape[0]):
-        middle = max(0.0, min(1.0, (time[k] - 0.25 * lasts) / (0.5 * lasts)))
-        contraction = exact.sine(math.pi * time[k] / lasts)
-        for more in range(pushes.shape[0]):
-            pushes[more] = exact.sine(math.pi * (least + more) * middle)
-        for i in range(lanes.shape[0]):
-            push = pushes[bumps[i] - least]
-            force = size[i] * ((1.0 - fraction[i]) * contraction * contraction + fraction[i] * push * push)
-            knots[k, 1, lanes[i]], knots[k, 2, lanes[i]] = force * x, force * y
 
 
 class Contractions(ForceProfile):
@@ -97,9 +73,13 @@ class Contractions(ForceProfile):
 
     def _contract(self, table: Array, lanes: NDArray[np.int64], rng: np.random.Generator) -> None:
         """Draw the forces of the lanes (L,) of a table of knots."""
-        time, along = self._time, exact.direction(self.heading)
+        time, (x, y), (least, most) = self._time, exact.direction(self.heading), self.pushes
+        _, swell = exact.direction(math.pi * time / self.lasts)
+        middle = np.clip((time - 0.25 * self.lasts) / (0.5 * self.lasts), 0.0, 1.0)
+        waves = np.array([exact.direction(math.pi * bumps * middle)[1] for bumps in range(least, most + 1)])
         for contraction in table[:-1].reshape(self.count, len(time), 3, table.shape[2]):
             size, fraction = draw(self.amplitude, rng), draw(self.push, rng)
-            bumps = rng.integers(self.pushes[0], self.pushes[1] + 1)
-            drawn = (np.full(len(lanes), number) for number in (size, fraction, bumps))
-            _contraction(time, self.lasts, *drawn, along, lanes, contraction)  # type: ignore[call-arg, arg-type]
+            push = waves[np.broadcast_to(rng.integers(least, most + 1), lanes.shape) - least].T
+            # Less of the contraction, so that the sum with its pushes peaks near its size.
+            force = size * ((1.0 - fraction) * swell[:, None] * swell[:, None] + fraction * push * push)
+            contraction[:, 1, lanes], contraction[:, 2, lanes] = force * x, force * y
