@@ -197,8 +197,6 @@ pictures: $(READY)
 	$(BIN)/birthsim animate --env BirthSIM/Circle-v1 --controller backstepping residual --seed 3 --rate 10 --begin 2 --end 10 --out docs/circle.webp
 	$(BIN)/birthsim animate --env BirthSIM/Vacuum-v0 --controller backstepping admittance-adaptive --sensors honest --seed 2 --rate 10 --begin 0.5 --end 8.5 \
 	  --out docs/vacuum.webp
-	$(BIN)/python examples/frequency_responses.py --out $(OUT)/frequency
-	cp $(OUT)/frequency/frequency_responses.png docs/
 
 # Interrupted, the same command goes on. What is fresh is left as it is; birthsim study status has the seconds of each.
 results: $(READY)

@@ -36,6 +36,7 @@ STUDIES = {
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
     "pools": Entry("pools", "STUDY", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
+    "responses": Entry("responses.study", "STUDY", "frequency responses of the rig, and their resonances"),
     "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
     "soak": Entry("soak.command", "", "10^8 policy steps over all that there is"),
     "speed": Entry("speed.study", "STUDY", "speeds, beside what they are to be compared with"),

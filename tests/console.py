@@ -24,6 +24,7 @@ STUDIES = {
     "worst",
     "pools",
     "air",
+    "responses",
 }
 """Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long

@@ -1,6 +1,5 @@
 """The linear model against finite differences, the second model, formulas of stiffness, valve gains, and the plant's motion."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linear.model import LinearModel
 from studies.accuracy.second_model import SecondModel, rates
+from tests.console import call, strict
 from tests.physics.test_second_model import ELASTO_PLASTIC, OTHER_RIG
 
 COULOMB = {"friction.law": "coulomb"}
@@ -254,18 +254,20 @@ def test_without_python_control_the_extra_is_named(monkeypatch: pytest.MonkeyPat
         linearize(None, (0.5, 0.0)).to_control()
 
 
-@pytest.mark.slow
-def test_the_example_draws_and_prints_resonance_and_bandwidth(tmp_path: Path) -> None:
+def test_the_study_finds_resonance_and_bandwidth(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A sliding rig's resonance is that of its slowest mode: damping moves the peak by zeta^2 < 1 %, the grid by 0.4 %."""
-    script = Path(__file__).parents[2] / "examples" / "frequency_responses.py"
-    done = subprocess.run([sys.executable, script, "--out", tmp_path], capture_output=True, text=True, timeout=300, check=True)
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines()[2:]]
-    assert len(rows) == 16
-    assert all(float(row[-1]) > 0 for row in rows)
+    status, printed, _ = call("responses", monkeypatch, capsys, "--jobs", "1", "--out", tmp_path)
+    assert status == 0
+    curves = strict(tmp_path / "responses.json")["figures"]
+    assert [len(each) for each in curves.values()] == [4] * 4
+    assert all(one["bandwidth"] > 0 for each in curves.values() for one in each)
     pose = (0.5, 0.0)
     model = linearize(None, pose, balanced_pressures(None, pose, (5200.0, 2700.0)), friction="sliding")
     modes = np.linalg.eigvals(model.A)
     slowest = min(abs(mode) for mode in modes if mode.imag > 5) / (2 * np.pi)
-    found = next(float(row[4]) for row in rows if row[:3] == ["hand Fy to y", "sliding", "high"])
-    assert found == pytest.approx(slowest, rel=0.02)
+    (found,) = (one for one in curves["hand Fy to y"] if (one["friction"], one["stiffness"]) == ("sliding", "high"))
+    assert found["resonance"] == pytest.approx(slowest, rel=0.02)
+    assert f"| hand Fy to y | sliding | high | {found['size']:.3g} mm/N | {found['resonance']:.3g} |" in printed
     assert (tmp_path / "frequency_responses.png").stat().st_size > 20_000
