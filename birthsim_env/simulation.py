@@ -180,9 +180,7 @@ class Simulation:
         self.actuation.begin(lanes)
         self._tick[:, lanes], self._seen[at.TIME, lanes], self._since[:, lanes] = 0.0, 0.0, 0.0
         self.impacts[:, lanes], self._openings[:, lanes] = 0.0, 0.0
-        rows = checked_start(
-            self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters, self.nominal
-        )  # fmt: skip
+        rows = checked_start(self.trajectory, self.stiffness, chosen, len(lanes), duration, self.parameters)
         start, speed = rows[0:2], rows[2:4]
         if position is not None:
             start, speed = np.repeat(position[:, None], len(chosen), axis=1), np.zeros((2, len(chosen)))

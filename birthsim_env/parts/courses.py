@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -14,9 +13,8 @@ from birthsim_env.loop.signals import Motion, Setpoints
 from birthsim_env.parts.drawn.seeding import is_vectorised
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.compiled.compilation import kernel
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.geometry import inverse_geometry, well_inside
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.geometry import inverse_geometry
 from birthsim_env.physics.plant import checked
 from birthsim_env.physics.rig.parameters import Parameters
 
@@ -40,20 +38,18 @@ def checked_start(
     num_envs: int,
     duration: float,
     rig: Parameters,
-    nominal: Array,
 ) -> Array:
     """What is asked of ``lanes`` (L,) as their episodes begin, rows of a ``Reference``, (15, L).
 
     Raises ``ValueError`` where it is not finite, leaves the workspace of ``rig``, or is no stiffness, within ``duration`` s.
-    ``nominal`` (PARAMETERS,) is the rig's column.
     """
     motion = _sampler("reference", trajectory, Motion.size, lanes, num_envs)
     setpoints = _sampler("stiffness", stiffness, Setpoints.size, lanes, num_envs)
     instants, together = np.linspace(0.0, duration, CHECKS), max(1, TOGETHER // len(lanes))
     start = np.concatenate([motion(instants[:1]), setpoints(instants[:1])])
-    groups = (instants[k : k + together] for k in range(0, CHECKS, together))
-    if not all(_is_plain(Motion(motion(group)), Setpoints(setpoints(group)), nominal) for group in groups):
-        _explain(trajectory, stiffness, lanes, num_envs, instants, rig)
+    for k in range(0, CHECKS, together):
+        group = instants[k : k + together]
+        _check(group, motion(group), setpoints(group), rig)
     return start
 
 
@@ -93,15 +89,11 @@ def check_drawn(trajectory: Trajectory, duration: float, rig: Parameters) -> Non
         cylinder = getattr(rig, name)
         shorter = max(cylinder.stroke - 2 * SPARE, 0.5 * cylinder.stroke)
         object.__setattr__(tight, name, dataclasses.replace(cylinder, stroke=shorter))
-    stiff, p = Setpoints(np.ones((Setpoints.size, lanes))), parameter_column(tight)
-    stiff.stiffness_coupling[:] = 0.0
     for instant in np.linspace(0.0, duration, CHECKS):
-        motion = one.sample(np.full(lanes, instant))
-        if not _is_plain(Motion(motion), stiff, p):
-            try:
-                inverse_geometry(motion[:2], tight)
-            except ValueError as error:
-                raise ValueError(f"reference at {instant:.3g} s, of one that can be drawn: {error}") from None
+        try:
+            inverse_geometry(one.sample(np.full(lanes, instant))[:2], tight)
+        except ValueError as error:
+            raise ValueError(f"reference at {instant:.3g} s, of one that can be drawn: {error}") from None
 
 
 def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs: int) -> Callable[[Array], Array]:
@@ -116,8 +108,8 @@ def _sampler(name: str, part: Any, size: int, lanes: NDArray[np.intp], num_envs:
         return part.some(np.tile(lanes, times))
 
     def sample(instants: Array) -> Array:
-        rows: Array = repeated(len(instants)).sample(np.repeat(instants, len(lanes)))
-        return rows
+        rows = repeated(len(instants)).sample(np.repeat(instants, len(lanes)))
+        return checked(f"{name}.sample(time)", rows, rows.shape, "SI")
 
     return sample
 
@@ -126,54 +118,22 @@ def _of_all(name: str, part: Any, size: int, num_envs: int, instant: float) -> A
     return checked(f"{name}.sample(time)", part.sample(np.full(num_envs, instant)), (size, num_envs), "SI")
 
 
-@kernel
-def _is_plain(motion: Motion, asked: Setpoints, p: Array) -> bool:
-    """Whether no lane is anywhere near what the check refuses."""
-    doubtful = 0
-    for i in range(motion.rows.shape[1]):
-        size = 0.0
-        for row in range(motion.rows.shape[0]):
-            size += abs(motion.rows[row, i])
-        for row in range(asked.rows.shape[0]):
-            size += abs(asked.rows[row, i])
-        kx, ky, kxy = asked.stiffness[0, i], asked.stiffness[1, i], asked.stiffness_coupling[i]
-        softest = min(min(kx, ky), min(asked.pneumatic_stiffness[0, i], asked.pneumatic_stiffness[1, i]))
-        inside = well_inside(motion.position[0, i], motion.position[1, i], p)
-        doubtful += 0 if size < math.inf and not (softest <= 0.0 or kxy * kxy >= kx * ky) and inside else 1
-    return doubtful == 0
-
-
-def _explain(
-    trajectory: Trajectory,
-    stiffness: StiffnessSchedule,
-    lanes: NDArray[np.intp],
-    num_envs: int,
-    instants: Array,
-    rig: Parameters,
-) -> None:
-    """Raises ``ValueError`` with what is wrong first, if anything is."""
-    points, asked = np.empty((2, CHECKS, len(lanes))), np.empty((7, CHECKS, len(lanes)))
-    for k, instant in enumerate(instants):
-        points[:, k] = _of_all("reference", trajectory, 8, num_envs, instant)[:2, lanes]
-        asked[:, k] = _of_all("stiffness", stiffness, 7, num_envs, instant)[:, lanes]
-
-    def first(wrong: Any) -> tuple[int, float]:
-        k = int(wrong.any(axis=1).argmax())
-        return k, float(instants[k])
-
-    soft = (asked[:4] <= 0).any(axis=0)
-    if soft.any():
-        k, instant = first(soft)
-        raise ValueError(f"stiffness.sample(time = {instant:g} s) = {asked[:4, k].min():g} N/m; allowed: more than 0")
-    kx, ky, kxy = asked[0], asked[1], asked[6]
-    coupled = kxy**2 >= kx * ky
-    if coupled.any():
-        k, instant = first(coupled)
+def _check(instants: Array, motion: Array, asked: Array, rig: Parameters) -> None:
+    """Raises ``ValueError`` with what is wrong first, if anything is; ``motion`` (8, K L), ``asked`` (7, K L), K instants."""
+    times, (kx, ky), kxy = np.repeat(instants, motion.shape[1] // len(instants)), asked[:2], asked[6]
+    if (soft := (asked[:4] <= 0).any(axis=0)).any():
+        k = int(soft.argmax())
+        raise ValueError(f"stiffness.sample(time = {times[k]:g} s) = {asked[:4, k].min():g} N/m; allowed: more than 0")
+    if (coupled := kxy**2 >= kx * ky).any():
+        k = int(coupled.argmax())
         raise ValueError(
-            f"stiffness.sample(time = {instant:g} s): Kclxy = {np.abs(kxy[k]).max():g} N/m; allowed: below sqrt(Kclx Kcly)"
+            f"stiffness.sample(time = {times[k]:g} s): Kclxy = {abs(kxy[k]):g} N/m; allowed: below sqrt(Kclx Kcly)"
         )
-    for k, instant in enumerate(instants):
-        try:
-            inverse_geometry(points[:, k], rig)
-        except ValueError as error:
-            raise ValueError(f"reference at {instant:.3g} s: {error}") from error
+    try:
+        inverse_geometry(motion[:2], rig)
+    except ValueError:
+        for instant, places in zip(instants, np.split(motion[:2], len(instants), axis=1), strict=True):
+            try:
+                inverse_geometry(places, rig)
+            except ValueError as error:
+                raise ValueError(f"reference at {instant:.3g} s: {error}") from error

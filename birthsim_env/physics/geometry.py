@@ -15,8 +15,6 @@ from birthsim_env.physics.compiled.lanes import (
     COS_GAMMA3,
     D_PRODUCT,
     D_SQUARES,
-    HALF_L1,
-    HALF_L2,
     K1,
     K2,
     SIN_GAMMA3,
@@ -146,20 +144,6 @@ def inverse_geometry(position: ArrayLike, parameters: Parameters) -> Array:
         point = (float(np.ravel(x)[first]), float(np.ravel(y)[first]))
         raise ValueError(f"position = ({point[0]:.6g}, {point[1]:.6g}) m is unreachable; allowed: {workspace(parameters)}")
     return piston
-
-
-MARGIN = 1e-9
-"""m; far more than rounding, far less than matters."""
-
-
-@helper
-def well_inside(x: float, y: float, p: Array) -> bool:
-    """Whether ``inverse_geometry`` surely reaches a point (m) with one rig's parameters (PARAMETERS,): ``MARGIN`` inside."""
-    r2 = math.sqrt(x * x + y * y)
-    sine, cosine = x / r2, -y / r2
-    r4 = length_r4(sine, cosine, p[D_SQUARES], p[D_PRODUCT], p[SIN_GAMMA3], p[COS_GAMMA3])
-    spare = min(p[HALF_L1] - abs(r4 - p[K1]), p[HALF_L2] - abs(r2 - p[K2]))
-    return bool(min(spare, p[COS_GAMMA3] * cosine + p[SIN_GAMMA3] * sine) > MARGIN)
 
 
 def jacobian(piston: ArrayLike, parameters: Parameters) -> Array:

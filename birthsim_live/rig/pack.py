@@ -174,9 +174,9 @@ def path_of(scenario: Parts, duration: float) -> list[list[float]]:
 
 def _problem(name: str, rig: Parameters) -> str:
     """Why a rig cannot do a scenario: its target leaves the workspace, or the rig cannot carry its weight there."""
-    (target, _, setpoints), nominal = begun(name), parameter_column(rig)
+    target, _, setpoints = begun(name)
     try:
-        start = checked_start(target, setpoints, np.array([0]), 1, SCENARIOS[name].duration, rig, nominal)
+        start = checked_start(target, setpoints, np.array([0]), 1, SCENARIOS[name].duration, rig)
         require_carried(start[:2], rig)
     except ValueError as error:
         if name == "probe":  # with which the page opens

@@ -246,8 +246,8 @@ def test_only_the_lanes_that_begin_are_sampled(monkeypatch):
     env = gymnasium.make_vec("BirthSIM/Circle-v1", num_envs=50, randomize=True).unwrapped
     env.reset(seed=0)
     sizes = []
-    kernel = courses._is_plain
-    monkeypatch.setattr(courses, "_is_plain", lambda *given: sizes.append(given[0].rows.shape[1]) or kernel(*given))
+    check = courses._check
+    monkeypatch.setattr(courses, "_check", lambda *given: sizes.append(given[1].shape[1]) or check(*given))
     env.reset(options={"reset_mask": np.arange(50) < 2})
     assert sum(sizes) == 2 * courses.CHECKS
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from birthsim_env.physics import geometry
-from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2, parameter_column
+from birthsim_env.physics.compiled.lanes import V1, V2, Y1, Y2
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Geometry, Parameters
 from tests.oracles import linkage_by_points as by_points
@@ -183,28 +183,6 @@ def test_edges_of_the_workspace_are_named_rightly_and_reached() -> None:
     highest, lowest = np.arctan2(corner[1], corner[0])
     assert f"{lowest:.4g} to {highest:.4g} rad above x" in geometry.workspace(rig)
     np.testing.assert_allclose(geometry.inverse_geometry(corner, rig), [[-0.1, 0.1], [0.2, 0.2]], atol=1e-12)
-
-
-@each_rig
-def test_what_is_well_inside_is_what_the_inverse_model_reaches(rig: Parameters) -> None:
-    """Points around both strokes and all around the pivot; the other branch of the linkage counts as outside."""
-    rng, column = np.random.default_rng(11), parameter_column(rig)
-    half = np.array([[rig.cylinder1.stroke / 2], [rig.cylinder2.stroke / 2]])
-    angle, radius = rng.uniform(-math.pi, math.pi, 300), rng.uniform(0.2, 0.85, 300)
-    near = pose(rng.uniform(-1.3, 1.3, (2, 300)) * half, rig).end_effector
-    points = np.concatenate([near, radius * np.array([np.cos(angle), np.sin(angle)])], axis=1)
-    reached = []
-    for point in points.T:
-        try:
-            geometry.inverse_geometry(point, rig)
-        except ValueError:
-            reached.append(False)
-        else:
-            reached.append(True)
-    assert 100 < sum(reached) < 400
-    assert [geometry.well_inside(x, y, column) for x, y in points.T] == reached
-    corner = pose(half, rig).end_effector[:, 0]
-    assert not geometry.well_inside(*corner, column), "on the edge is not well inside"
 
 
 @each_rig
