@@ -44,7 +44,10 @@ CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nv
 SCENARIOS := circle probe descent forceps dystocia
 ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
-LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(STUDENT)
+# Policies by gradients: scenario, and its environment.
+BY_GRADIENTS := circle:Circle-v1 probe:Probe-v2 descent:Descent-v1 forceps:Forceps-v1 dystocia:Dystocia-v1 vacuum:Vacuum-v0
+GRADIENTS := $(foreach pair,$(BY_GRADIENTS),$(firstword $(subst :, ,$(pair)))_apg) circle_residual_apg
+LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
@@ -81,9 +84,9 @@ run: $(BASE)
 	@echo "== 2 of 4: a residual policy on top of a law, half a minute to two minutes"
 	rm -rf $(OUT)/policy
 	$(BIN)/birthsim train --config circle_quick --seed 0 --out $(OUT)/policy
-	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, less than a minute"
+	@echo "== 3 of 4: a controller from scratch, by gradients through the closed loop, some 20 s"
 	rm -rf $(OUT)/scratch
-	$(BIN)/birthsim train --config circle_apg --steps 900000 --seed 0 --out $(OUT)/scratch
+	$(BIN)/birthsim train --config circle_apg --steps 300000 --seed 0 --out $(OUT)/scratch
 	@echo "== 4 of 4: the paper's law, the best law, the controller from scratch and the residual on 64 episodes that training never saw"
 	$(BIN)/birthsim evaluate --controller backstepping admittance-backstepping residual:$(OUT)/scratch residual --policy $(OUT)/policy \
 	  --episodes 64 --seed 10000 --out $(OUT)/evaluation
@@ -208,6 +211,9 @@ results: $(READY)
 policies: $(READY)
 	for name in $(SCENARIOS) $(ON_CIRCLE); do \
 	  $(BIN)/birthsim train --config $$name --seeds 5 --jobs 2 --out $(OUT)/training/$$name || exit 1; done
+	for pair in $(BY_GRADIENTS); do id=$${pair#*:}; $(BIN)/birthsim train --config circle_apg --env BirthSIM/$${id%-*}Residual-$${id#*-} \
+	  --seeds 5 --jobs 2 --out $(OUT)/training/$${pair%:*}_apg || exit 1; done
+	$(BIN)/birthsim train --config circle_residual_apg --seeds 5 --jobs 2 --out $(OUT)/training/circle_residual_apg
 	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
 	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
 	  --out $(OUT)/training/$(STUDENT)

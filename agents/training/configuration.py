@@ -86,11 +86,8 @@ class TrainingSettings:
         whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
         if not (whole and 1 <= len(widths) <= LAYERS):
             raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
-        if self.algorithm == "apg" and (self.privileged or self.sensors != "ideal"):
-            raise ValueError(
-                f"algorithm = 'apg' with sensors = {self.sensors!r}, privileged = {self.privileged}; allowed: 'ideal' and "
-                "False, whose gradients are known"
-            )
+        if self.algorithm == "apg" and self.privileged:
+            raise ValueError("privileged = True with algorithm = 'apg'; allowed: False")
         if self.algorithm in ("ppo", "apg") and self.lanes * self.rollout > COLLECTED:
             raise ValueError(
                 f"lanes = {self.lanes} with rollout = {self.rollout}; allowed: a product of at most {COLLECTED}, the steps "

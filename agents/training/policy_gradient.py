@@ -27,6 +27,7 @@ from agents.training.reached import Reached
 from agents.training.rollouts import Worlds
 from agents.training.time_split import split
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
+from birthsim_env.observation import Observation
 from birthsim_env.reward import LARGEST_COST
 
 LEAST_RATE = 0.01
@@ -34,6 +35,9 @@ LEAST_RATE = 0.01
 
 OBSERVED, LEAST = 64, 0.4
 """Rigs whose observations, during an episode, say how to normalise; the least standard deviation of an entry, in its scale."""
+
+STIFFNESS = 1.25
+"""Cost of an error of 5000 N/m on cylinder 1, or 2500 on cylinder 2, in errors of a millimetre; assumed."""
 
 MET = 5.0
 """s: mean time that a rig is met; assumed."""
@@ -69,6 +73,13 @@ def _statistics(settings: TrainingSettings, env: Any) -> tuple[Any, Any]:
     driven.close()
     mean, variance = np.array([known.get(name, (0.0, 0.0)) for name in env.observation_names]).T
     return mean.copy(), np.maximum(variance, LEAST**2)
+
+
+def _stiffness_cost(observation: Tensor) -> Tensor:
+    """What errors of the pneumatic stiffness (9) cost (N,), which the reward leaves to a controller underneath."""
+    has, asked = Observation.pneumatic_stiffness.first, Observation.pneumatic_setpoint.first
+    error = observation[:, has : has + 2] - observation[:, asked : asked + 2]
+    return STIFFNESS * (error * error).sum(dim=1)
 
 
 class PolicyGradient:
@@ -148,7 +159,7 @@ class PolicyGradient:
             started = time.perf_counter()
             now = self._worlds.step(now, action)
             stepping += time.perf_counter() - started
-            loss = loss + settings.discount**k * _cost(now.reward, period).mean()
+            loss = loss + settings.discount**k * (_cost(now.reward, period) + _stiffness_cost(now.observation)).mean()
         self._now = now
         self._adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]

@@ -41,8 +41,23 @@ RUNS = {
         "BirthSIM/Circle-v1", 128, 170000, ("admittance-sensorless", "backstepping-force-first"), "honest",
         "examples/honest_sensors_rig.toml",
     ),
+    **{
+        f"{name}_apg": Run(environment, episodes, 71_500_000, ("backstepping", "admittance-backstepping"))
+        for name, environment, episodes in (
+            ("circle", "BirthSIM/Circle-v1", 256), ("probe", "BirthSIM/Probe-v2", 128), ("descent", "BirthSIM/Descent-v1", 64),
+            ("forceps", "BirthSIM/Forceps-v1", 128), ("dystocia", "BirthSIM/Dystocia-v1", 128),
+            ("vacuum", "BirthSIM/Vacuum-v0", 128),
+        )
+    },
+    "circle_residual_apg": Run("BirthSIM/Circle-v1", 256, 71_500_000),
 }  # fmt: skip
 """Policy -> its run; seeds were never used for training or design."""
+
+COMPARED = {
+    "settled_rms": "settled error, mm", "stiffness_error": "static stiffness error, %",
+    "pneumatic_rms_1": "error of pneumatic stiffness 1, %", "pneumatic_rms_2": "of 2, %", "air": "air, l/min",
+}  # fmt: skip
+"""Metric -> its column beside classical controllers; every cell has the median and the 95th percentile."""
 
 
 def _pieces(policy: str) -> dict[str, list[Task]]:
@@ -95,7 +110,12 @@ def _shown(content: Content) -> dict[str, str]:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     figures = content["figures"]
-    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": _summary(figures)}
+    return {
+        "learned.md": "\n\n".join(parts) + "\n",
+        "learned.csv": text.getvalue(),
+        "residual.md": _summary(figures),
+        "gradients_policies.md": _by_gradients(figures),
+    }
 
 
 def _summary(figures: dict[str, Any]) -> str:
@@ -109,6 +129,21 @@ def _summary(figures: dict[str, Any]) -> str:
             less = _row(figures[policy]["beside"]["backstepping"], "less, pooled RMS")
             off = "-" if less[4] is None else f"{less[4]:.1f} ({less[5]:.1f} to {less[6]:.1f})"
             lines.append([policy.capitalize(), f"{paper[3]:.3g}", f"{under[3]:.3g}", f"{paper[4]:.3g}", off])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _by_gradients(figures: dict[str, Any]) -> str:
+    """Policies by gradients beside classical controllers."""
+    lines = [["world", "controller", *COMPARED.values(), "lost"]]
+    lines.append(["---"] * len(lines[0]))
+    for policy in (name for name in figures if name.endswith("_apg")):
+        rows = figures[policy]["metrics"]["rows"]
+        for controller in dict.fromkeys(row[2] for row in rows):
+            own = {row[0]: row for row in rows if row[2] == controller}
+            cells = [f"{own[metric][3]} / {own[metric][4]}" if metric in own else "-" for metric in COMPARED]
+            lost = own["lost episodes"]
+            name = f"{policy}, {controller.rpartition(', ')[2]}" if controller.startswith("residual") else controller
+            lines.append([policy.partition("_")[0], name, *cells, f"{lost[3]} {lost[1]}"])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
