@@ -24,6 +24,7 @@ STUDIES = {
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
     "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
+    "figure4": Entry("figure4", "STUDY", "errors in the experiment of the paper's Fig. 4"),
     "floor": Entry("honest.floor", "STUDY", "what the errors of honest sensors leave to the best controller"),
     "fuzz": Entry("fuzz.command", "", "odd input to everything that is read or called"),
     "gradients": Entry("gradients.study", "STUDY", "what gradients cost, and how far they can be trusted"),
