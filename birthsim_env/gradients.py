@@ -99,7 +99,7 @@ class Recorder:
             elif name not in free:
                 pieces.append((k, trace(stage, loop.memories[k], loop.place)))
         action = WORLD + ACTION
-        rows = {
+        rows: dict[str, Sequence[int]] = {
             "state": range(STATE, STATE + STATES), "motion": range(MOTION, MOTION + 4),
             "action": range(action, action + len(simulation.action)),
         }  # fmt: skip

@@ -28,6 +28,7 @@ STUDIES = {
     "floor": Entry("honest.floor", "STUDY", "what the errors of honest sensors leave to the best controller"),
     "fuzz": Entry("fuzz.command", "", "odd input to everything that is read or called"),
     "gradients": Entry("gradients.study", "STUDY", "what gradients cost, and how far they can be trusted"),
+    "gradients-checks": Entry("gradients.checks", "STUDY", "how well gradients through closed loops agree with differences"),
     "haptics": Entry("haptics.study", "STUDY", "what a hand feels"),
     "honest": Entry("comparison.study", "HONEST", "what honest sensors cost"),
     "learned": Entry("learned.study", "STUDY", "what the shipped policies take off their controllers' errors"),

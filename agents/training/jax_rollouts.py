@@ -15,8 +15,6 @@
 A step is a pure callback: from one ``start`` the same actions give the same. Lanes cannot be mapped (``jax.vmap``): they are N.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -55,11 +53,11 @@ class Worlds:
     def begin(self, now: Now) -> Now:
         """The lanes as they are ``now``, after the last step: from here others go on, and what led here is forgotten."""
         self._start, self._taken = self.torch.env.get_state(), list[tuple[Any, Now, Any]]()
-        return jax.tree.map(jax.numpy.asarray, now._replace(at=np.int32(0)))
+        return Now(*map(jax.numpy.asarray, now._replace(at=np.int32(0))))
 
     def step(self, now: Now, action: Array) -> Now:
         """A policy step under actions (N, size) in [-1, 1]."""
-        return _step(self, now.at, now.carried, action)
+        return Now(*_step(self, now.at, now.carried, action))
 
     def advance(self, at: Any, carried: Any, action: Any) -> Now:
         """The step after the first ``at`` ones; with other actions than before, lanes go the way to it anew."""
@@ -71,26 +69,27 @@ class Worlds:
             for one in (*before[len(self._taken) : at], chosen):
                 now = self.torch.advance(one)
                 self._taken.append((one, _arrays(now, len(self._taken) + 1), self.torch.pullback(now)))
-        return self._taken[at][1]
+        return self._taken[int(at)][1]
 
     def back(self, at: Any, *gradients: Any) -> tuple[Any, ...]:
-        """Gradients to ``carried`` and actions."""
-        found = self._taken[int(at)][2](*map(np.asarray, gradients))
+        """Gradients to ``carried`` and actions of the step that led to ``at``."""
+        found = self._taken[int(at) - 1][2](*map(np.asarray, gradients))
         return tuple(one.astype(canonicalize_dtype(one.dtype)) for one in found)
 
 
 def _arrays(now: rollouts.Now, at: int) -> Now:
     arrays = (one.numpy() for one in now)
-    return Now(np.int32(at), *(one.astype(canonicalize_dtype(one.dtype)) for one in arrays))  # type: ignore[arg-type]
+    return Now(np.int32(at), *(one.astype(canonicalize_dtype(one.dtype)) for one in arrays))
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _step(worlds: Worlds, at: Array, carried: Array, action: Array) -> Now:
+def _step(worlds: Worlds, at: Array, carried: Array, action: Array) -> Any:
     return jax.pure_callback(worlds.advance, worlds.shape, at, carried, action)
 
 
-def _forward(worlds: Worlds, at: Array, carried: Array, action: Array) -> tuple[Now, tuple[Array, ...]]:
-    return _step(worlds, at, carried, action), (at, carried, action)
+def _forward(worlds: Worlds, at: Array, carried: Array, action: Array) -> tuple[Any, tuple[Array, ...]]:
+    now = _step(worlds, at, carried, action)
+    return now, (now.at, carried, action)  # the way back waits for the step
 
 
 def _backward(worlds: Worlds, kept: tuple[Array, ...], bars: Now) -> tuple[Any, ...]:

@@ -12,6 +12,7 @@ Gradients are those of ``birthsim_env.gradients``, one-sided at kinks. What ends
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from gymnasium.vector import AutoresetMode
 from torch import Tensor
 
 from birthsim_env.gradients import Recorder
+from birthsim_env.physics.compiled.lanes import Array
 
 
 class Now(NamedTuple):
@@ -45,19 +47,14 @@ class _Step(torch.autograd.Function):
     @staticmethod
     def forward(context: Any, carried: Tensor, action: Tensor, worlds: Worlds) -> tuple[Tensor, ...]:
         now = worlds.advance(action.detach().numpy())
-        context.back, context.lives = worlds.recorder.taken(), ~now.ended.numpy()
+        context.back = worlds.pullback(now)
         context.mark_non_differentiable(now.ended)
         return tuple(now)
 
     @staticmethod
     def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None]:
-        carried, observation, reward, motion, state = (one.numpy() for one in gradients[:5])
-        lives = context.lives
-        late, action = context.back(
-            carried=carried * lives, observation=observation * lives[:, None], reward=reward, motion=motion * lives,
-            state=state * lives,
-        )  # fmt: skip
-        return torch.from_numpy(late), torch.from_numpy(action.T.astype(np.float32)), None
+        carried, action = context.back(*(one.numpy() for one in gradients[:5]))
+        return torch.from_numpy(carried), torch.from_numpy(action), None
 
 
 class Worlds:
@@ -87,6 +84,19 @@ class Worlds:
         """``step`` without gradients."""
         observation, reward, terminated, truncated, _ = self.env.step(action)
         return self._now(observation, reward, terminated | truncated)
+
+    def pullback(self, now: Now) -> Callable[..., tuple[Array, Array]]:
+        """Takes gradients to the arrays of the last step, ``now``, to what was ``carried`` and to the action."""
+        back, lives = self.recorder.taken(), ~now.ended.numpy()
+
+        def pull(carried: Array, observation: Array, reward: Array, motion: Array, state: Array) -> tuple[Array, Array]:
+            late, action = back(
+                carried=carried * lives, observation=observation * lives[:, None], reward=reward, motion=motion * lives,
+                state=state * lives,
+            )  # fmt: skip
+            return late, action.T.astype(np.float32)
+
+        return pull
 
     def _now(self, observation: Any, reward: Any, ended: Any) -> Now:
         simulation = self.env.simulation

@@ -1,7 +1,5 @@
 """Closed loops against central differences: every controller, all scenarios, all sensors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium
@@ -68,7 +66,8 @@ def compared(env: Any, steps: int = 4, seed: int = 1) -> tuple[NDArray[np.float6
     recorder = Recorder(simulation)
     (_, plain, _), (_, taped, backs) = run(0.0), run(0.0, recorder)
     equal = all(np.array_equal(one, other) for one, other in zip(plain, taped, strict=True))
-    carried, parts = None, []
+    carried: Any = None
+    parts = []
     for k in reversed(range(steps)):
         carried, by_action = backs[k](carried=carried, reward=paid[k], state=state[k], motion=motion[k])
         parts.append(by_action * way[k].T)

@@ -1,7 +1,5 @@
 """What helpers do beside arithmetic: rings of rows, loops of computed length, guarded divisions, random numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

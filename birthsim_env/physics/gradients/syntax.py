@@ -1,7 +1,5 @@
 """Rewrites the syntax tree of a helper, so that what asks for a truth value calls ``tracing`` instead."""
 
-from __future__ import annotations
-
 import ast
 from typing import Any
 
