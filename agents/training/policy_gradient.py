@@ -36,7 +36,7 @@ LEAST_RATE = 0.01
 OBSERVED, LEAST = 64, 0.4
 """Rigs whose observations, during an episode, say how to normalise; the least standard deviation of an entry, in its scale."""
 
-STIFFNESS = 1.25
+STIFFNESS = 1.0
 """Cost of an error of 5000 N/m on cylinder 1, or 2500 on cylinder 2, in errors of a millimetre; assumed."""
 
 MET = 5.0
@@ -79,7 +79,7 @@ def _stiffness_cost(observation: Tensor) -> Tensor:
     """What errors of the pneumatic stiffness (9) cost (N,), which the reward leaves to a controller underneath."""
     has, asked = Observation.pneumatic_stiffness.first, Observation.pneumatic_setpoint.first
     error = observation[:, has : has + 2] - observation[:, asked : asked + 2]
-    return STIFFNESS * (error * error).sum(dim=1)
+    return STIFFNESS * error.abs().sum(dim=1)
 
 
 class PolicyGradient:
