@@ -24,7 +24,6 @@ LANES, SEED = 3, 7
 PERIODS, STEPS = 800, 80
 
 EXCEPTIONS = {
-    "lqr": "its gains come from SciPy's Riccati solver, so from LAPACK and BLAS",
     "nonlinear-mpc": "CasADi plans",
     "training": "PyTorch sums gradients in an order that depends on the processor",
 }
