@@ -5,8 +5,9 @@
     back = recorder.taken()                          # the pullback of this step
     carried, by_action = back(reward=..., observation=..., carried=...)
 
-Gradients flow through plant, actuation or law with its memory, ideal sensors, reward and observation. Target, setpoints and
-hands that feel nothing are functions of time. What is random is held.
+Gradients flow through plant, actuation or law with its memory, sensors, a hand that feels the rig, reward and observation. A
+sample that comes late hands its gradient to the state that it was taken of. Target, setpoints and hands that feel nothing are
+functions of time. What is random is held, and what a converter rounds passes as it is.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ Pullback = Callable[..., tuple[Array, Array]]
 class Recorder:
     """Runs a simulation in place of its loop, and keeps what going back needs.
 
-    ``carried`` (C,) are rows of the loop's space that hand gradients from one policy step to the one before: state, memories,
-    and what is measured. Raises ``ValueError`` that names what cannot be differentiated.
+    ``carried`` (C,) are rows of the loop's space, and of tables after it, that hand gradients from one policy step to the one
+    before: state, memories, and what is measured. Raises ``ValueError`` that names what cannot be differentiated.
     """
 
     def __init__(self, simulation: Simulation) -> None:

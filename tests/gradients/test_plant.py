@@ -75,7 +75,7 @@ def test_reverse_is_forward_mode() -> None:
     way, weight = along(256, plant.lane_parameters, 2, 7), np.random.default_rng(8).standard_normal((18, 256)) / SCALES
     forward = weight * jvp(plant, opening, forces, DURATION, way)
     plant.state[:] = state
-    pullback = vjp(plant, opening, forces, DURATION)
+    pullback = plant.vjp(opening, forces, DURATION)
     back = pullback(weight, rig=True)
     assert back.rig is not None
     assert way.rig is not None
@@ -106,7 +106,7 @@ def test_parameters_follow_by_the_chain_rule() -> None:
 )
 def test_options_are_refused_by_name(field: str, value: float) -> None:
     with pytest.raises(ValueError, match=field):
-        vjp(Plant(Parameters().replace({field: value})), np.zeros((4, 1)), np.zeros((1, 2, 1)), DURATION)
+        Plant(Parameters().replace({field: value})).vjp(np.zeros((4, 1)), np.zeros((2, 1)), DURATION)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")

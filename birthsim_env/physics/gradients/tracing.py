@@ -3,10 +3,11 @@
 That unrolls loops, inlines calls, and follows rows and their names by itself: a block is an array (rows, 1) of ``Value``, and
 the records of ``compiled.records`` name its rows. Only what asks for the truth of a computed value is rewritten first, in the
 helper's syntax tree: conditional expressions, ``and``, ``or``, ``not``, chained comparisons and ``if`` become selections; both
-ways of an ``if`` run, and what they write is merged. Primal operations keep their order, and hence their bits.
+ways of an ``if`` run, and what they write is merged. A computed row is chosen from all rows that it can be, and a loop over a
+computed number has as many passes as that can be. Primal operations keep their order, and hence their bits.
 
-What Python cannot decide while tracing is an ``UntraceableError``: ``while``, a loop that is left under a computed condition,
-rows that are computed, and functions that are neither helpers nor known.
+What Python cannot decide while tracing is an ``UntraceableError``: ``while``, a loop that is left under a computed condition or
+that has no bound, and functions that are neither helpers nor known.
 """
 
 from __future__ import annotations
