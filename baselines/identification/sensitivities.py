@@ -3,8 +3,6 @@
 A window is a lane, and carries one tangent per free number of its start and per parameter.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
