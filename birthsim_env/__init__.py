@@ -11,7 +11,7 @@ from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Circle, Hold, Path, Trajectory
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
-from birthsim_env.physics.linear.linearize import balanced_pressures, linearize
+from birthsim_env.physics.linear.linearize import balanced_pressures, linearize, linearize_lanes
 from birthsim_env.physics.linear.model import LinearModel
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
@@ -19,8 +19,8 @@ from birthsim_env.scores import normalized_score, reference_scores
 
 __all__ = [
     "Circle", "ForceProfile", "Hold", "LinearModel", "Measurement", "Parameters", "Path", "Plant", "Reference",
-    "StiffnessSchedule", "Trajectory", "UserForce", "balanced_pressures", "linearize", "normalized_score",
-    "reference_scores",
+    "StiffnessSchedule", "Trajectory", "UserForce", "balanced_pressures", "linearize", "linearize_lanes",
+    "normalized_score", "reference_scores",
 ]  # fmt: skip
 
 __version__ = "0.1.0"

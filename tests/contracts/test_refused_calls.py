@@ -209,7 +209,6 @@ TABLE = {
     ("leave 204.1 N on piston 2", ""): [linear(pressures=HIGH_BELOW, friction="sliding")],
     ("openings = ", "-1 to 1"): [linear(openings=(0.0, 0.0, 0.0, 2.0))],
     ("force has shape (1,)", "(2,)"): [linear(force=(1.0,))],
-    ("", "a rig whose options are off"): [linear(parameters=RIG.replace({"chambers.tube_length": 1.0}))],
     ("frequency = 0", "above 0"): [lambda: linearize(None, (0.5, 0.0)).frequency_response([1.0, 0.0])],
     ("unknown parameter 'mechanics.weight'", "mass, gravity"): [lambda: RIG.replace({"mechanics.weight": 0.9})],
     ("unknown parameter section 'motor'", "geometry, cylinder1"): [lambda: RIG.replace({"motor.mass": 0.9})],

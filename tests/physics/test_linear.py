@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
-from birthsim_env import Parameters, Plant, balanced_pressures, linearize
+from birthsim_env import Parameters, Plant, balanced_pressures, linearize, linearize_lanes
 from birthsim_env.physics import control_model, geometry, valves
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linear.model import LinearModel
 from studies.accuracy.second_model import SecondModel, rates
+from studies.gradients.states import plant_of
 from tests.console import call, strict
 from tests.physics.test_second_model import ELASTO_PLASTIC, OTHER_RIG
 
@@ -136,6 +138,49 @@ def test_at_an_equilibrium_it_is_the_second_models(name: str) -> None:
     both = differences(second_rates, np.concatenate([second.state, u, f]), size)
     assert_same(to_second @ model.A, both[:, :18] @ to_second, SCALES[:18], 1e-7)
     assert_same(to_second @ model.B, both[:, 18:], SCALES[18:])
+
+
+def test_along_a_trajectory_lanes_have_the_differences_of_their_plants() -> None:
+    """Moving lanes on rigs drawn at random; 1 % of their rates may stand nearer to a kink than the difference is wide."""
+    plant, opening, force = plant_of(64, 9)
+    found = linearize_lanes(plant, opening, force)
+    np.testing.assert_allclose(found.rates, plant.derivatives(plant.state, opening, force), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.outputs[:4], plant.end_effector(), rtol=1e-12, atol=1e-14)
+    point = np.concatenate([plant.state, opening, force])
+    slopes = np.concatenate([found.A, found.B], axis=2)
+    off = np.empty((24, 18, 64))
+    for k, size in enumerate(STEP * SCALES):
+        way = size * np.eye(24)[:, [k]]
+        high, low = (plant.derivatives(s[:18], np.clip(s[18:22], -1, 1), s[22:]) for s in (point + way, point - way))
+        off[k] = np.abs(slopes[:, :, k].T - (high - low) / (2 * size)) * SCALES[k]
+    share = off / np.max(np.abs(slopes) * SCALES, axis=2).T
+    inside = np.abs(opening).max(axis=0) < 0.99
+    assert np.quantile(share[:, :, inside], 0.99) < ALLOWED
+
+
+def test_options_of_a_rig_have_their_states() -> None:
+    """At rest the plant's motion over 10 us is the matrix exponential of A, B. Shut valves leak 1e4 Pa/s, of which 10 us are
+    1e-6 of a pressure; what the integrator leaves out of the fastest mode, 5000/s, is less."""
+    given = {"air.supply_conductance": 2e-8, "chambers.tube_length": 0.5, "mechanics.mode_frequency": 20.0}
+    rig, hand = Parameters().replace(given), np.array([6.0, -4.0])
+    model = linearize(rig, pose_of(rig, 0.03, -0.07), force=hand)
+    assert len(model.states) == 31
+    # The handle, the piston's end and its bristle carry the hand.
+    np.testing.assert_allclose(model.at.rates[[at.V1, at.V2, 21, 22]], 0.0, atol=1e-9)
+    sizes = np.concatenate([SCALES[:18], [1e5, 0.1, 0.1, 0.1, 0.1], np.full(8, 1e-3), SCALES[18:]])
+    step, duration = 1e-5 * sizes, 1e-5
+    ways = np.concatenate([np.diag(step), -np.diag(step)], axis=1)
+    plant = Plant(rig, ways.shape[1])
+    plant.state = model.at.state[:18, None] + ways[:18]
+    plant.memory[4:] = model.at.state[18:, None] + ways[18:31]
+    plant.advance(ways[31:35], hand[:, None] + ways[35:], duration)
+    reached = np.concatenate([plant.state, plant.memory[4:]])
+    found = (reached[:, :37] - reached[:, 37:]) / (2 * step)
+    whole = np.zeros((37, 37))
+    whole[:31] = np.hstack([model.A, model.B])
+    expected = expm(duration * whole)[:31]
+    still = np.eye(31, 37)
+    assert_same((found - still) / duration, (expected - still) / duration, sizes, 1e-4)
 
 
 @pytest.mark.parametrize("friction", ["sliding", "stuck"])

@@ -1,4 +1,4 @@
-"""The plant linearised at rest: exact derivatives of ``dynamics.right_hand_side`` at a pose and chamber pressures.
+"""The plant linearised: at rest, at a pose and chamber pressures, or wherever N plants are.
 
 Friction is not smooth, so the caller says how the pistons are. Either way dry friction carries what pressures, weight and hand
 leave over, so that the point is a balance of forces.
@@ -10,7 +10,7 @@ leave over, so that the point is a balance of forces.
   states. The falling part of Stribeck's curve, below about ``stribeck_speed``, is left out.
 
 Shut spools lie on a kink: opening fills a chamber from the supply, closing empties it to the atmosphere. The gain there is the
-mean of both (``duals``). An opening on one side of zero, however small, gives the gain of that side.
+mean of both (``derivatives``). An opening on one side of zero, however small, gives the gain of that side.
 """
 
 from pathlib import Path
@@ -18,18 +18,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from birthsim_env.physics import control_model, dynamics, geometry, mechanics, options
+from birthsim_env.physics import geometry, options
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
-from birthsim_env.physics.linear.duals import Dual, lifted
-from birthsim_env.physics.linear.model import LinearModel, OperatingPoint, Signal
-from birthsim_env.physics.plant import checked
+from birthsim_env.physics.gradients.tracing import call
+from birthsim_env.physics.linear.derivatives import derivatives_of
+from birthsim_env.physics.linear.model import Jacobians, LinearModel, OperatingPoint, Signal
+from birthsim_env.physics.mechanics import piston_force
+from birthsim_env.physics.plant import Plant, checked
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from birthsim_env.physics.rig.values import shown
 
 _UNITS = {"y": "m", "v": "m/s", "z": "m", "P": "Pa", "T": "K", "s": "1"}
 STATES = tuple(Signal(name, _UNITS[name[0]]) for name in at.STATE_NAMES)
+FURTHER = (
+    Signal("Ps", "Pa"), Signal("xh", "m"), Signal("yh", "m"), Signal("vxh", "m/s"), Signal("vyh", "m/s"),
+    *(Signal(f"q{chamber}_{way}", "kg/s") for way in ("in", "out") for chamber in ("1P", "1N", "2P", "2N")),
+)  # fmt: skip
+"""States of rigs with ``physics.options``: pressure at the valves, handle, flows at the chambers."""
 INPUTS = (*(Signal(name, "1") for name in ("u1P", "u1N", "u2P", "u2N")), Signal("Fx", "N"), Signal("Fy", "N"))
 """Opening that each spool goes to, and the hand's force."""
 OUTPUTS = (
@@ -72,15 +79,15 @@ def linearize(
 ) -> LinearModel:
     """The plant near rest at an end effector position ``pose`` (2,), m, as a ``LinearModel``; air is at ambient temperature.
 
+    A handle on a structure that bends is where it carries the hand's force. States of options that a rig has not are left out.
+
     ``pressures`` (4,), Pa absolute, of chambers P1, N1, P2, N2 (default: ``balanced_pressures``); ``openings`` (4,) of their
     spools; ``force`` (2,), N, of the hand; ``friction`` "stuck" or "sliding" (see above). Inputs are the openings that spools
     go to and the hand's force; deadband and hysteresis of the valves are left out. Raises ``ValueError`` for a pose outside the
-    workspace, pressures that the air cannot have or friction cannot hold, and rigs with ``physics.options``.
+    workspace, and pressures that the air cannot have or friction cannot hold.
     """
     rig = load_parameters(parameters)
     p = parameter_array(rig, 1)
-    if not options.are_off(p):
-        raise ValueError("linearize knows no supply line, tube or handle; allowed: a rig whose options are off")
     if friction not in ("stuck", "sliding"):
         raise ValueError(f"friction = {shown(friction)}; allowed: 'stuck', 'sliding'")
     piston = geometry.inverse_geometry(checked("pose", pose, (2,), "m"), rig)
@@ -97,7 +104,7 @@ def linearize(
     x[list(at.PRESSURES)] = np.clip(pressure, low * (1 + EDGE), high * (1 - EDGE))
     x[list(at.TEMPERATURES)] = p[at.TEMPERATURE, 0]
     x[list(at.SPOOLS)] = u
-    kept = np.ones(at.STATES, dtype=bool)
+    kept = np.repeat([True, *(p[[at.LINE, at.MODE_RATE, at.TUBE_RATE], 0] > 0.0)], [at.STATES, 1, 4, 8])
     has_bristle = p[at.LUGRE, 0] + p[at.ELASTO_PLASTIC, 0] > 0.5
     level = p[[at.FS1, at.FS2] if has_bristle else [at.FC1, at.FC2], 0]
     if friction == "sliding":
@@ -107,20 +114,49 @@ def linearize(
     load = geometry.joint_force([f[0], f[1] - p[at.MASS, 0] * p[at.GRAVITY, 0]], piston, rig)
     leans = friction == "sliding" or has_bristle
     x[[at.Z1, at.Z2]] = _left_over(x, load, p, level) / p[at.BRISTLE_S0, 0] if leans else 0.0
-    rates, outputs = _derivatives(x, u, f, p)
-    jacobian, measured = np.stack([r.gradient for r in rates])[kept], np.stack([r.gradient for r in outputs])
-    state, inputs = np.flatnonzero(kept), slice(at.STATES, None)
-    where = OperatingPoint(x, u, f, np.array([r.value for r in outputs]), np.array([r.value for r in rates]), friction)
-    names = tuple(signal for signal, keep in zip(STATES, kept, strict=True) if keep)
+    names = STATES
+    if kept[at.STATES :].any():
+        x, names = np.concatenate([x, _further(x, f, p)]), STATES + FURTHER
+    kept = kept[: len(x)]
+    found, slopes = derivatives_of(x[:, None], u[:, None], f[:, None], p)
+    jacobian, measured = slopes[0, : len(x)][kept], slopes[0, len(x) :]
+    state, inputs = np.flatnonzero(kept), slice(len(x), None)
+    where = OperatingPoint(x, u, f, found[len(x) :, 0], found[: len(x), 0], friction)
     matrices = jacobian[:, state], jacobian[:, inputs], measured[:, state], measured[:, inputs]
-    return LinearModel(*matrices, names, INPUTS, OUTPUTS, where)
+    return LinearModel(*matrices, tuple(names[k] for k in state), INPUTS, OUTPUTS, where)
+
+
+def linearize_lanes(plant: Plant, opening_command: ArrayLike, user_force: ArrayLike) -> Jacobians:
+    """The derivatives of N plants where they are, moving or at rest, under openings (4, N) and forces of the hand (2, N), N.
+
+    Along a trajectory its states are those of the lanes. Openings are those that spools go to. Raises ``ValueError`` for wrong
+    shapes and values that are not finite.
+    """
+    u = checked("opening_command", opening_command, (4, plant.num_envs), "1")
+    f = checked("user_force", user_force, (2, plant.num_envs), "N")
+    has_options = not options.are_off(plant.lane_parameters)
+    x = np.concatenate([plant.state, plant.memory[4:]]) if has_options else plant.state
+    found, slopes = derivatives_of(x, u, f, plant.lane_parameters)
+    first, last = slice(0, len(x)), slice(len(x), None)
+    matrices = slopes[:, first, first], slopes[:, first, last], slopes[:, last, first], slopes[:, last, last]
+    return Jacobians(*matrices, found[: len(x)], found[len(x) :])
+
+
+def _further(x: Array, f: Array, p: Array) -> Array:
+    """The further states of options (FURTHER,) at rest in a state (18,), where a handle carries the hand's force."""
+    further = np.empty((options.FURTHER, 1))
+    options.rest(x[:, None], p, further)
+    further[options.RESERVOIR] *= 1 - EDGE
+    if p[at.MODE_RATE, 0] > 0.0:
+        stiffness = p[at.HANDLE, 0] * p[at.MASS, 0] * p[at.MODE_RATE, 0] ** 2
+        further[options.HANDLE : options.HANDLE + 2, 0] += f / stiffness
+    return further[:, 0]
 
 
 def _left_over(x: Array, load: Array, p: Array, level: Array) -> Array:
     """What pressures leave of a load along the pistons (2,), N, to friction, (2,), N; refuses more than its ``level`` (2,)."""
     areas, pressures = p[[at.AREA_P1, at.AREA_N1, at.AREA_P2, at.AREA_N2], 0], x[list(at.PRESSURES)]
-    pushed = lifted(mechanics.piston_force)
-    left: Array = load + pushed(pressures[::2], pressures[1::2], areas[::2], areas[1::2], p[at.ATMOSPHERE, 0])
+    left: Array = load + call(piston_force, pressures[::2], pressures[1::2], areas[::2], areas[1::2], p[at.ATMOSPHERE, 0])
     rounding = 1e-9 * p[at.SUPPLY, 0] * areas[::2]
     if np.any(np.abs(left) > level + rounding):
         k = int(np.argmax(np.abs(left) - level))
@@ -129,33 +165,3 @@ def _left_over(x: Array, load: Array, p: Array, level: Array) -> Array:
             f"allowed: what friction holds, at most {level[k]:.4g} N either way"
         )
     return left
-
-
-def _derivatives(x: Array, u: Array, f: Array, p: Array) -> tuple[list[Dual], list[Dual]]:
-    """Rates (18) and outputs (12) with gradients with respect to the state, openings and force, (24,)."""
-    numbers = np.concatenate([x, u, f])
-    duals = [[Dual(float(number), row)] for number, row in zip(numbers, np.eye(len(numbers)), strict=True)]
-    state, command, force = (np.array(part, dtype=object) for part in (duals[:18], duals[18:22], duals[22:]))
-    own, rates = p.astype(object), np.zeros((at.STATES, 1), dtype=object)
-    lifted(dynamics.right_hand_side)(state, command, force, own, rates, 1)
-    nothing = np.zeros(len(numbers))
-    # Bristles of a law without any have the rate 0.0.
-    return [r if isinstance(r, Dual) else Dual(r, nothing) for r in rates[:, 0]], _outputs(state[:, 0], own[:, 0])
-
-
-def _outputs(x: Array, p: Array) -> list[Dual]:
-    """``OUTPUTS`` of a state of ``Dual``."""
-    names = (at.K1, at.K2, at.D_SQUARES, at.D_PRODUCT, at.SIN_GAMMA3, at.COS_GAMMA3)
-    _, r2, _, _, _, kappa, sine, cosine = lifted(geometry.pose)(x[at.Y1], x[at.Y2], *(p[name] for name in names))
-    velocity = -kappa * cosine * x[at.V1] + sine * x[at.V2], -kappa * sine * x[at.V1] - cosine * x[at.V2]
-    piston_force, stiffness = lifted(mechanics.piston_force), lifted(control_model.pneumatic_stiffness)
-    areas = (p[at.AREA_P1], p[at.AREA_N1]), (p[at.AREA_P2], p[at.AREA_N2])
-    lengths = [(half + y, half - y) for half, y in ((p[at.HALF_L1], x[at.Y1]), (p[at.HALF_L2], x[at.Y2]))]
-    pressures = (x[at.PP1], x[at.PN1]), (x[at.PP2], x[at.PN2])
-    return [
-        *(r2 * sine, -r2 * cosine, *velocity),
-        *(piston_force(*pressures[c], *areas[c], p[at.ATMOSPHERE]) for c in range(2)),
-        *(stiffness(*pressures[c], *areas[c], *lengths[c], p[at.INDEX]) for c in range(2)),
-        *pressures[0],
-        *pressures[1],
-    ]

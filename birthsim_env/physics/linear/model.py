@@ -38,6 +38,21 @@ class OperatingPoint:
             array.setflags(write=False)
 
 
+class Jacobians(NamedTuple):
+    """dx/dt = ``rates`` + A dx + B du and y = ``outputs`` + C dx + D du near the states of N lanes, SI units.
+
+    ``A`` (N, S, S), ``B`` (N, S, 6), ``C`` (N, 12, S), ``D`` (N, 12, 6), ``rates`` (S, N), ``outputs`` (12, N). The S states
+    are those of ``Plant.state`` and, of rigs with options, the further ones; inputs and outputs are those of a ``LinearModel``.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    rates: Array
+    outputs: Array
+
+
 @dataclass(frozen=True)
 class LinearModel:
     """dx/dt = A x + B u, y = C x + D u for deviations x, u, y from the operating point ``at``, SI units.
