@@ -158,5 +158,6 @@ class LinearQuadratic(TrackingController):
         second = regulator(mass, self.parameters.cylinder2.viscous_friction, 1.0, tolerances)
         # Six digits, which every processor's LAPACK gives alike.
         table = np.concatenate([np.array(first).T, np.repeat(second[:, None], SCHEDULE, axis=1)])
-        scheduled = {"lowest": low, "step": float(grid[1] - grid[0]), "table": np.array([float(f"{gain:.6g}") for gain in table.flat])}
+        rounded = np.array([float(f"{gain:.6g}") for gain in table.flat])
+        scheduled = {"lowest": low, "step": float(grid[1] - grid[0]), "table": rounded}
         return {**scheduled, "dead_zone": gains["dead_zone"], "pneumatic_gain": PNEUMATIC_GAIN}
