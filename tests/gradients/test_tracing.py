@@ -14,7 +14,8 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.gradients import source
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph
-from birthsim_env.physics.gradients.tracing import UntraceableError, call, empty, inputs
+from birthsim_env.physics.gradients.symbols import empty, inputs
+from birthsim_env.physics.gradients.tracing import UntraceableError, call
 
 LANES = 24
 

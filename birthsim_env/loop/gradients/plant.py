@@ -15,7 +15,7 @@ from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.compilation import BLOCK, kernel
 from birthsim_env.physics.compiled.lanes import PARAMETERS, STATES
 from birthsim_env.physics.geometry import end_effector_motion
-from birthsim_env.physics.gradients import tracing
+from birthsim_env.physics.gradients import symbols, tracing
 from birthsim_env.physics.gradients.graph import Graph
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
 from birthsim_env.physics.gradients.right_hand_side import INPUTS
@@ -65,8 +65,8 @@ def plant_adjoint(stage: Stage) -> Adjoint:
 def motion_traced() -> Traced:
     """What ``World.motion`` says of the state after a period."""
     graph = Graph()
-    rig, state = tracing.inputs(graph, "p", PARAMETERS), tracing.inputs(graph, "x", STATES)
-    motion = tracing.empty(4)
+    rig, state = symbols.inputs(graph, "p", PARAMETERS), symbols.inputs(graph, "x", STATES)
+    motion = symbols.empty(4)
     tracing.call(end_effector_motion, state, rig, motion)
     inputs = {row: rig[row, 0] for row in range(PARAMETERS)} | {STATE + row: state[row, 0] for row in range(STATES)}
     return Traced("motion", graph, inputs, {MOTION + row: motion[row, 0] for row in range(4)})

@@ -17,10 +17,10 @@ import numpy as np
 from birthsim_env.loop import stage as stages
 from birthsim_env.loop.rows import SEEN, WORLD
 from birthsim_env.loop.stage import Stage, address_of, layouts_of
-from birthsim_env.physics.gradients import source, tracing
+from birthsim_env.physics.gradients import source, symbols, tracing
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
-from birthsim_env.physics.gradients.tracing import Symbols, UntraceableError
+from birthsim_env.physics.gradients.tracing import UntraceableError
 
 HEAD = f"""{source.HEAD}from birthsim_env.loop.stage import block, scratch
 
@@ -118,7 +118,7 @@ class _Tables:
         name, shape = f"t{k}", self._tables[k].shape
         if name not in self.made:
             shape = (1, *shape[1:]) if lanes_first else (*shape[:-1], 1)
-            block = tracing.inputs(self._graph, name, math.prod(shape)).reshape(shape)
+            block = symbols.inputs(self._graph, name, math.prod(shape)).reshape(shape)
             self.made[name] = self._place(self._tables[k], lanes_first), block
         return self.made[name][1]
 
@@ -135,7 +135,7 @@ def _singles(tables: _Tables, k: int) -> Any:
     return tables.get(k, True)
 
 
-tracing.INSTEAD[stages.scratch] = tracing.empty
+tracing.INSTEAD[stages.scratch] = symbols.empty
 tracing.INSTEAD[stages.block] = tracing.INSTEAD[stages.numbers] = _block
 tracing.INSTEAD[stages.singles] = _singles
 for _kind in (stages.table1, stages.table2, stages.table3, stages.table4):
@@ -150,10 +150,10 @@ def trace(stage: Stage, memory: int, place: Callable[[Any, bool], int]) -> Trace
     """
     graph = Graph()
     sizes = {"w": (0, WORLD), "s": (WORLD, SEEN), "m": (memory, 0 if stage.memory is None else stage.memory.shape[0])}
-    blocks = {name: (first, tracing.inputs(graph, name, rows)) for name, (first, rows) in sizes.items()}
+    blocks = {name: (first, symbols.inputs(graph, name, rows)) for name, (first, rows) in sizes.items()}
     tables = _Tables(graph, stage.tables, place)
     layouts: list[Any] = layouts_of(stage.function)
-    constants = np.array([*stage.constants], dtype=object).view(Symbols)
+    constants = np.array([*stage.constants], dtype=object).view(symbols.Symbols)
     handed = (*(block for _, block in blocks.values()), constants, tables, 0, 1)
     arguments = [
         value if k in (5, 6) or value is tables else layouts[k](value) if layouts[k] else _Place(value)

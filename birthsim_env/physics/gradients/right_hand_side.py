@@ -11,7 +11,8 @@ from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.graph import Graph, Value
 from birthsim_env.physics.gradients.source import HEAD, loop, module_of
-from birthsim_env.physics.gradients.tracing import call, empty, inputs
+from birthsim_env.physics.gradients.symbols import empty, inputs
+from birthsim_env.physics.gradients.tracing import call
 
 RIG = tuple(row for row in range(at.DEADBAND) if row not in (at.LUGRE, at.ELASTO_PLASTIC))
 """Rows of the parameters that there are gradients to: all of a rig without options and with valves that open as commanded."""
