@@ -17,7 +17,8 @@ from birthsim_env.physics.geometry import end_effector_motion
 from birthsim_env.physics.gradients.derivatives import reverse
 from birthsim_env.physics.gradients.evaluated import evaluated
 from birthsim_env.physics.gradients.graph import Graph, Scalar
-from birthsim_env.physics.gradients.tracing import call, empty, inputs
+from birthsim_env.physics.gradients.symbols import empty, inputs
+from birthsim_env.physics.gradients.tracing import call
 
 KINKED = (at.V1, at.V2, *at.SPOOLS)
 """States that may stand on a kink: dry friction and orifices."""
