@@ -226,7 +226,7 @@ learned: $(READY)
 	$(BIN)/birthsim explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	cp $(OUT)/learned/explain/correction.png docs/
-	cp $(OUT)/studies/learned/learning_curves.png docs/
+	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/learned/from_scratch.png docs/
 
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch

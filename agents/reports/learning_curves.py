@@ -86,6 +86,22 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
         return save(figure, folder, "learning_curves")
 
 
+def draw_side_by_side(trainings: dict[str, Sequence[dict[str, Any]]], folder: Path, name: str) -> list[Path]:
+    """Draw pooled errors of the trainings of each algorithm over policy steps and over wall time (``name``, PNG and SVG)."""
+    with plt.rc_context(STYLE):
+        figure, panels = plt.subplots(1, 2, figsize=(7.4, 3.0), layout="constrained", sharey=True)
+        for axes, (measure, label) in zip(panels, (("steps", "policy steps"), ("seconds", "time (s)")), strict=True):
+            for color, (algorithm, own) in zip((ACCENT, MIDDLE), trainings.items(), strict=True):
+                for training in own:
+                    points = training["curve"][1:]
+                    at, error = ([_number(point[key]) for point in points] for key in (measure, "pooled_mm"))
+                    axes.plot(at, error, color=color, lw=1.0, label=algorithm if training is own[0] else None)
+            axes.set(xscale="log", yscale="log", xlabel=label)
+        panels[0].set_ylabel(dict(FIGURES)["pooled_mm"])
+        legend_below(figure, *panels[0].get_legend_handles_labels())
+        return save(figure, folder, name)
+
+
 def _number(value: float | None) -> float:
     """JSON has null for what is not finite."""
     return float("nan") if value is None else float(value)

@@ -154,10 +154,13 @@ def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
 
 def _pictures(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
-    from agents.reports.learning_curves import draw_learning_curves, learning_curves
+    from agents.reports.learning_curves import draw_learning_curves, draw_side_by_side, learning_curves
 
     draw_learning_curves(learning_curves(policy_folders("circle")), folder)
-    return [folder / "learning_curves.png"]
+    from_scratch = {"gradients": "circle_apg", "PPO": "circle_pure"}
+    curves = {algorithm: learning_curves(policy_folders(name)) for algorithm, name in from_scratch.items()}
+    draw_side_by_side(curves, folder, "from_scratch")
+    return [folder / "learning_curves.png", folder / "from_scratch.png"]
 
 
 STUDY = Study(
