@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from baselines.identification.prediction import around, given
 from baselines.identification.quantities import LATENCY, Quantity, value_of
 from baselines.identification.windows import FREE, Windows, admitted_openings, spools_at
+from birthsim_env.loop.signals import Point
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import kernel
@@ -20,6 +21,9 @@ from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, RIG
 from birthsim_env.physics.gradients.steps import GENERATED as GENERATED
 from birthsim_env.physics.gradients.steps import SLOPES, SPAN, integrate_tangents, load_whole, terms_of
 from birthsim_env.physics.rig.parameters import Parameters
+
+PLACES = len(at.PRESSURES)
+"""Where positions follow pressures."""
 
 
 def sensitivities(
@@ -46,13 +50,13 @@ def sensitivities(
         seeds[places[:, 3], places[:, 2]], tracks[:, :, 0], moved,
     )  # fmt: skip
     late = np.full(len(tangents), rig.electronics.position_latency / trial.period)
-    low, high, part = around(windows, moved[:, 4:], late)
+    low, high, part = around(windows, moved[:, PLACES:], late)
     positions = low + part * (high - low)
     for d, one in enumerate(quantities, len(FREE)):
         if one.name == LATENCY:
             low, high, _ = around(windows, tracks, late[:1])
             positions[d] = (low - high)[0] * one.slope(value_of(rig, LATENCY)) / trial.period
-    return moved[:-1, :4].transpose(2, 3, 0, 1), positions
+    return moved[:-1, :PLACES].transpose(2, 3, 0, 1), positions
 
 
 def _by_coordinates(rig: Parameters, quantities: tuple[Quantity, ...]) -> Array:
@@ -77,7 +81,7 @@ def _track_tangents(
     x, u, f = np.empty((at.STATES, SPAN)), np.empty((4, SPAN)), np.empty((2, SPAN))
     p, j, out = np.empty((at.PARAMETERS, SPAN)), np.empty((SLOPES + at.STATES, SPAN)), np.empty((at.STATES, SPAN))
     total, trial, seeds = np.empty((at.STATES, SPAN)), np.empty((at.STATES, SPAN)), np.empty((len(places), SPAN))
-    by_y, count = np.empty((2, 4, SPAN)), len(along)
+    by_y1, by_y2, count = Point(np.empty((Point.size, SPAN))), Point(np.empty((Point.size, SPAN))), len(along)
     periods, steps = tracks.shape[0] - 1, int(clock.steps)
     s, late = np.empty((count, at.STATES, SPAN)), np.empty((count, at.STATES, SPAN))
     further = np.empty((count, at.STATES, SPAN))
@@ -93,20 +97,22 @@ def _track_tangents(
         for k in range(periods + 1):
             # The velocity of a piston that alone moves at 1 m/s is a column of the Jacobian.
             copy(x, trial, n)
-            for piston in range(2):
-                for i in range(n):
-                    trial[at.V1, i], trial[at.V2, i] = 1.0 - piston, 1.0 * piston
-                end_effector_motion(trial[:, :n], p[:, :n], by_y[piston, :, :n])
+            for i in range(n):
+                trial[at.V1, i], trial[at.V2, i] = 1.0, 0.0
+            end_effector_motion(trial[:, :n], p[:, :n], by_y1.rows[:, :n])
+            for i in range(n):
+                trial[at.V1, i], trial[at.V2, i] = 0.0, 1.0
+            end_effector_motion(trial[:, :n], p[:, :n], by_y2.rows[:, :n])
             for axis in range(2):
                 for i in range(n):
-                    tracks[k, axis, first + i] = by_y[0, axis, i]
+                    tracks[k, axis, first + i] = by_y1.position[axis, i]
             for d in range(count):
                 for i in range(n):
                     for chamber in range(4):
                         moved[k, chamber, d, first + i] = s[d, at.PRESSURES[chamber], i]
                     for axis in range(2):
-                        moved[k, 4 + axis, d, first + i] = (
-                            by_y[0, 2 + axis, i] * s[d, at.Y1, i] + by_y[1, 2 + axis, i] * s[d, at.Y2, i]
+                        moved[k, PLACES + axis, d, first + i] = (
+                            by_y1.velocity[axis, i] * s[d, at.Y1, i] + by_y2.velocity[axis, i] * s[d, at.Y2, i]
                         )
             if k < periods:
                 given(openings, forces, rows, first, k, u, f, n)
