@@ -1,7 +1,7 @@
 """Learning curves of several training seeds: interquartile mean and 95 % bootstrap interval over the seeds."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +86,7 @@ def draw_learning_curves(trainings: Sequence[dict[str, Any]], folder: Path) -> l
         return save(figure, folder, "learning_curves")
 
 
-def draw_side_by_side(trainings: dict[str, Sequence[dict[str, Any]]], folder: Path, name: str) -> list[Path]:
+def draw_side_by_side(trainings: Mapping[str, Sequence[dict[str, Any]]], folder: Path, name: str) -> list[Path]:
     """Draw pooled errors of the trainings of each algorithm over policy steps and over wall time (``name``, PNG and SVG)."""
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(1, 2, figsize=(7.4, 3.0), layout="constrained", sharey=True)

@@ -15,17 +15,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from baselines.identification.noise import guessed_noise, noise_from
 from baselines.identification.quantities import QUANTITIES, Quantity, coordinates, limits, rig_at
-from baselines.identification.starts import (
-    Noise,
-    Slopes,
-    begun_anew,
-    derivatives,
-    outliers,
-    predicted,
-    settle,
-    slopes_at,
-    slopes_of,
-)
+from baselines.identification.starts import Noise, Slopes, begun_anew, outliers, predicted, settle, slopes_at
 from baselines.identification.trial import Trial
 from baselines.identification.windows import FREE, Windows, cut
 from birthsim_env.physics.compiled.lanes import Array
@@ -43,6 +33,9 @@ MOST = (25, 30)
 TOLERANCE = 1e-7
 """A search ends where a step lowers the cost, or moves the coordinates, by less than this fraction. The cost is some 3e4, of
 which 0.5 is a standard deviation: where friction hardly falls near rest the valley is flat, and 1e-5 would end half way."""
+
+DIFFERENCE = 1e-5
+"""Step of forward differences, in coordinates: rounding of the residuals, 1e-9, leaves 1e-4 of a derivative."""
 
 MOVED, MOST_ROUNDS = 0.05, 3
 """A search is repeated where noise moves by more than this fraction, or the latency by half a period; so many at most."""
@@ -89,12 +82,13 @@ class Problem:
         return np.concatenate([self.settled(theta)[1].ravel(), (theta - self.centre) / self.spread])
 
     def jacobian(self, theta: Array) -> Array:
-        """Their derivatives, (W (R + 14) + Q, Q), less what the start states make up for."""
-        self._start, _ = self.settled(theta)
-        rig = self.rig_at(theta)
-        by_start, by_rig = derivatives(self.windows, self.noise, rig, self._start, self.quantities)
-        self.slopes = slopes_of(by_start)
-        self.derivatives = self.slopes.unexplained(by_rig)
+        """Their derivatives, (W (R + 14) + Q, Q), less what the start states make up for: one lane a parameter and window."""
+        self._start, residual = self.settled(theta)
+        self.slopes = slopes_at(self.windows, self.noise, self.rig_at(theta), self._start)
+        moved = theta + DIFFERENCE * np.eye(len(theta))
+        rigs = [self.rig_at(one) for one in moved]
+        found = predicted(self.windows, self.noise, rigs, np.repeat(self._start[None], len(rigs), axis=0))
+        self.derivatives = self.slopes.unexplained(((found - residual) / DIFFERENCE).transpose(1, 2, 0))
         return np.concatenate([self.derivatives.reshape(-1, len(theta)), np.diag(1.0 / self.spread)])
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from baselines.identification.windows import Windows, admitted_openings, spools_at
 from birthsim_env.loop.world import Clock
 from birthsim_env.physics.compiled import lanes as at
-from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
+from birthsim_env.physics.compiled.compilation import BLOCK, kernel
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
 from birthsim_env.physics.dynamics import integrate, load, settle, steps_in, store
 from birthsim_env.physics.geometry import end_effector_motion
@@ -33,8 +33,7 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
     states, openings = states.copy(), admitted_openings(trial, columns[:, 0])
     for rate in np.unique(columns[at.SPOOL_RATE]):
         lanes = np.flatnonzero(columns[at.SPOOL_RATE] == rate)
-        spools, _ = spools_at(openings, trial.period, windows.starts, float(rate))
-        states[np.ix_(np.array(at.SPOOLS), lanes)] = spools[:, None]
+        states[np.ix_(np.array(at.SPOOLS), lanes)] = spools_at(openings, trial.period, windows.starts, float(rate))[:, None]
     pressures = np.empty((len(rigs), count, windows.length, 4))
     positions = np.empty((len(rigs), count, *windows.positions.shape[1:]))
     at_once = max(1, LANES // count)
@@ -52,19 +51,6 @@ def predict(windows: Windows, rigs: Sequence[Parameters], states: Array) -> tupl
         pressures[part] = shaped[:-1, :4].transpose(2, 3, 0, 1)
         positions[part] = _shown(windows, shaped[:, 4:], late[part])
     return pressures, positions, states
-
-
-@helper
-def given(
-    openings: Array, forces: Array, rows: NDArray[np.int64], first: int, k: int, u: Array, f: Array, n: int
-) -> None:  # fmt: skip
-    """Writes openings (4, n) and force (2, n) of period ``k`` of n lanes from ``first`` on."""
-    for i in range(n):
-        row = rows[first + i] + k
-        for valve in range(4):
-            u[valve, i] = openings[valve, row]
-        for axis in range(2):
-            f[axis, i] = forces[axis, row]
 
 
 @kernel
@@ -89,23 +75,22 @@ def _track(
                 for axis in range(2):
                     tracks[k, 4 + axis, first + i] = motion[axis, i]
             if k < periods:
-                given(openings, forces, rows, first, k, u, f, n)
+                for i in range(n):
+                    row = rows[first + i] + k
+                    for valve in range(4):
+                        u[valve, i] = openings[valve, row]
+                    for axis in range(2):
+                        f[axis, i] = forces[axis, row]
                 integrate(x, u, f, p, steps, clock.period / steps, hit, dx, total, trial, n)
                 settle(x, n)
         store(x, first, n, state)
 
 
-def around(windows: Windows, tracks: Array, late: Array) -> tuple[Array, Array, Array]:
-    """What arrives of tracks (K + 1, 2, V, W), ``late`` (V,) periods earlier: the positions (V, W, F, 2) before and after the
-    instant, and how far it is between them (V, W, F, 1)."""
+def _shown(windows: Windows, tracks: Array, late: Array) -> Array:
+    """Positions (V, W, F, 2) that arrive: of tracks (K + 1, 2, V, W), ``late`` (V,) periods earlier, straight in between."""
     when = windows.arrived - late[:, None, None]
     before = np.clip(np.floor(when), 0, windows.length - 1).astype(np.intp)
+    part = (when - before)[..., None]
     variant, window = np.arange(len(late))[:, None, None], np.arange(len(windows.starts))[:, None]
     low, high = (tracks[before + one, :, variant, window] for one in (0, 1))
-    return low, high, (when - before)[..., None]
-
-
-def _shown(windows: Windows, tracks: Array, late: Array) -> Array:
-    """Positions (V, W, F, 2) that arrive, straight in between."""
-    low, high, part = around(windows, tracks, late)
     return np.asarray(low + part * (high - low))

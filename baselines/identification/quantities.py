@@ -27,10 +27,6 @@ class Quantity:
         """The coordinate of a value."""
         return value / self.unit if self.unit else math.log(max(value - self.floor, 1e-12))
 
-    def slope(self, value: float) -> float:
-        """The derivative of the value to its coordinate, at a value."""
-        return self.unit or value - self.floor
-
     def value(self, coordinate: float) -> float:
         """The value at a coordinate."""
         return coordinate * self.unit if self.unit else self.floor + math.exp(coordinate)
@@ -63,7 +59,7 @@ FURTHEST = 3.5
 """Spreads from the owner's value within which a parameter is looked for."""
 
 INSIDE = 1e-3
-"""Coordinates by which the search stays within what the rig's description allows."""
+"""Coordinates by which the search stays within what the rig's description allows, more than a step of differences."""
 
 
 def limits(rig: Parameters, quantities: tuple[Quantity, ...]) -> tuple[Array, Array]:

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.identification.prediction import predict
-from baselines.identification.quantities import Quantity
-from baselines.identification.sensitivities import sensitivities
 from baselines.identification.windows import FREE, Windows
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.lanes import Array, parameter_column
@@ -22,6 +20,9 @@ from birthsim_env.physics.rig.parameters import Parameters
 
 SPREAD = np.array([5e-3, 0.1, 5e-3, 0.1, 2e-4, 2e-4, *[2e4] * 4, *[12.0] * 4])
 """m, m/s, m, m/s, bristles m, Pa, K: standard deviations of a start state about its guess, assumed."""
+
+DIFFERENCE = 1e-4
+"""Step of differences, in ``SPREAD``."""
 
 CLOSE = 3e-3
 """Where a step moves every window's start by less than this many standard deviations the search ends."""
@@ -46,11 +47,12 @@ class Noise:
     position: float
 
 
-def over_noise(windows: Windows, noise: Noise, pressures: Array, positions: Array) -> Array:
-    """Pressures (V, W, K, 4), then positions (V, W, F, 2) that have arrived, over the noise, (V, W, R)."""
+def residuals(windows: Windows, noise: Noise, pressures: Array, positions: Array) -> Array:
+    """Measured less predicted, over the noise, (V, W, R): pressures (V, W, K, 4), then positions (V, W, F, 2)."""
     shape = (*pressures.shape[:2], -1)
-    second = np.where(windows.valid[..., None], positions / noise.position, 0.0)
-    return np.concatenate([(pressures / noise.pressure).reshape(shape), second.reshape(shape)], axis=2)
+    first = (windows.pressures - pressures) / noise.pressure
+    second = np.where(windows.valid[..., None], (windows.positions - positions) / noise.position, 0.0)
+    return np.concatenate([first.reshape(shape), second.reshape(shape)], axis=2)
 
 
 def states_of(windows: Windows, free: Array) -> Array:
@@ -61,23 +63,9 @@ def states_of(windows: Windows, free: Array) -> Array:
 
 
 def predicted(windows: Windows, noise: Noise, rigs: list[Parameters], free: Array) -> Array:
-    """Residuals (V, W, R + 14), measured less predicted, for V rigs and free start states (V, W, 14)."""
+    """Residuals (V, W, R + 14) for V rigs and free start states (V, W, 14)."""
     pressures, positions, _ = predict(windows, rigs, states_of(windows, free))
-    measured = over_noise(windows, noise, windows.pressures - pressures, windows.positions - positions)
-    return np.concatenate([measured, -free], axis=2)
-
-
-def derivatives(
-    windows: Windows, noise: Noise, rig: Parameters, free: Array, quantities: tuple[Quantity, ...] = ()
-) -> tuple[Array, Array]:  # fmt: skip
-    """Of the residuals, (W, R + 14, 14) to the free start states (W, 14), and (W, R + 14, Q) to coordinates of a rig."""
-    count = len(FREE)
-    found = over_noise(windows, noise, *sensitivities(windows, rig, states_of(windows, free[None])[:, 0], quantities))
-    found[:count] *= SPREAD[:, None, None]
-    own = np.zeros((*found.shape[:2], count))
-    own[np.arange(count), :, np.arange(count)] = 1.0
-    columns = np.ascontiguousarray(-np.concatenate([found, own], axis=2).transpose(1, 2, 0))
-    return columns[..., :count], columns[..., count:]
+    return np.concatenate([residuals(windows, noise, pressures, positions), -free], axis=2)
 
 
 @dataclass(frozen=True)
@@ -107,16 +95,21 @@ class Slopes:
         return np.asarray(columns - self.basis @ self.explained(columns))
 
 
-def slopes_of(columns: Array) -> Slopes:
-    """The slopes of derivatives (W, R + 14, 14) to start states."""
-    # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
-    triangle = np.linalg.cholesky(columns.transpose(0, 2, 1) @ columns).transpose(0, 2, 1)
-    return Slopes(np.asarray(columns @ np.linalg.inv(triangle)), np.asarray(triangle))
-
-
 def slopes_at(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> Slopes:
     """The slopes at start states ``free`` (W, 14)."""
-    return slopes_of(derivatives(windows, noise, rig, free)[0])
+    return Slopes(*_slopes(windows, noise, rig, free))
+
+
+def _slopes(windows: Windows, noise: Noise, rig: Parameters, free: Array) -> tuple[Array, Array]:
+    count = len(FREE)
+    several = np.repeat(free[None], 1 + count, axis=0)
+    several[1:] += DIFFERENCE * np.eye(count)[:, None]
+    found = predicted(windows, noise, [rig] * (1 + count), several)
+    slopes = np.ascontiguousarray((found[1:] - found[0]).transpose(1, 2, 0)) / DIFFERENCE
+    # Cholesky's triangle is that of QR in a tenth of the time; the rows of ``SPREAD`` keep the matrix well conditioned.
+    triangle = np.linalg.cholesky(slopes.transpose(0, 2, 1) @ slopes).transpose(0, 2, 1)
+    basis = slopes @ np.linalg.inv(triangle)
+    return np.asarray(basis, dtype=np.float64), np.asarray(triangle, dtype=np.float64)
 
 
 def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes: Slopes | None) -> tuple[Array, Array]:
@@ -141,8 +134,7 @@ def settle(windows: Windows, noise: Noise, rig: Parameters, free: Array, slopes:
         scale[left] = np.where(better, np.minimum(1.0, 2.0 * scale[left]), 0.25 * scale[left])
         slow = ~(slopes.step(residual[left])[1] < SHRINKS * length)
         if slow.any():
-            new = slopes_at(part.some(slow), noise, rig, free[left[slow]])
-            slopes.basis[slow], slopes.triangle[slow] = new.basis, new.triangle
+            slopes.basis[slow], slopes.triangle[slow] = _slopes(part.some(slow), noise, rig, free[left[slow]])
     return free, residual
 
 

@@ -113,18 +113,14 @@ def _parabola(times: Array, values: Array) -> tuple[float, float]:
     return float(found[0]), float(found[1] / scale)
 
 
-def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: float) -> tuple[Array, Array]:
-    """Openings of the spools (4, W) at rows ``starts`` and their derivatives to the ``rate``, s: the integrator's answer to the
-    openings (4, T) before, from rest, of spools of a ``rate``, 1/s."""
+def spools_at(openings: Array, period: float, starts: NDArray[np.intp], rate: float) -> Array:
+    """Openings of the spools (4, W) at rows ``starts``: the integrator's answer to the openings (4, T) before, from rest, of
+    spools of a ``rate``, 1/s."""
     steps = steps_in(period)
     h = period / steps * rate
-    left = 1.0 - h * (1.0 - h * (0.5 - h * (1.0 / 6.0 - h / 24.0)))
-    kept = left**steps
-    slope = -period * left ** (steps - 1) * (1.0 - h * (1.0 - h * (0.5 - h / 6.0)))
+    kept = (1.0 - h * (1.0 - h * (0.5 - h * (1.0 / 6.0 - h / 24.0)))) ** steps
     before = np.concatenate([np.zeros((4, 1)), openings[:, :-1]], axis=1)
-    spools = lfilter([1.0 - kept], [1.0, -kept], before, axis=1)
-    late = np.concatenate([np.zeros((4, 1)), spools[:, :-1]], axis=1)
-    return spools[:, starts], lfilter([slope], [1.0, -kept], late - before, axis=1)[:, starts]
+    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], before, axis=1)[:, starts])
 
 
 def admitted_openings(trial: Trial, column: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Reverse mode on a graph: the operations of a vector-Jacobian product are appended to it.
+"""Reverse and forward mode on a graph: the operations of a vector-Jacobian or a Jacobian-vector product are appended to it.
 
 At kinks derivatives are one-sided: of a tie in ``max(a, b)`` or ``min(a, b)`` they are those of ``a``, of ``abs(0)`` that of
 its negative side; the square root of 0 has slope 0. So a spool at zero opens both of its orifices, either of which it can.
@@ -8,13 +8,15 @@ What a converter rounds passes as it is (straight through).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
 
 Term = tuple[Any, Scalar]
 """An argument of a node, and a number times the node's derivative to it."""
+
+ONE = 1.0
 
 
 def _divided(graph: Graph, y: Value, a: Any, b: Any, g: Scalar) -> list[Term]:
@@ -81,3 +83,24 @@ def reverse(graph: Graph, outputs: Iterable[tuple[Scalar, Scalar]], sources: lis
             for argument, what in _terms(graph, k, bars[k], active):
                 add(argument, what)
     return [bars.get(value.at, 0.0) for value in sources]
+
+
+def forward(graph: Graph, outputs: Iterable[Scalar], seeds: Mapping[Value, Scalar]) -> list[Scalar]:
+    """Tangents of ``outputs`` for tangents ``seeds`` of the sources."""
+    active = graph.depends(list(seeds))
+    dots: dict[int, Scalar] = {value.at: seed for value, seed in seeds.items()}
+
+    def of(value: Any) -> Scalar:
+        return dots.get(value.at, 0.0) if isinstance(value, Value) else 0.0
+
+    for k in range(len(active)):
+        if active[k] and k not in dots:
+            operation, *arguments = graph.nodes[k]
+            if operation in ("where", "max", "min"):
+                a, b = arguments[-2:]
+                condition = arguments[0] if operation == "where" else a >= b if operation == "max" else a <= b
+                dots[k] = graph.select(condition, of(a), of(b))
+            else:
+                parts = [of(a) if slope is ONE else slope * of(a) for a, slope in _terms(graph, k, ONE, active)]
+                dots[k] = sum(parts[1:], parts[0])
+    return [of(value) for value in outputs]

@@ -74,14 +74,13 @@ def jvp(plant: Plant, command: Array, forces: Array, duration: float, along: Der
     require_plain(plant)
     held = duration / len(forces)
     count = dynamics.steps_in(held)
-    tangent, seeded = np.zeros((1, EVERY, plant.num_envs)), np.full((1, EVERY), along.rig is not None)
-    tangent[0, : at.STATES], tangent[0, at.STATES : INPUTS - 2], seeded[:, :INPUTS] = along.state, along.opening, True
+    tangent = np.zeros((EVERY, plant.num_envs))
+    tangent[: at.STATES], tangent[at.STATES : INPUTS - 2] = along.state, along.opening
     if along.rig is not None:
-        tangent[0, INPUTS:] = along.rig[list(RIG)]
-    by_force = np.ascontiguousarray(np.broadcast_to(along.force, forces.shape))[:, None]
-    how = count, held / count, tangent, by_force, *steps.terms_of(seeded)
-    steps.advance_tangents(plant.state, command, forces, plant.lane_parameters, *how)
-    return tangent[0, : at.STATES]
+        tangent[INPUTS:] = along.rig[list(RIG)]
+    by_force = np.ascontiguousarray(np.broadcast_to(along.force, forces.shape))
+    steps.advance_tangent(plant.state, command, forces, plant.lane_parameters, count, held / count, tangent, by_force)
+    return tangent[: at.STATES]
 
 
 def _spread(result: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Runge-Kutta steps differentiated: kernels over lanes that walk a tape of states back, or carry tangents along.
+"""Runge-Kutta steps differentiated: kernels over lanes that walk a tape of states back, or carry a tangent along.
 
 The tape has the state before every step; going back, the three trial states of a step are computed again, with the same bits.
 What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
@@ -7,25 +7,19 @@ What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.compiled.compilation import BLOCK, helper, kernel
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
-from birthsim_env.physics.gradients.right_hand_side import ENTRIES, EVERY, INPUTS, made
+from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
 
 STAGES = 4
-SLOPES = len(ENTRIES)
-SPAN, VECTOR = 8, 4
-"""Lanes that tangents are carried along for at once: those of thirty directions stay in the second-level cache. Their number is
-rounded up to whole vectors, where the last lane repeats."""
-adjoint, adjoint_rig, slopes, slopes_rig, carry = made.adjoint, made.adjoint_rig, made.slopes, made.slopes_rig, made.carry
+adjoint, adjoint_rig, tangent_rig = made.adjoint, made.adjoint_rig, made.tangent_rig
 
 
 @helper
@@ -159,107 +153,47 @@ def backward(
         store(total, first, n, result)
 
 
-class Terms(NamedTuple):
-    """What openings, force and parameters add to the rates of D tangents.
-
-    Of M terms, ``places`` (M, 4): entry of ``ENTRIES``, rate, source, tangent; those of tangent d end before ``ends[d]`` (D,).
-    """
-
-    places: NDArray[np.int64]
-    ends: NDArray[np.int64]
-
-
-def terms_of(along: NDArray[np.bool_]) -> Terms:
-    """The terms of tangents (D, EVERY) that are True where they are not zero."""
-    others = [(k, rate, source) for k, (rate, source) in enumerate(ENTRIES) if source >= at.STATES]
-    places = [(*other, d) for d, one in enumerate(along) for other in others if one[other[2]]]
-    found = np.array(places, dtype=np.int64).reshape(-1, 4)
-    return Terms(found, np.searchsorted(found[:, 3], np.arange(len(along)), side="right"))
-
-
 @helper
-def load_whole(source: Array, first: int, n: int, scratch: Array) -> int:
-    """``load`` of whole vectors; returns their lanes, at most ``SPAN``."""
-    whole = -(-n // VECTOR) * VECTOR
-    for row in range(source.shape[0]):
-        for i in range(whole):
-            scratch[row, i] = source[row, first + min(i, n - 1)]
-    return whole
-
-
-@helper
-def integrate_tangents(
-    x: Array, u: Array, f: Array, p: Array, s: Array, places: NDArray[np.int64], ends: NDArray[np.int64], seeds: Array,
-    steps: int, step: float, j: Array, out: Array, total: Array, trial: Array, late: Array, moved: Array, n: int,
-) -> None:  # fmt: skip
-    """``dynamics.integrate`` of a state ``x`` (18, n) and of its tangents ``s`` (D, 18, n).
-
-    ``seeds`` (M, n) are the tangents of the sources of ``Terms``. Scratch: ``j`` (SLOPES + 18, n), ``out``, ``total``,
-    ``trial`` (18, n), ``late``, ``moved`` (D, 18, n).
-    """
-    rig = False
-    for m in range(len(places)):
-        rig = rig or places[m, 2] >= INPUTS
-    for _ in range(steps):
-        dynamics.copy(x, total, n)
-        dynamics.copy(x, trial, n)
-        for d in range(s.shape[0]):
-            dynamics.copy(s[d], late[d], n)
-            dynamics.copy(s[d], moved[d], n)
-        for stage in range(STAGES):
-            weight, ahead = weight_of(stage, step), ahead_of(stage, step)
-            slopes(trial, u, f, p, j, n)
-            if rig:
-                slopes_rig(trial, u, f, p, j, n)
-            dynamics.stage(x, j[SLOPES:], total, trial, n, weight, ahead)
-            first = 0
-            for d in range(s.shape[0]):
-                carry(j, moved[d], out, n)
-                for m in range(first, ends[d]):
-                    for i in range(n):
-                        out[places[m, 1], i] += j[places[m, 0], i] * seeds[m, i]
-                first = ends[d]
-                dynamics.stage(s[d], out, late[d], moved[d], n, weight, ahead)
-        dynamics.copy(total, x, n)
-        for d in range(s.shape[0]):
-            dynamics.copy(late[d], s[d], n)
+def move(
+    x: Array, s: Array, out: Array, x0: Array, s0: Array, total: Array, late: Array, weight: float, ahead: float, n: int
+) -> None:
+    """A stage of state and tangent together; ``out`` (36, n) has the rates of the tangent and then those of the state."""
+    for row in range(at.STATES):
+        for i in range(n):
+            total[row, i] += weight * out[at.STATES + row, i]
+            late[row, i] += weight * out[row, i]
+            x[row, i] = x0[row, i] + ahead * out[at.STATES + row, i]
+            s[row, i] = s0[row, i] + ahead * out[row, i]
 
 
 @kernel
-def advance_tangents(
-    state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, along: Array, by_force: Array,
-    places: NDArray[np.int64], ends: NDArray[np.int64],
-) -> None:  # fmt: skip
-    """Integrates ``state`` (18, N) as ``dynamics.advance`` and, in their first 18 rows, its tangents ``along`` (D, EVERY, N).
+def advance_tangent(
+    state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, along: Array, by_force: Array
+) -> None:
+    """Integrates ``state`` (18, N) as ``dynamics.advance`` and, in its first 18 rows, its tangent ``along`` (EVERY, N).
 
-    The other rows are tangents of openings, force and rig, and ``by_force`` (K, D, 2, N) those of the force's samples;
-    ``places`` and ``ends`` are of ``Terms``.
+    The other rows are tangents of openings and rig; ``by_force`` (K, 2, N) is that of the force.
     """
-    x, u, f = np.empty((at.STATES, SPAN)), np.empty((4, SPAN)), np.empty((2, SPAN))
-    p, j, out = np.empty((at.PARAMETERS, SPAN)), np.empty((SLOPES + at.STATES, SPAN)), np.empty((at.STATES, SPAN))
-    total, trial, seeds = np.empty((at.STATES, SPAN)), np.empty((at.STATES, SPAN)), np.empty((len(places), SPAN))
-    count = len(along)
-    s, late = np.empty((count, at.STATES, SPAN)), np.empty((count, at.STATES, SPAN))
-    moved = np.empty((count, at.STATES, SPAN))
-    for first in range(0, state.shape[1], SPAN):
-        n = min(SPAN, state.shape[1] - first)
-        whole = load_whole(state, first, n, x)
-        load_whole(command, first, n, u)
-        load_whole(parameters, first, n, p)
-        for d in range(count):
-            load_whole(along[d, : at.STATES], first, n, s[d])
-        for k in range(forces.shape[0]):
-            load_whole(forces[k], first, n, f)
-            for m in range(len(places)):
-                source, d = places[m, 2], places[m, 3]
-                of_hand = INPUTS - 2 <= source < INPUTS
-                for i in range(whole):
-                    lane = first + min(i, n - 1)
-                    seeds[m, i] = by_force[k, d, source - INPUTS + 2, lane] if of_hand else along[d, source, lane]
-            integrate_tangents(
-                x, u, f, p, s, places, ends, seeds, steps, step, j, out, total, trial, late, moved, whole
-            )  # fmt: skip
+    x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
+    p, s, out = np.empty((at.PARAMETERS, BLOCK)), np.empty((EVERY, BLOCK)), np.empty((2 * at.STATES, BLOCK))
+    x0, s0 = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK))
+    total, late = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK))
+    for first in range(0, state.shape[1], BLOCK):
+        n = min(BLOCK, state.shape[1] - first)
+        load(state, first, n, x)
+        load(command, first, n, u)
+        load(parameters, first, n, p)
+        load(along, first, n, s)
+        for k in range(steps * forces.shape[0]):
+            load(forces[k // steps], first, n, f)
+            load(by_force[k // steps], first, n, s[INPUTS - 2 : INPUTS])
+            for kept, now in ((x0, x), (s0, s), (total, x), (late, s)):
+                dynamics.copy(now, kept, n)
+            for stage in range(STAGES):
+                tangent_rig(x, u, f, p, s, out, n)
+                move(x, s, out, x0, s0, total, late, weight_of(stage, step), ahead_of(stage, step), n)
+            dynamics.copy(total, x, n)
+            dynamics.copy(late, s, n)
         dynamics.settle(x, n)
         store(x, first, n, state)
-        for d in range(count):
-            store(s[d], first, n, along[d, : at.STATES])
+        store(s, first, n, along)
