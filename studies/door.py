@@ -22,6 +22,7 @@ STUDIES = {
     "air": Entry("least_air.study", "STUDY", "how much air the schedule of least air saves"),
     "beside-law": Entry("residual.beside_law", "STUDY", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
+    "by-gradients": Entry("learned.study", "BY_GRADIENTS", "policies by gradients beside classical controllers"),
     "circle": Entry("comparison.study", "CIRCLES", "controllers and policies on circles that guided no decision"),
     "comparison": Entry("comparison.study", "COMPARISON", "every controller under all conditions"),
     "figure4": Entry("figure4", "STUDY", "errors in the experiment of the paper's Fig. 4"),

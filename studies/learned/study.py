@@ -114,7 +114,6 @@ def _shown(content: Content) -> dict[str, str]:
         "learned.md": "\n\n".join(parts) + "\n",
         "learned.csv": text.getvalue(),
         "residual.md": _summary(figures),
-        "gradients_policies.md": _by_gradients(figures),
     }
 
 
@@ -132,19 +131,20 @@ def _summary(figures: dict[str, Any]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
-def _by_gradients(figures: dict[str, Any]) -> str:
+def _by_gradients(content: Content) -> dict[str, str]:
     """Policies by gradients beside classical controllers."""
+    figures = content["figures"]
     lines = [["world", "controller", *COMPARED.values(), "lost"]]
     lines.append(["---"] * len(lines[0]))
-    for policy in (name for name in figures if name.endswith("_apg")):
-        rows = figures[policy]["metrics"]["rows"]
+    for policy, found in figures.items():
+        rows = found["metrics"]["rows"]
         for controller in dict.fromkeys(row[2] for row in rows):
             own = {row[0]: row for row in rows if row[2] == controller}
             cells = [f"{own[metric][3]} / {own[metric][4]}" if metric in own else "-" for metric in COMPARED]
             lost = own["lost episodes"]
             name = f"{policy}, {controller.rpartition(', ')[2]}" if controller.startswith("residual") else controller
             lines.append([policy.partition("_")[0], name, *cells, f"{lost[3]} {lost[1]}"])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    return {"gradients_policies.md": "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"}
 
 
 def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
@@ -154,17 +154,36 @@ def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
 
 def _pictures(content: Content, folder: Path) -> list[Path]:
     # pyplot takes half a second to load.
-    from agents.reports.learning_curves import draw_learning_curves, draw_side_by_side, learning_curves
+    from agents.reports.learning_curves import draw_learning_curves, learning_curves
 
     draw_learning_curves(learning_curves(policy_folders("circle")), folder)
+    return [folder / "learning_curves.png"]
+
+
+def _side_by_side(content: Content, folder: Path) -> list[Path]:
+    from agents.reports.learning_curves import draw_side_by_side, learning_curves
+
     from_scratch = {"gradients": "circle_apg", "PPO": "circle_pure"}
     curves = {algorithm: learning_curves(policy_folders(name)) for algorithm, name in from_scratch.items()}
     draw_side_by_side(curves, folder, "from_scratch")
-    return [folder / "learning_curves.png", folder / "from_scratch.png"]
+    return [folder / "from_scratch.png"]
 
 
-STUDY = Study(
-    ("agents.commands.evaluate", "studies.learned.study"), {"policy": tuple(RUNS)}, _tasks, _kept,
-    {"settled_rms": "mm", "stiffness_error": "%", "air": "l/min", "saturation": "%"}, _shown, _pictures,
-    allowed={"policy": tuple(RUNS)}, words={"policy": "shipped policies, each in its own worlds"},
-)  # fmt: skip
+SOURCES = ("agents.commands.evaluate", "studies.learned.study")
+UNITS = {"settled_rms": "mm", "stiffness_error": "%", "air": "l/min", "saturation": "%"}
+GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
+WORDS = {"policy": "shipped policies, each in its own worlds"}
+
+BY_GRADIENTS = Study(
+    SOURCES,
+    {"policy": GRADIENTS},
+    _tasks,
+    _kept,
+    UNITS,
+    _by_gradients,
+    _side_by_side,
+    allowed={"policy": GRADIENTS},
+    words=WORDS,
+)
+OTHERS = tuple(name for name in RUNS if name not in GRADIENTS)
+STUDY = Study(SOURCES, {"policy": OTHERS}, _tasks, _kept, UNITS, _shown, _pictures, allowed={"policy": OTHERS}, words=WORDS)
