@@ -57,7 +57,7 @@ COMPARED = {
     "settled_rms": "settled error, mm", "stiffness_error": "static stiffness error, %",
     "pneumatic_rms_1": "error of pneumatic stiffness 1, %", "pneumatic_rms_2": "of 2, %", "air": "air, l/min",
 }  # fmt: skip
-"""Metric -> its column beside classical controllers; every cell has the median and the 95th percentile."""
+"""Metric -> its column beside classical controllers; a cell has the median and the 95th percentile, and the first the worst."""
 
 
 def _pieces(policy: str) -> dict[str, list[Task]]:
@@ -140,7 +140,8 @@ def _by_gradients(content: Content) -> dict[str, str]:
         rows = found["metrics"]["rows"]
         for controller in dict.fromkeys(row[2] for row in rows):
             own = {row[0]: row for row in rows if row[2] == controller}
-            cells = [f"{own[metric][3]} / {own[metric][4]}" if metric in own else "-" for metric in COMPARED]
+            ends = {metric: 6 if metric == "settled_rms" else 5 for metric in COMPARED}
+            cells = [" / ".join(own[metric][3:end]) if metric in own else "-" for metric, end in ends.items()]
             lost = own["lost episodes"]
             name = f"{policy}, {controller.rpartition(', ')[2]}" if controller.startswith("residual") else controller
             lines.append([policy.partition("_")[0], name, *cells, f"{lost[3]} {lost[1]}"])
