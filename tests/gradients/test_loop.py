@@ -38,7 +38,7 @@ LAW_LOOPS = {
     for name, sensors in zip(COMPILED, itertools.cycle(SENSORS), strict=False)
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
-FAST = ("valves", "a hand that feels")
+FAST = ("a hand that feels",)
 
 
 @pytest.mark.parametrize("name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LOOPS])

@@ -110,6 +110,7 @@ def test_options_are_refused_by_name(field: str, value: float) -> None:
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads the processor's instructions")
+@pytest.mark.slow
 def test_the_adjoint_runs_on_vectors() -> None:
     """Vectorisation breaks in silence: a division of four lanes for every one in the source, and those of single lanes are
     of the rest that is no whole vector."""

@@ -158,6 +158,7 @@ def test_along_a_trajectory_lanes_have_the_differences_of_their_plants() -> None
     assert np.quantile(share[:, :, inside], 0.99) < ALLOWED
 
 
+@pytest.mark.slow
 def test_options_of_a_rig_have_their_states() -> None:
     """At rest the plant's motion over 10 us is the matrix exponential of A, B. Shut valves leak 1e4 Pa/s, of which 10 us are
     1e-6 of a pressure; what the integrator leaves out of the fastest mode, 5000/s, is less."""
@@ -299,6 +300,7 @@ def test_without_python_control_the_extra_is_named(monkeypatch: pytest.MonkeyPat
         linearize(None, (0.5, 0.0)).to_control()
 
 
+@pytest.mark.slow
 def test_the_study_finds_resonance_and_bandwidth(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -36,6 +36,7 @@ def test_a_policy_from_scratch_learns_in_80_updates(whole: tuple[Path, dict]) ->
     assert policy.training["algorithm"] == "apg"
 
 
+@pytest.mark.slow
 def test_a_killed_training_ends_with_the_same_policy(
     whole: tuple[Path, dict],
     tmp_path: Path,
