@@ -222,11 +222,12 @@ policies: $(READY)
 
 learned: $(READY)
 	$(BIN)/birthsim study learned
+	$(BIN)/birthsim study by-gradients
 	$(BIN)/birthsim study render
 	$(BIN)/birthsim explain --policy probe --out $(OUT)/learned/explain_probe
 	$(BIN)/birthsim explain --policy circle --no-pushes --out $(OUT)/learned/explain
 	cp $(OUT)/learned/explain/correction.png docs/
-	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/learned/from_scratch.png docs/
+	cp $(OUT)/studies/learned/learning_curves.png $(OUT)/studies/by-gradients/from_scratch.png docs/
 
 scratch: $(READY)
 	$(BIN)/python examples/learning_curves.py --out $(OUT)/scratch

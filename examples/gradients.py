@@ -12,7 +12,7 @@ import gymnasium
 import torch
 
 import birthsim_env  # noqa: F401  registers the ids
-from agents.training.rollouts import Worlds
+from agents.gradients.rollouts import Worlds
 
 LANES, HORIZON = 64, 12
 """Rigs side by side; policy steps of 10 ms that a gradient goes back."""

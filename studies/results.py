@@ -9,14 +9,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from birthsim_env.sources import ROOT, hashes
+from birthsim_env.physics.compiled.sources import ROOT, hashes
 
 RESULTS = ROOT / "results"
 LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
-    "baselines/work/", "baselines/commands/", "birthsim_env/files.py", "birthsim_env/sources.py", "studies/study.py",
-    "studies/results.py",
+    "baselines/work/", "baselines/commands/", "birthsim_env/files.py", "birthsim_env/physics/compiled/sources.py",
+    "studies/study.py", "studies/results.py",
 )  # fmt: skip
 """What reads options and keeps pieces, and decides no figure: a change of it makes no result stale."""
 

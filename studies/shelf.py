@@ -15,7 +15,7 @@ from typing import cast
 from baselines.commands.command import perform_with
 from baselines.commands.settings import Configured
 from birthsim_env.files import write_text
-from birthsim_env.sources import ROOT
+from birthsim_env.physics.compiled.sources import ROOT
 from studies.door import OWN, STUDIES
 from studies.figures import figure
 from studies.results import changed, read_result

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from baselines.commands.settings import EPISODES, MANY, Processes, number, whole
 from baselines.work.tasks import Result, Task, run_tasks
 from birthsim_env.files import own_folder, whole_results, write_text
-from birthsim_env.sources import ROOT
+from birthsim_env.physics.compiled.sources import ROOT
 from studies.results import RESULTS, Content, provenance, written
 
 Options = SimpleNamespace

@@ -18,13 +18,13 @@ from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
+from agents.gradients.rollouts import Worlds
 from agents.policy.network import CLIP, EPSILON, PolicyNetwork
 from agents.residual.settings import LAWS, NO_LAW, ResidualSettings
 from agents.training.checkpoint import read_checkpoint, tensors, write_checkpoint
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS
 from agents.training.reached import Reached
-from agents.training.rollouts import Worlds
 from agents.training.time_split import split
 from agents.training.validation import SEED_SPACING, TRAINING_SEED
 from birthsim_env.observation import Observation

@@ -156,8 +156,8 @@ class LinearQuadratic(TrackingController):
         grid = np.linspace(low, high, SCHEDULE)
         first = [regulator(mass, self.parameters.cylinder1.viscous_friction, kappa, tolerances) for kappa in grid]
         second = regulator(mass, self.parameters.cylinder2.viscous_friction, 1.0, tolerances)
-        # Six digits, which every processor's LAPACK gives alike.
         table = np.concatenate([np.array(first).T, np.repeat(second[:, None], SCHEDULE, axis=1)])
+        # Six digits, which every processor's LAPACK gives alike.
         rounded = np.array([float(f"{gain:.6g}") for gain in table.flat])
         scheduled = {"lowest": low, "step": float(grid[1] - grid[0]), "table": rounded}
         return {**scheduled, "dead_zone": gains["dead_zone"], "pneumatic_gain": PNEUMATIC_GAIN}

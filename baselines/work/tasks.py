@@ -16,7 +16,7 @@ from tqdm import tqdm
 import birthsim_env
 from baselines.work.side_by_side import side_by_side
 from birthsim_env.files import finite, later_signals, write_json
-from birthsim_env.sources import hashes
+from birthsim_env.physics.compiled.sources import hashes
 
 Result = dict[str, Any]
 

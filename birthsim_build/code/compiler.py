@@ -20,7 +20,7 @@ from llvmlite.binding import llvm_version_info
 
 from birthsim_build.image import Words
 from birthsim_env.physics.compiled.compilation import cache_folder, keep, kept
-from birthsim_env.sources import source_stamp
+from birthsim_env.physics.compiled.sources import source_stamp
 
 ONE_LANE = {
     **{"BIRTHSIM_BLOCK": "1", "NUMBA_LOOP_VECTORIZE": "0", "NUMBA_SLP_VECTORIZE": "0"},

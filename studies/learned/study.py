@@ -12,8 +12,9 @@ from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
 from baselines.work.tasks import Task
+from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
-from birthsim_env.sources import ROOT
+from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Found, Options, Study
 
@@ -54,10 +55,10 @@ RUNS = {
 """Policy -> its run; seeds were never used for training or design."""
 
 COMPARED = {
-    "settled_rms": "settled error, mm", "stiffness_error": "static stiffness error, %",
-    "pneumatic_rms_1": "error of pneumatic stiffness 1, %", "pneumatic_rms_2": "of 2, %", "air": "air, l/min",
+    "settled_rms": ("settled error, mm", 3), "stiffness_error": ("static stiffness error, %", 2),
+    "pneumatic_rms_1": ("error of pneumatic stiffness 1, %", 2), "pneumatic_rms_2": ("of 2, %", 2), "air": ("air, l/min", 2),
 }  # fmt: skip
-"""Metric -> its column beside classical controllers; a cell has the median and the 95th percentile, and the first the worst."""
+"""Metric -> its column beside classical controllers, and how much a cell has of median, 95th percentile and worst."""
 
 
 def _pieces(policy: str) -> dict[str, list[Task]]:
@@ -109,12 +110,8 @@ def _shown(content: Content) -> dict[str, str]:
         rows += [[policy, *row] for row in found["metrics"]["rows"]]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
-    figures = content["figures"]
-    return {
-        "learned.md": "\n\n".join(parts) + "\n",
-        "learned.csv": text.getvalue(),
-        "residual.md": _summary(figures),
-    }
+    summary = _summary(content["figures"])
+    return {"learned.md": "\n\n".join(parts) + "\n", "learned.csv": text.getvalue(), "residual.md": summary}
 
 
 def _summary(figures: dict[str, Any]) -> str:
@@ -133,19 +130,18 @@ def _summary(figures: dict[str, Any]) -> str:
 
 def _by_gradients(content: Content) -> dict[str, str]:
     """Policies by gradients beside classical controllers."""
-    figures = content["figures"]
-    lines = [["world", "controller", *COMPARED.values(), "lost"]]
-    lines.append(["---"] * len(lines[0]))
-    for policy, found in figures.items():
-        rows = found["metrics"]["rows"]
-        for controller in dict.fromkeys(row[2] for row in rows):
-            own = {row[0]: row for row in rows if row[2] == controller}
-            ends = {metric: 6 if metric == "settled_rms" else 5 for metric in COMPARED}
-            cells = [" / ".join(own[metric][3:end]) if metric in own else "-" for metric, end in ends.items()]
-            lost = own["lost episodes"]
-            name = f"{policy}, {controller.rpartition(', ')[2]}" if controller.startswith("residual") else controller
-            lines.append([policy.partition("_")[0], name, *cells, f"{lost[3]} {lost[1]}"])
-    return {"gradients_policies.md": "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"}
+    rows = [["world", "controller", *(name for name, _ in COMPARED.values()), "lost"]]
+    for policy, found in content["figures"].items():
+        every = found["metrics"]["rows"]
+        for controller in dict.fromkeys(row[2] for row in every):
+            own = {row[0]: row[1:] for row in every if row[2] == controller}
+            cells = [
+                " / ".join(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()
+            ]
+            name = controller.replace("residual", policy) if controller.startswith("residual") else controller
+            of, _, lost, *_ = own["lost episodes"]
+            rows.append([policy.partition("_")[0], name, *cells, f"{lost} {of}"])
+    return {"gradients_policies.md": markdown(rows) + "\n"}
 
 
 def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
@@ -176,15 +172,8 @@ GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
 WORDS = {"policy": "shipped policies, each in its own worlds"}
 
 BY_GRADIENTS = Study(
-    SOURCES,
-    {"policy": GRADIENTS},
-    _tasks,
-    _kept,
-    UNITS,
-    _by_gradients,
-    _side_by_side,
-    allowed={"policy": GRADIENTS},
+    SOURCES, {"policy": GRADIENTS}, _tasks, _kept, UNITS, _by_gradients, _side_by_side, allowed={"policy": GRADIENTS},
     words=WORDS,
-)
+)  # fmt: skip
 OTHERS = tuple(name for name in RUNS if name not in GRADIENTS)
 STUDY = Study(SOURCES, {"policy": OTHERS}, _tasks, _kept, UNITS, _shown, _pictures, allowed={"policy": OTHERS}, words=WORDS)

@@ -7,7 +7,7 @@ from typing import Any
 from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Task
 from birthsim_env.files import finite
-from birthsim_env.sources import ROOT
+from birthsim_env.physics.compiled.sources import ROOT
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.sweeps.plan import HeatMap, Sweep, load_sweep

@@ -9,8 +9,8 @@ import pytest
 jax = pytest.importorskip("jax", reason="pip install jax")
 torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
 
-from agents.training import rollouts  # noqa: E402
-from agents.training.jax_rollouts import Worlds  # noqa: E402
+from agents.gradients import rollouts  # noqa: E402
+from agents.gradients.jax_rollouts import Worlds  # noqa: E402
 
 
 def lanes() -> Any:

@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 
 import agents  # noqa: F401  registers the residual environments
-from baselines.registry import LIMITED, LISTED, SLOW, make_controller
+from baselines.registry import make_controller
 from baselines.staged import driving
 from birthsim_env.gradients import Recorder
 from birthsim_env.parts.hands.user_forces import UserForce
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters
+from studies.gradients.checks import CONTROLLERS
 from studies.gradients.loops import SMOOTH, begun, compared
-
-COMPILED = [name for name in LISTED if name not in SLOW] + [f"{LIMITED}{name}" for name in ("pid", "admittance-adaptive")]
 
 SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
     "valves": {"world": "BirthSIM/Circle-v1"},
@@ -35,7 +34,7 @@ SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 LAW_LOOPS = {
     f"{name}, {sensors}": {"world": "BirthSIM/Circle-v1", "controller": name, "sensors": sensors}
-    for name, sensors in zip(COMPILED, itertools.cycle(SENSORS), strict=False)
+    for name, sensors in zip(CONTROLLERS, itertools.cycle(SENSORS), strict=False)
 }
 LOOPS = {**SCENARIO_LOOPS, **LAW_LOOPS}
 FAST = ("a hand that feels",)

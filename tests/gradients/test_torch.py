@@ -12,7 +12,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra 'agents' is not installed")
 
-from agents.training.rollouts import Worlds  # noqa: E402
+from agents.gradients.rollouts import Worlds  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from birthsim_env.sources import ROOT
+from birthsim_env.physics.compiled.sources import ROOT
 from studies.figures import figure
 from studies.results import read_result
 

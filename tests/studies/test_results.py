@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from birthsim_env.sources import ROOT, hashes
+from birthsim_env.physics.compiled.sources import ROOT, hashes
 from studies import shelf
 from studies.door import OWN
 from studies.results import changed, provenance, read_result, written

@@ -10,7 +10,7 @@ import pytest
 
 from baselines.work import tasks
 from baselines.work.tasks import Task, code_stamp, run_tasks
-from birthsim_env.sources import hashes
+from birthsim_env.physics.compiled.sources import hashes
 
 
 def square(log, number):

@@ -31,7 +31,7 @@ from numba.core.registry import CPUDispatcher
 
 import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
 from birthsim_env.files import whole_file
-from birthsim_env.sources import PACKAGES, ROOT, source_stamp
+from birthsim_env.physics.compiled.sources import PACKAGES, ROOT, source_stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from birthsim_env.physics.compiled import compilation
-from birthsim_env.sources import PACKAGES, dependencies, file_of, imports, source_stamp
+from birthsim_env.physics.compiled.sources import PACKAGES, dependencies, file_of, imports, source_stamp
 
 ROOT = Path(__file__).parents[3]
 PROBE = """
@@ -39,10 +39,12 @@ def package(tmp_path):
     folder.mkdir()
     for name in (
         "files",
-        "sources",
         "loop/signals",
         *(f"physics/{part}" for part in ("electronics", "valves")),
-        *(f"physics/compiled/{part}" for part in ("compilation", "lanes", "exact", "records", "record_types", "resolution")),
+        *(
+            f"physics/compiled/{part}"
+            for part in ("compilation", "lanes", "exact", "records", "record_types", "resolution", "sources")
+        ),
         *(f"physics/rig/{part}" for part in ("parameters", "quantities", "reading", "sections", "values")),
     ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -23,7 +23,7 @@ import numpy as np
 from jax import Array
 from jax.dtypes import canonicalize_dtype
 
-from agents.training import rollouts
+from agents.gradients import rollouts
 
 
 class Now(NamedTuple):

@@ -1,0 +1,1 @@
+"""Closed loops that a library differentiates: PyTorch and JAX."""
