@@ -90,13 +90,14 @@ def draw_side_by_side(trainings: Mapping[str, Sequence[dict[str, Any]]], folder:
     """Draw pooled errors of the trainings of each algorithm over policy steps and over wall time (``name``, PNG and SVG)."""
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(1, 2, figsize=(7.4, 3.0), layout="constrained", sharey=True)
-        for axes, (measure, label) in zip(panels, (("steps", "policy steps"), ("seconds", "time (s)")), strict=True):
+        measures = ("steps", 1e-6, "policy steps (million)"), ("seconds", 1.0, "time (s)")
+        for axes, (measure, unit, label) in zip(panels, measures, strict=True):
             for color, (algorithm, own) in zip((ACCENT, MIDDLE), trainings.items(), strict=True):
                 for training in own:
                     points = training["curve"][1:]
                     at, error = ([_number(point[key]) for point in points] for key in (measure, "pooled_mm"))
-                    axes.plot(at, error, color=color, lw=1.0, label=algorithm if training is own[0] else None)
-            axes.set(xscale="log", yscale="log", xlabel=label)
+                    axes.plot(unit * np.array(at), error, color=color, lw=1.0, label=algorithm if training is own[0] else None)
+            axes.set(yscale="log", xlim=0, xlabel=label)
         panels[0].set_ylabel(dict(FIGURES)["pooled_mm"])
         legend_below(figure, *panels[0].get_legend_handles_labels())
         return save(figure, folder, name)
