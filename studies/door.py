@@ -46,6 +46,7 @@ STUDIES = {
     "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),
     "stiffest": Entry("stability.stiffest", "STUDY", "stiffest setpoints at which the paper's law rests"),
     "stiffness": Entry("comparison.feel", "STUDY", "how the stiffness of every controller feels"),
+    "strangers": Entry("strangers.study", "STUDY", "identification and controllers on rigs that the model lacks"),
     "sweep": Entry("sweeps.study", "STUDY", "grids, random draws and searches, from a TOML file"),
     "targets": Entry("targets.study", "STUDY", "built code of every target, against Python"),
     "verification": Entry("verification.command", "", "balances, coverage, mutation, for docs/verification.md"),

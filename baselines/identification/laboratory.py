@@ -14,6 +14,7 @@ from baselines.identification.trial import Trial
 from birthsim_env.loop.signals import REFERENCES, Reference
 from birthsim_env.parts.own_parts import Through
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.simulation import Part
 
 STIFFNESS = 3000.0
 """N/m asked of the law in both directions; laws that know no stiffness ignore it."""
@@ -24,18 +25,21 @@ PNEUMATIC = (4400.0, 2200.0)
 
 def run_plan(
     plan: Plan, rigs: Sequence[Parameters], controller: Controller, sensors: str, seed: int,
-    tick: Callable[[], Any] = lambda: None,
+    tick: Callable[[], Any] = lambda: None, carry: Callable[[RestingRigs], Part] | None = None,
 ) -> list[Trial]:  # fmt: skip
     """What a log of every rig would hold; rig i has the sensors of ``seed`` + i. ``tick`` is called once per control period.
 
+    ``carry`` makes of the rigs at rest what moves in the plant's place.
+
     Raises ``ValueError`` where a piston hits its end stop, with the rig's number.
     """
-    return [_run(plan, rig, number, controller, sensors, seed + number, tick) for number, rig in enumerate(rigs)]
+    return [_run(plan, rig, number, controller, sensors, seed + number, tick, carry) for number, rig in enumerate(rigs)]
 
 
 def _run(
-    plan: Plan, rig: Parameters, number: int, controller: Controller, sensors: str, seed: int, tick: Callable[[], Any]
-) -> Trial:
+    plan: Plan, rig: Parameters, number: int, controller: Controller, sensors: str, seed: int, tick: Callable[[], Any],
+    carry: Callable[[RestingRigs], Part] | None,
+) -> Trial:  # fmt: skip
     rows, path = np.zeros((REFERENCES, 1)), Through(plan.times, plan.target.T)
     rows[:2], rows[8:10], rows[10:12] = plan.target[:, :1], STIFFNESS, np.transpose([PNEUMATIC])
     loop = RestingRigs([rig], Reference(rows), controller, sensors, seed, name="law")
@@ -60,6 +64,6 @@ def _run(
             )
         tick()
 
-    loop.close([follow], [add], [*loop.parts()["plant"], look])
+    loop.close([follow], [add], [*([carry(loop)] if carry else loop.parts()["plant"]), look])
     loop.run(count)
     return Trial(start + period * np.arange(count), openings, pressures, positions, np.zeros((2, count)))

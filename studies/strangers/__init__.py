@@ -1,0 +1,1 @@
+"""Rigs that the package's model lacks."""
