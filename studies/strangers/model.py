@@ -6,6 +6,7 @@ Classical Runge-Kutta steps of ``STEP`` integrate it: a control period has twent
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -161,7 +162,8 @@ class Stranger:
         half = 0.5 * self._play
         self._inner = np.clip(self._inner, self._late[0] - half, self._late[0] + half)
         del self._late[0]
-        found = integrate(self.state, round(seconds / STEP), self._inner, push, *self._constants, self._odd)
+        rig: Any = self._constants
+        found = integrate(self.state, round(seconds / STEP), self._inner, push, *rig, self._odd)
         self.state, self.air = found
 
     @property

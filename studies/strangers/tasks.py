@@ -22,7 +22,7 @@ from birthsim_env.simulation import Part
 from studies.recovery.tasks import CONTROLLER, SENSORS, drawn_rig
 from studies.strangers.model import Strangeness, Stranger
 
-STRANGERS: dict[str, tuple[dict[str, float], dict[str, object], dict[str, object]]] = {
+STRANGERS: dict[str, tuple[dict[str, float], dict[str, object], dict[str, float]]] = {
     "nothing": ({}, {}, {}),
     "friction 30 % larger outwards": ({"friction_asymmetry": 0.3}, {}, {}),
     "friction +-30 % along the stroke": ({"friction_wave": 0.3}, {}, {}),
