@@ -6,7 +6,6 @@ Classical Runge-Kutta steps of ``STEP`` integrate it: a control period has twent
 """
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
@@ -146,11 +145,12 @@ class Stranger:
     """
 
     def __init__(self, rig: Parameters, strangeness: Strangeness, observed: Array, state: Array) -> None:
-        self._odd = np.array([getattr(strangeness, one.name) for one in fields(strangeness)])
+        odd = np.array([getattr(strangeness, one.name) for one in fields(strangeness)])
         begun = SecondModel(rig, observed, state)
-        self._constants, self._play, self._inner = begun.constants, strangeness.play, state[14:18].copy()
+        self._constants, self._play, self._inner = (*begun.constants, odd), strangeness.play, state[14:18].copy()
         self._late = [state[14:18].copy() for _ in range(round(strangeness.delay / rig.electronics.control_period))]
         handle, frequency = observed.copy(), strangeness.handle_frequency
+        self._has_handle = frequency > 0
         if frequency:
             handle[1] -= rig.mechanics.gravity / (2 * np.pi * frequency) ** 2
         self.state: Array = np.concatenate([begun.state, [rig.air.supply_pressure], np.zeros(4), handle])
@@ -162,11 +162,9 @@ class Stranger:
         half = 0.5 * self._play
         self._inner = np.clip(self._inner, self._late[0] - half, self._late[0] + half)
         del self._late[0]
-        rig: Any = self._constants
-        found = integrate(self.state, round(seconds / STEP), self._inner, push, *rig, self._odd)
-        self.state, self.air = found
+        self.state, self.air = integrate(self.state, round(seconds / STEP), self._inner, push, *self._constants)
 
     @property
     def seen(self) -> Array:
         """x, y, vx, vy (4,) where hand and tracker are."""
-        return self.state[HANDLE] if self._odd[5] else self.state[:4]
+        return self.state[HANDLE] if self._has_handle else self.state[:4]

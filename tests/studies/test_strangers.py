@@ -25,7 +25,7 @@ def start(rig: Parameters = TIGHT, extension: float = 0.0, **odd: float) -> tupl
 
 
 def slope(stranger: Stranger) -> np.ndarray:
-    return strange_rates(stranger.state, SHUT, NO_PUSH, *stranger._constants, stranger._odd)
+    return strange_rates(stranger.state, SHUT, NO_PUSH, *stranger._constants)
 
 
 def test_with_nothing_strange_it_is_the_second_model() -> None:
