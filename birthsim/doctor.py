@@ -11,7 +11,7 @@ ABOUT = {
     "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
     "build": "export --to wasm, c, fmu", "log": "export --to parquet, mcap", "tune": "tune", "video": "films of episodes",
     "mpc": "the controller nonlinear-mpc", "control": "linear models for python-control", "cluster": "--cluster ray",
-    "sweep": "sweeps of trainings",
+    "sweep": "sweeps of trainings", "jax": "gradients for JAX",
 }  # fmt: skip
 """Extra -> what it is for."""
 

@@ -79,16 +79,25 @@ def evaluate(
     """
     if episodes < 1:
         raise ValueError(f"episodes = {episodes!r}; allowed: a whole number >= 1")
+    return evaluate_worlds(environment, controller, name, range(seed, seed + episodes), None, progress, **arguments)
+
+
+def evaluate_worlds(
+    environment: str, controller: Controller, name: str, seeds: Sequence[int], rigs: Array | None, progress: bool = True,
+    **arguments: Any,
+) -> Evaluation:  # fmt: skip
+    """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
     result = Evaluation(name)
     spent: list[float] = []
     try:
-        for first in range(0, episodes, LANES):
-            seeds = [seed + k for k in range(first, min(first + LANES, episodes))]
-            _run_batch(environment, controller, seeds, arguments, result, spent, progress)
+        for first in range(0, len(seeds), LANES):
+            own = slice(first, first + LANES)
+            lanes = None if rigs is None else rigs[:, own]
+            _run_batch(environment, controller, list(seeds[own]), lanes, arguments, result, spent, progress)
     except KeyboardInterrupt:
         if not result.seeds:
             raise
-        print(f"interrupted: {len(result.seeds)} of {episodes} episodes are complete and kept")
+        print(f"interrupted: {len(result.seeds)} of {len(seeds)} episodes are complete and kept")
     result.cost = float(np.median(spent))
     return result
 
@@ -107,12 +116,14 @@ def merged(evaluations: Sequence[Evaluation], name: str) -> Evaluation:
 
 
 def _run_batch(
-    environment: str, controller: Controller, seeds: list[int], arguments: dict[str, Any], result: Evaluation,
-    spent: list[float], progress: bool,
+    environment: str, controller: Controller, seeds: list[int], rigs: Array | None, arguments: dict[str, Any],
+    result: Evaluation, spent: list[float], progress: bool,
 ) -> None:  # fmt: skip
     period = load_parameters(arguments.get("parameters")).electronics.control_period
     driver = driving(controller, result.controller)
     env: Any = gymnasium.make_vec(environment, num_envs=len(seeds), policy_period=period, actuation=driver, **arguments)
+    if rigs is not None:
+        env.simulation.plant.lane_parameters[:] = rigs
     env.reset(seed=list(seeds))
     asked, simulation = required_strength_ratio(env), env.simulation
     measures = Measures(simulation, env.steps)

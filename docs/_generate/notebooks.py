@@ -6,11 +6,20 @@ from pathlib import Path
 from urllib.parse import quote
 
 import jupytext
+from nbformat.v4 import new_code_cell
 
 TUTORIALS = Path(__file__).resolve().parent.parent / "tutorials"
 NAMES = sorted(path.stem for path in TUTORIALS.glob("*.md") if "{code-cell}" in path.read_text(encoding="utf-8"))
 BRANCH = "gh-pages"
 """Of the repository, where the site is published: Colab opens notebooks of a repository only."""
+
+INSTALLS = """# Installs BirthSIM where it is absent.
+import importlib.util
+import subprocess
+import sys
+
+if importlib.util.find_spec("birthsim_env") is None:
+    subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "{}"], check=True)"""
 
 
 def repository() -> str:
@@ -22,13 +31,19 @@ def repository() -> str:
 
 
 def notebook(name: str) -> str:
-    """A tutorial as .ipynb. With a repository its first cell installs BirthSIM from there, and links lead there."""
+    """A tutorial as .ipynb. Its first cell installs BirthSIM where it is absent: with a repository from there, and links lead
+    there, else from the clone around it."""
     text = (TUTORIALS / f"{name}.md").read_text(encoding="utf-8")
+    extra = "[agents]" if re.search("^(from|import) agents", text, re.MULTILINE) else ""
+    source = f"../..{extra}"
     if where := repository():
-        text = re.sub(r'"\.\./\.\.((?:\[\w+\])?)"', rf'"birthsim\1 @ git+https://github.com/{where}"', text)
+        source = f"birthsim{extra} @ git+https://github.com/{where}"
         text = re.sub(r"\]\(\.\./", f"](https://github.com/{where}/blob/HEAD/docs/", text)
         text = re.sub(r"\]\((?=\w+\.md)", f"](https://github.com/{where}/blob/HEAD/docs/tutorials/", text)
-    return jupytext.writes(jupytext.reads(text, fmt="md:myst"), fmt="ipynb")
+    document = jupytext.reads(text, fmt="md:myst")
+    first = next(k for k, cell in enumerate(document.cells) if cell.cell_type == "code")
+    document.cells.insert(first, new_code_cell(INSTALLS.format(source)))
+    return jupytext.writes(document, fmt="ipynb")
 
 
 def write(folder: Path) -> None:

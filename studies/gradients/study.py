@@ -1,9 +1,8 @@
 """What gradients cost beside the plain step, in turns, and how large a change they foretell."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -12,11 +11,13 @@ import numpy as np
 import agents  # noqa: F401  registers the residual environments
 from baselines.bench.statistics import quantile
 from baselines.work.tasks import Result, Task
+from birthsim_env import Plant
 from birthsim_env.gradients import Recorder
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.gradients.plant import Derivatives, jvp, vjp
 from studies.comparison.tables import markdown
+from studies.gradients.figure import friction_figure
 from studies.gradients.states import plant_of
 from studies.results import Content
 from studies.study import Found, Options, Study
@@ -26,6 +27,9 @@ STEP, TURNS = 0.01, 25
 
 LANES, CHANGES, INSTANTS = 512, (1e-4, 1e-2, 0.1), (0.01, 0.04, 0.16, 0.32)
 """Rigs; changes of the openings; s after which pistons are looked at."""
+
+OPENINGS, AFTER = np.arange(-30, 31) / 100.0, 0.1
+"""Of the valve that fills the front of cylinder 2, and of the other its negative; s from rest."""
 
 PLANTS = {"plant, 256 lanes": (256, False), "plant, 256 lanes, with the rig": (256, True), "plant, 4096 lanes": (4096, False)}
 LOOPS = {"no controller, 256 lanes": "none", "admittance-backstepping, 256 lanes": "admittance-backstepping"}
@@ -104,6 +108,16 @@ def foretold(slides: bool) -> Result:
     return {"errors": errors}
 
 
+def pushed() -> Result:
+    """How far piston 2 of the nominal rig has moved ``AFTER`` it was at rest, by ``OPENINGS``, m, and the slopes of that."""
+    lanes = len(OPENINGS)
+    plant, way, force = Plant(None, lanes), np.repeat([[0.0], [0.0], [1.0], [-1.0]], lanes, axis=1), np.zeros((1, 2, lanes))
+    plant.state[:] = balanced_state(plant.lane_parameters, np.zeros((2, lanes)))
+    along = Derivatives(np.zeros_like(plant.state), way, np.zeros_like(force))
+    slope = jvp(plant, way * OPENINGS, force, AFTER, along)[at.Y2]
+    return {"opening": OPENINGS.tolist(), "moved": plant.state[at.Y2].tolist(), "slope": slope.tolist()}
+
+
 def _tasks(options: Options) -> dict[Any, Task]:
     plants = {
         name: Task(f"plant{k}", "cost", plant_cost, {"lanes": n, "rig": rig})
@@ -111,13 +125,14 @@ def _tasks(options: Options) -> dict[Any, Task]:
     }
     loops = {name: Task(f"loop-{law}", "cost", loop_cost, {"law": law}) for name, law in LOOPS.items()}
     trust = {name: Task(name, "trust", foretold, {"slides": name == "slide"}) for name in ("slide", "rest")}
-    return {**plants, **loops, **trust}
+    return {**plants, **loops, **trust, "pushed": Task("pushed", "trust", pushed, {})}
 
 
 def _kept(options: Options, found: Found) -> Any:
     return {
         "cost": {name: found[name] for name in (*PLANTS, *LOOPS)},
         "foretold": {name: found[name]["errors"] for name in ("slide", "rest")},
+        "pushed": dict(found["pushed"]),
     }
 
 
@@ -135,5 +150,12 @@ def _shown(content: Content) -> dict[str, str]:
     return {"gradients_cost.md": markdown(cost) + "\n", "gradients_trust.md": markdown(trust) + "\n"}
 
 
-UNITS = {"forward": "s", "taped": "s", "backward": "s", "after": "s", "change": "1", "median": "1", "q90": "1"}
-STUDY = Study((__name__,), {}, _tasks, _kept, UNITS, _shown, timed=True)
+def _drawn(content: Content, folder: Path) -> list[Path]:
+    return friction_figure(content["figures"]["pushed"], AFTER, folder)
+
+
+UNITS = {
+    "forward": "s", "taped": "s", "backward": "s", "after": "s", "change": "1", "median": "1", "q90": "1",
+    "opening": "1", "moved": "m", "slope": "m",
+}  # fmt: skip
+STUDY = Study((__name__,), {}, _tasks, _kept, UNITS, _shown, _drawn, timed=True)

@@ -1,11 +1,12 @@
-"""The worst of many drawn worlds, and which of its figures makes it so."""
+"""The worst of many drawn worlds, the worst that a search finds, and which of its figures makes it so."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from baselines.bench.evaluation import Evaluation, evaluate
+from baselines.bench.evaluation import Evaluation, evaluate_worlds
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import jsonable, number, penalize_lost, quantile
 from baselines.identification.quantities import value_of
@@ -21,6 +22,7 @@ from birthsim_env.physics.rig.parameters import Parameters, field_of, load_param
 from birthsim_env.physics.rig.values import checked_number
 from studies.comparison.grid import as_described
 from studies.comparison.tables import markdown
+from studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from studies.results import Content
 from studies.study import Options, Study
 
@@ -30,14 +32,14 @@ PUSHED = SCENARIOS["probe"].duration - PROBE_REST
 LONGEST_REST = 60.0
 """s; assumed: no rig needs longer to come to rest."""
 NAMED, CAUSES = 5, 8
-"""Worst worlds that a row names; changes of one figure that are shown, of those that help most."""
+"""Worst drawn worlds that a row names; changes of one figure that are shown, of those that help most."""
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
     checked_number("--rest", options.rest, "s", least=0.0, most=LONGEST_REST)
     believed = load_parameters(options.parameters or None)
     rig = (believed if options.drawn else as_described(believed)).to_dict()
-    own = {name: getattr(options, name) for name in ("metric", "limit", "rest", "worlds", "episodes", "seed")}
+    own = {name: getattr(options, name) for name in ("metric", "limit", "rest", "episodes", "seed")}
     pairs = [(name, sensors) for name in options.controller for sensors in options.sensors]
     for name in options.controller:
         make_controller(name, believed)
@@ -48,40 +50,62 @@ def _tasks(options: Options) -> dict[Any, Task]:
 
 
 def worst(
-    controller: str, sensors: str, rig: dict[str, Any], metric: str, limit: float, rest: float, worlds: int, episodes: int,
-    seed: int,
+    controller: str, sensors: str, rig: dict[str, Any], metric: str, limit: float, rest: float, episodes: int, seed: int
 ) -> Result:  # fmt: skip
-    """Median, 95 % and worst of a metric's sizes and of unrest, the worst worlds, and the causes of the first ``worlds``."""
+    """Median, 95 % and worst of a metric's sizes and of unrest, the worst worlds, and the worst that a search then finds among
+    those that the rig's strength can bear, with its causes."""
     own = Parameters.from_dict(rig)
-    done = _evaluated(controller, rest, own, sensors, seed, episodes)
+    seeds = seed + np.arange(episodes, dtype=np.int64)
+    ranges = {name: pair for name, pair in documented_ranges(own, sensors).items() if name not in drawn_by(sensors)}
+
+    def run(seeds: Seeds, places: Array) -> Evaluation:
+        return _evaluated(controller, rest, own, sensors, seeds, rigs_at(places, ranges, own))
+
+    places = drawn_places(seeds, ranges)
+    done = run(seeds, places)
     sizes, signed = sizes_of(done, metric), penalize_lost(done.metrics[metric], done.lost, applies=True)
     order = np.argsort(-sizes, kind="stable")
+    begun = seeds, places, _bearable(done, metric)
+    found, where = hardest(lambda *world: _bearable(run(*world), metric), *begun, episodes, seed)
+    figures = {name: float(value) for name, value in figures_at(where, ranges).items()}
     return {
         "controller": controller, "sensors": sensors,
         **{name: jsonable([quantile(sizes_of(done, name), part) for part in (0.5, 0.95, 1.0)]) for name in (metric, "unrest")},
         "above": int((sizes > limit).sum()), "lost": int(sum(done.lost)),
         "named": jsonable([[done.seeds[k], float(signed[k])] for k in order[:NAMED]]),
-        "worlds": [causes(controller, sensors, own, metric, rest, done.seeds[k]) for k in order[:worlds]],
+        "found": causes(controller, sensors, own, metric, rest, found, figures),
     }  # fmt: skip
 
 
-def causes(controller: str, sensors: str, rig: Parameters, metric: str, rest: float, seed: int) -> dict[str, Any]:
-    """The metric in world ``seed``, and where one figure is as the law believes, or one error of the sensors is 0."""
+def _bearable(evaluation: Evaluation, metric: str) -> Array:
+    """Sizes of a metric, less than nothing in worlds that ask for more than the rig's strength."""
+    bearable = np.array(evaluation.required_strength_ratio) <= 1.0
+    return np.where(bearable, np.nan_to_num(sizes_of(evaluation, metric), nan=-1.0, posinf=np.inf), -1.0)
+
+
+def causes(
+    controller: str, sensors: str, rig: Parameters, metric: str, rest: float, seed: int, figures: dict[str, float]
+) -> dict[str, Any]:
+    """The metric in world ``seed`` with a rig of these ``figures``, and where one figure is as the controller believes, or one
+    error of the sensors is 0."""
+    own = {figure: [low, high] for figure, low, high in rig.ranges}
+
+    def placed(fixed: dict[str, float]) -> Parameters:
+        every = {**own, **{name: [value, value] for name, value in {**figures, **fixed}.items()}}
+        return Parameters.from_dict({**rig.to_dict(), "randomize": every})
 
     def size(fixed: dict[str, float], seconds: float = rest) -> float:
-        own = {figure: [low, high] for figure, low, high in rig.ranges}
-        changed = Parameters.from_dict({**rig.to_dict(), "randomize": {**own, **{k: [v, v] for k, v in fixed.items()}}})
-        return float(sizes_of(_evaluated(controller, seconds, changed, sensors, seed, 1), metric)[0])
+        return float(sizes_of(_evaluated(controller, seconds, placed(fixed), sensors, [seed]), metric)[0])
 
-    world, push, way = _world(rig, sensors, seed)
+    world, push, way = _world(placed({}), sensors, seed)
     ranges = documented_ranges(rig, sensors)
     drawn = {figure: value_of(rig, figure) for figure, (low, high) in ranges.items() if low < high}
     errors = [figure for figure in ranges if figure in drawn_by(sensors) and field_of(figure).metadata["least"] == 0.0]
     put = [*drawn.items(), *((figure, 0.0) for figure in errors)]
     rows = sorted((size({figure: value}), figure, world[figure], value) for figure, value in put)[:CAUSES]
-    here = _evaluated(controller, rest, rig, sensors, seed, 1)
+    here = _evaluated(controller, rest, placed({}), sensors, [seed])
     return {
-        "seed": seed, "push_n": push, "way_mm": way, "strength": float(here.required_strength_ratio[0]),
+        "seed": seed, "figures": figures, "push_n": push, "way_mm": way, "strength": float(here.required_strength_ratio[0]),
         **jsonable({
             "size": float(sizes_of(here, metric)[0]), "as_believed": size(drawn),
             "changes": [["s of rest", rest, 2 * rest, size({}, 2 * rest)], *([*cells, value] for value, *cells in rows)],
@@ -92,31 +116,35 @@ def causes(controller: str, sensors: str, rig: Parameters, metric: str, rest: fl
 def _shown(content: Content) -> dict[str, str]:
     settings, metric = content["settings"], content["settings"]["metric"]
     named = f"{metric}, {UNITS[metric]}"
-    rows = [["controller", "sensors", named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds"]]
+    rows = [["controller", "sensors", named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
     parts = []
     for found in content["figures"]:
         sizes = [", ".join(map(_number, found[name])) for name in (metric, "unrest")]
         listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in found["named"])
         rows.append([
             found["controller"], found["sensors"], sizes[0], str(found["above"]), sizes[1], str(found["lost"]), listed,
+            _number(found["found"]["size"]),
         ])  # fmt: skip
-        parts += [_explained(found, world, named) for world in found["worlds"]]
+        parts.append(_explained(found, named))
     text = (
         f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
-        f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst."
+        f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
+        f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
     )
     return {"worst.md": "\n\n".join([text, markdown(rows), *parts]) + "\n"}
 
 
-def _explained(found: dict[str, Any], world: dict[str, Any], named: str) -> str:
+def _explained(row: dict[str, Any], named: str) -> str:
+    found = row["found"]
     text = (
-        f"{found['controller']}, {found['sensors']} sensors, world {world['seed']}: {named.replace(',', '')} "
-        f"{_number(world['size'])}, a push of {world['push_n']:.3g} N over {world['way_mm']:.3g} mm, "
-        f"{100 * world['strength']:.0f} % of the rig's strength."
+        f"{row['controller']}, {row['sensors']} sensors, found in world {found['seed']}: {named.replace(',', '')} "
+        f"{_number(found['size'])}, a push of {found['push_n']:.3g} N over {found['way_mm']:.3g} mm, "
+        f"{100 * found['strength']:.0f} % of the rig's strength. "
+        f"Figures of the rig: {', '.join(f'{name} {value:.4g}' for name, value in found['figures'].items())}."
     )
     rows = [["figure", "of this world", "put to", named]]
-    rows += [[figure, f"{own:.4g}", f"{put:.4g}", _number(size)] for figure, own, put, size in world["changes"]]
-    return f"{text}\n\n{markdown([*rows, ['all that are randomised', '', 'as believed', _number(world['as_believed'])]])}"
+    rows += [[figure, f"{own:.4g}", f"{put:.4g}", _number(size)] for figure, own, put, size in found["changes"]]
+    return f"{text}\n\n{markdown([*rows, ['all that are randomised', '', 'as believed', _number(found['as_believed'])]])}"
 
 
 def _number(value: float | str) -> str:
@@ -147,24 +175,29 @@ def sizes_of(evaluation: Evaluation, metric: str) -> Array:
     return np.abs(penalize_lost(evaluation.metrics[metric], evaluation.lost, applies=True))
 
 
-def _evaluated(name: str, rest: float, rig: Parameters, sensors: str, seed: int, episodes: int) -> Evaluation:
+def _evaluated(
+    name: str, rest: float, rig: Parameters, sensors: str, seeds: Sequence[int] | Seeds, rigs: Array | None = None
+) -> Evaluation:
+    """In the worlds of ``seeds``, whose ``rigs`` (PARAMETERS, N) are drawn where none are given."""
     hand = {} if rest == PROBE_REST else {"user_force": Ramp((5.0, 40.0), "axes", rest)}
     setting: dict[str, Any] = {"sensors": sensors, "parameters": rig, "duration": rest + PUSHED, **hand}
-    return evaluate(ENVIRONMENT, make_controller(name, rig), name, episodes, seed, False, randomize=True, **setting)
+    setting["randomize"] = True if rigs is None else "sensors" if drawn_by(sensors) else "scenario"
+    law, own = make_controller(name, rig), [int(seed) for seed in seeds]
+    return evaluate_worlds(ENVIRONMENT, law, name, own, rigs, progress=False, **setting)
 
 
 STUDY = Study(
     (__name__,),
     {
-        "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"), "sensors": ("honest",), "drawn": False,
-        "metric": "stiffness_error", "limit": 15.0, "rest": PROBE_REST, "worlds": 1, "episodes": 800, "seed": 90000,
+        "controller": ("admittance-adaptive", "admittance-sensorless", "backstepping"), "sensors": tuple(SENSORS),
+        "drawn": False, "metric": "stiffness_error", "limit": 15.0, "rest": PROBE_REST, "episodes": 800, "seed": 90000,
         "parameters": "",
     },
     _tasks, lambda _, found: list(found.values()), {**UNITS, "push_n": "N", "way_mm": "mm"}, _shown,
     allowed={"sensors": tuple(SENSORS), "metric": tuple(UNITS)},
     words={
         "controller": "registered names", "drawn": "randomise the figures of honest sensors too",
-        "limit": "worlds above it are counted", "rest": "s before the push", "worlds": "worst worlds that are explained",
+        "limit": "worlds above it are counted", "rest": "s before the push",
         "seed": "of the first world", "parameters": "TOML file of the rig as the controllers believe it",
     },
 )  # fmt: skip

@@ -1,0 +1,33 @@
+"""Figure of a gradient through friction: how far a valve moves a piston that rested, and what the gradient says of it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from baselines.figures.runs import ACCENT, DARK, STYLE, save
+
+STEPS = 5
+"""Of the grid of openings: how far a chord reaches on either side."""
+
+
+def friction_figure(pushed: dict[str, Any], after: float, folder: Path) -> list[Path]:
+    """``pushed`` has lists ``opening``, ``moved`` (m) and ``slope`` (m) after ``after`` seconds."""
+    opening, moved, slope = (np.array(pushed[name]) for name in ("opening", "moved", "slope"))
+    chord = (moved[2 * STEPS :] - moved[: -2 * STEPS]) / (opening[2 * STEPS :] - opening[: -2 * STEPS])
+    reach = opening[STEPS] - opening[0]
+    with plt.rc_context(STYLE):
+        figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.3), layout="constrained")
+        left.plot(opening, 1e3 * moved, color=DARK, label=f"after {1e3 * after:g} ms")
+        tangents = np.arange(STEPS, len(opening), 2 * STEPS)
+        ends = np.array([[-reach], [reach]])
+        left.plot(opening[tangents], 1e3 * moved[tangents], "o", ms=4, color=ACCENT, label="gradients")
+        left.plot(opening[tangents] + ends, 1e3 * (moved[tangents] + slope[tangents] * ends), color=ACCENT, lw=2.2)
+        left.set(xlabel="opening of the valves of cylinder 2", ylabel="motion of its piston (mm)")
+        right.plot(opening, 1e3 * slope, color=ACCENT, label="gradient")
+        right.plot(opening[STEPS:-STEPS], 1e3 * chord, color=DARK, ls="--", label=f"difference over ±{reach:.2g}")
+        right.set(xlabel="opening of the valves of cylinder 2", ylabel="mm per unit of opening")
+        for axes in (left, right):
+            axes.legend()
+        return save(figure, folder, "gradients_friction")
