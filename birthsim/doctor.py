@@ -25,7 +25,7 @@ class Settings:
 
 def main(_: Settings) -> None:
     """Print it."""
-    from birthsim_env.physics.compiled.compilation import cache_folder
+    from birthsim_env.physics.compiled.kept import cache_folder
 
     print(f"{'Python':12}{platform.python_version()}, {platform.system()} {platform.machine()}, {os.cpu_count()} processors")
     for name in ("birthsim", "gymnasium", "numpy", "numba", "llvmlite", "scipy", "torch"):

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def from_agents(module: str) -> Any:
-    """The module ``agents.<module>``; raises ``ImportError`` in one line where another package of that name is in its place."""
+    """A ``module`` below ``agents``; raises ``ImportError`` in one line where another package of that name is in its place."""
     mend = "rename or uninstall it, then pip install --force-reinstall --no-deps birthsim (from a clone: -e .)"
     try:
         package = import_module("agents")
@@ -17,14 +17,14 @@ def from_agents(module: str) -> Any:
     if not getattr(package, "BELONGS_TO_BIRTHSIM", False):
         place = package.__file__ or ", ".join(package.__path__)
         raise ImportError(f"the package 'agents' at {place} is not BirthSIM's but hides or overwrites it; {mend}")
-    return import_module(f"agents.{module}")
+    return import_module(module)
 
 
 def residual_env(**arguments: Any) -> Any:
     """Entry point of the ids with a law inside."""
-    return from_agents("residual.env").ResidualEnv(**arguments)
+    return from_agents("agents.residual.env").ResidualEnv(**arguments)
 
 
 def residual_vector_env(**arguments: Any) -> Any:
     """Entry point of the vectorised ids with a law inside."""
-    return from_agents("residual.env").ResidualVectorEnv(**arguments)
+    return from_agents("agents.residual.env").ResidualVectorEnv(**arguments)

@@ -39,6 +39,7 @@ STUDIES = {
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
     "pools": Entry("pools", "STUDY", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
+    "recovery-rest": Entry("recovery.study", "AT_REST", "what a log of a rig at rest tells of it"),
     "responses": Entry("responses.study", "STUDY", "frequency responses of the rig, and their resonances"),
     "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
     "soak": Entry("soak.command", "", "10^8 policy steps over all that there is"),

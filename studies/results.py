@@ -16,7 +16,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
     "baselines/work/", "baselines/commands/", "birthsim_env/files.py", "birthsim_env/physics/compiled/sources.py",
-    "studies/study.py", "studies/results.py",
+    "birthsim_env/physics/compiled/kept.py", "studies/study.py", "studies/results.py",
 )  # fmt: skip
 """What reads options and keeps pieces, and decides no figure: a change of it makes no result stale."""
 

@@ -41,7 +41,8 @@ def no_files(options: Options, found: Found, folder: Path) -> list[str]:
 class Study:
     """What is run, over which grid, what is kept of it, and how it is shown.
 
-    ``code`` names the modules that measure: a result is fresh while their sources are as they were. ``options`` has the default
+    ``code`` names the modules that measure, also what they find by an entry point: a result is fresh while their code is as it
+    was. ``options`` has the default
     of each option; a tuple takes several values. ``tasks(options)`` are the pieces by key, ``keep(options, results by key)``
     the figures, as JSON takes them, whose ``units`` are given by column. ``show(result)`` are the texts that stand in
     ``docs/data``, by file name; ``draw(result, folder)`` writes pictures. With ``partial`` some pieces may fail; ``timed``

@@ -14,6 +14,7 @@ from baselines.identification.experiment import propose, read_plan
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.log_file import read_trial, write_trial
+from baselines.identification.quantities import unmeasured
 from baselines.logs.writing import WRITERS
 from baselines.registry import make_controller
 from birthsim_env.files import make_folder, whole_results, write_text
@@ -42,7 +43,7 @@ class Settings(Configured):
     duration: Annotated[float | None, number("S")] = None
     """Duration of the proposed experiment, else 12 s."""
     controller: Annotated[str | None, CONTROLLER] = None
-    """Controller of --simulate, else backstepping."""
+    """Controller of --simulate, else backstepping; for what a log tells it assumes the default rig."""
     sensors: Annotated[Kind | None, Parameter(group=WORLD)] = None
     """Sensors of --simulate, else lab."""
     seed: Seed = 0
@@ -78,7 +79,7 @@ def _propose(settings: Settings, path: Path, rig: Parameters) -> None:
 def _simulate(settings: Settings, path: Path, rig: Parameters) -> None:
     out = _out(settings, (".csv", *WRITERS))
     plan = read_plan(path, rig)
-    law = make_controller(settings.controller or "backstepping", rig)
+    law = make_controller(settings.controller or "backstepping", unmeasured(rig))
     count = int((plan.times[-1] - plan.times[0]) / rig.electronics.control_period)
     with _bar(count, "experiment", "period") as tick:
         trial = run_plan(plan, [rig], law, settings.sensors or "lab", settings.seed, tick)[0]

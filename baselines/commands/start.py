@@ -51,7 +51,7 @@ def load(name: str, package: str, module: str) -> ModuleType:
         # Other distributions have a package of that name too.
         from birthsim_env.learned import from_agents
 
-        found: ModuleType = from_agents(module)
+        found: ModuleType = from_agents(f"{package}.{module}")
         return found
     except ImportError as error:
         print(f"{name}: error: {error}", file=sys.stderr)

@@ -62,6 +62,13 @@ INSIDE = 1e-3
 """Coordinates by which the search stays within what the rig's description allows, more than a step of differences."""
 
 
+def unmeasured(rig: Parameters) -> Parameters:
+    """``rig`` as it is known before its log: what is identified has the default rig's values."""
+    known = {one.name: value_of(Parameters(), one.name) for one in QUANTITIES}
+    known["chambers.dead_volume"] = max(known["chambers.dead_volume"], least_dead_volume(rig))
+    return rig.replace(known)
+
+
 def limits(rig: Parameters, quantities: tuple[Quantity, ...]) -> tuple[Array, Array]:
     """The least and the largest coordinates (Q,) that are looked at, for the rig as its owner describes it."""
     low, high = [], []

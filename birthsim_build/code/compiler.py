@@ -19,7 +19,7 @@ import numpy as np
 from llvmlite.binding import llvm_version_info
 
 from birthsim_build.image import Words
-from birthsim_env.physics.compiled.compilation import cache_folder, keep, kept
+from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
 from birthsim_env.physics.compiled.sources import source_stamp
 
 ONE_LANE = {

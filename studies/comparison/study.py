@@ -147,8 +147,9 @@ def comparison(
     **options: Any,
 ) -> Study:  # fmt: skip
     """A study of some controllers under some conditions; ``options`` are defaults that differ from those of the comparison."""
+    learned = any(own.startswith(LEARNED) for own in options.get("controller", ()))
     return Study(
-        ("studies.comparison.grid",),
+        ("studies.comparison.grid", *(("agents.policy.controller",) if learned else ())),
         {
             "env": ENVIRONMENTS, "controller": tuple(default_controllers()), "sensors": ("ideal", "lab", "honest"),
             "plant": tuple(PLANTS), "episodes": 100, "seed": 0, "parameters": "", **options,

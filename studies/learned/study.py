@@ -166,7 +166,7 @@ def _side_by_side(content: Content, folder: Path) -> list[Path]:
     return [folder / "from_scratch.png"]
 
 
-SOURCES = ("agents.commands.evaluate", "studies.learned.study")
+SOURCES = ("agents.policy.controller", "agents.commands.evaluate", "studies.learned.study")
 UNITS = {"settled_rms": "mm", "stiffness_error": "%", "air": "l/min", "saturation": "%"}
 GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
 WORDS = {"policy": "shipped policies, each in its own worlds"}

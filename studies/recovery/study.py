@@ -1,5 +1,6 @@
 """Randomised rigs, identified from logs of their own."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def _kept(options: Options, found: Found) -> Any:
     return list(found.values())
 
 
-def _shown(content: Content) -> dict[str, str]:
+def _shown(content: Content, name: str) -> dict[str, str]:
     found, settings = content["figures"], content["settings"]
     head = (
         f"{len(found)} of {settings['rigs']} rigs, seeds from {settings['seed']}, experiment {settings['experiment']} of "
@@ -32,7 +33,7 @@ def _shown(content: Content) -> dict[str, str]:
     )
     worst = max(max(result["misfit"]) for result in found)
     last = f"Largest residual over the noise of its log: {worst:.3f}."
-    return {"recovery.md": "\n".join([head, "", *recovery_table(found), "", last]) + "\n"}
+    return {f"{name}.md": "\n".join([head, "", *recovery_table(found), "", last]) + "\n"}
 
 
 def recovery_table(results: list[dict[str, Any]]) -> list[str]:
@@ -57,8 +58,12 @@ def recovery_table(results: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-STUDY = Study(
-    ("studies.recovery.tasks",), {"rigs": 50, "seed": 82000, "duration": 12.0, "experiment": "proposed"}, _tasks, _kept,
-    {"misfit": "of the log's noise", "value": "the parameter's"}, _shown, partial=True,
-    allowed={"experiment": tuple(EXPERIMENTS)}, words={"duration": "s of each experiment", "rigs": "randomised"},
-)  # fmt: skip
+def _recovery(name: str, rigs: int, experiment: str) -> Study:
+    return Study(
+        ("studies.recovery.tasks",), {"rigs": rigs, "seed": 82000, "duration": 12.0, "experiment": experiment}, _tasks, _kept,
+        {"misfit": "of the log's noise", "value": "the parameter's"}, partial(_shown, name=name), partial=True,
+        allowed={"experiment": tuple(EXPERIMENTS)}, words={"duration": "s of each experiment", "rigs": "randomised"},
+    )  # fmt: skip
+
+
+STUDY, AT_REST = _recovery("recovery", 50, "proposed"), _recovery("recovery-rest", 10, "rest")

@@ -14,8 +14,10 @@ from agents.policy.seeds import policy_folders
 from agents.residual.privileged import acting
 from agents.residual.settings import LAWS, is_one_of
 from agents.training.validation import validate
+from baselines.bench.evaluation import evaluate
 from baselines.bench.pieces import file_hash
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, jsonable, number, quantile
+from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.files import finite
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -27,7 +29,11 @@ from studies.haptics.worlds import Condition
 from studies.results import Content
 from studies.study import Found, Options, Study
 
-ERRORS = {"error": "settled error, mm", "stiffness": "stiffness error, %"}
+ERRORS = {"error": "settled error, mm", "stiffness": "error along the push, %"}
+STATIC = "static stiffness error, %: median", "95 %"
+PUSHED = "BirthSIM/Probe-v2"
+"""Where the static stiffness is measured."""
+
 FELT = {"bandwidth": "bandwidth, Hz: mean", "jnd": "JND at 1 Hz: median", "error": "own error, mm: median"}
 MORE = {"bandwidth": "more bandwidth: mean, Hz", "jnd": "less JND: mean", "error": "less own error: mean, mm"}
 """Figures of what a hand feels, and how much better they are than the controller's."""
@@ -87,10 +93,21 @@ def errors(
     else:
         score = validate(env, acting(one.network.acting(), env, _privileged(Path(policy))), seed)
     env.close()
+    static = None if _privileged(Path(policy)) else _static(policy, law, rig, sensors, seed, episodes)
     return {
-        "error": score.error.tolist(), "stiffness": score.stiffness.tolist(), "within": score.feasible.tolist(),
-        "lost": int(score.lost),
+        "error": score.error.tolist(), "stiffness": score.stiffness.tolist(), "static": static,
+        "within": score.feasible.tolist(), "lost": int(score.lost),
     }  # fmt: skip
+
+
+def _static(policy: str, law: str, rig: dict[str, Any], sensors: str, seed: int, episodes: int) -> Any:
+    """Error of the stiffness that a held push finds, per world of ``PUSHED``, %; infinite where the episode is lost."""
+    believed = Parameters.from_dict(rig)
+    controller = make_controller(law, believed) if law else ResidualController(believed, policy)
+    found = evaluate(
+        PUSHED, controller, law or policy, episodes, seed, progress=False, sensors=sensors, parameters=believed, randomize=True
+    )
+    return np.where(found.lost, np.inf, np.abs(found.metrics["stiffness_error"])).tolist()
 
 
 @dataclass(frozen=True)
@@ -146,30 +163,32 @@ def _error_rows(found: Found, law: str, options: Options) -> Iterator[dict[str, 
             yield {
                 "who": f"{Path(name).name} {seed}".strip(), "error": [quantile(error, part) for part in (0.5, 0.95)],
                 "less": less([one], theirs) if name == options.policy else None, "stiffness": quantile(stiffness, 0.5),
+                "static": None if one["static"] is None else [quantile(_array(one, "static"), part) for part in (0.5, 0.95)],
                 "lost": one["lost"],
             }  # fmt: skip
         if name != law:
             mine, others = [one for _, one in of(options.policy)], [one for _, one in of(name)]
             than = theirs if name == options.policy else np.mean([one["error"] for one in others], axis=0)
             label = "all seeds" if name == options.policy else f"all seeds, less than {Path(name).name}"
-            yield {"who": label, "error": None, "less": less(mine, than), "stiffness": None, "lost": None}
+            yield {"who": label, "error": None, "less": less(mine, than), "stiffness": None, "static": None, "lost": None}
 
 
 def _felt_rows(found: Found, law: str, options: Options) -> Iterator[dict[str, Any]]:
-    def array(one: Result, key: str) -> Array:
-        return np.array([np.inf if value is None else value for value in one[key]])
-
     def better(ones: list[Result]) -> dict[str, Any]:
-        gained = {key: np.stack([array(one, key) - array(found["felt", law, ""], key) for one in ones]) for key in FELT}
+        gained = {key: np.stack([_array(one, key) - _array(found["felt", law, ""], key) for one in ones]) for key in FELT}
         return {key: _interval(_mean, own if key == "bandwidth" else -own) for key, own in gained.items()}
 
     policies = {seed: one for (what, name, seed), one in found.items() if (what, name) == ("felt", options.policy)}
     for seed, one in {"": found["felt", law, ""], **policies}.items():
         middle = {
-            key: float(np.mean(array(one, key))) if key == "bandwidth" else quantile(array(one, key), 0.5) for key in FELT
+            key: float(np.mean(_array(one, key))) if key == "bandwidth" else quantile(_array(one, key), 0.5) for key in FELT
         }
         yield {"who": seed or law, **middle, "better": better([one]) if seed else None, "lost": one["lost"]}
     yield {"who": "all seeds", **dict.fromkeys(FELT), "better": better(list(policies.values())), "lost": None}
+
+
+def _array(one: Result, key: str) -> Array:
+    return np.array([np.inf if value is None else value for value in one[key]])
 
 
 def _interval(statistic: Callable[[Array], float], values: Array) -> list[float]:
@@ -188,13 +207,15 @@ def _mean(values: Array) -> float:
 def _shown(content: Content) -> dict[str, str]:
     figures, settings = content["figures"], content["settings"]
     head = ["controller", f"{ERRORS['error']}: median", "95 %", "less: median of the pairs, mm", "mean, mm"]
-    rows = [[*head, f"{ERRORS['stiffness']}: median", "lost"]]
+    rows = [[*head, f"{ERRORS['stiffness']}: median", *STATIC, "lost"]]
     for row in figures["errors"]:
         less = [_entry((row["less"] or {}).get(key)) for key in ("median", "mean")]
-        rows.append([row["who"], *map(_entry, row["error"] or ("", "")), *less, _entry(row["stiffness"]), _entry(row["lost"])])
+        error, static = (map(_entry, row[name] or ("", "")) for name in ("error", "static"))
+        rows.append([row["who"], *error, *less, _entry(row["stiffness"]), *static, _entry(row["lost"])])
     parts = [
         f"{figures['within']} of {settings['episodes']} episodes, seeds from {settings['seed']}, `{settings['sensors']}` "
-        "sensors, randomised rigs, are within the rig's strength. Differences compare the same worlds, with 95 % intervals.",
+        "sensors, randomised rigs, are within the rig's strength. Differences compare the same worlds, with 95 % intervals. "
+        f"The static stiffness is that of a held push in as many worlds of `{PUSHED}`.",
         markdown(rows),
     ]
     if figures["felt"]:

@@ -134,6 +134,6 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 STUDY = Study(
-    (__name__,), {"episodes": 64, "seed": 70000}, _tasks, _kept,
+    (__name__, "agents.policy.controller"), {"episodes": 64, "seed": 70000}, _tasks, _kept,
     {"returns": "reward", "halves": "reward", "error": "mm", "lost": "", "success": ""}, _shown,
 )  # fmt: skip

@@ -67,6 +67,7 @@ def _written(options: Options, found: Found, folder: Path) -> list[str]:
 
 
 STUDY = Study(
-    ("studies.sweeps.work",), {"file": ""}, _tasks, _kept, {}, _shown, _drawn, partial=True, further=_further, write=_written,
-    first="file", words={"file": "TOML file with tables [base], [grid], [draw], [search] and [[map]], as docs/sweeps.md says"},
+    ("studies.sweeps.work", "agents.policy.controller"), {"file": ""}, _tasks, _kept, {}, _shown, _drawn, partial=True,
+    further=_further, write=_written, first="file",
+    words={"file": "TOML file with tables [base], [grid], [draw], [search] and [[map]], as docs/sweeps.md says"},
 )  # fmt: skip

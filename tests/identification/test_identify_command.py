@@ -18,7 +18,12 @@ def test_experiment_and_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
     TRUE.to_toml(rig)
     status, printed, _ = call("identify", monkeypatch, capsys, "--propose", plan, "--duration", 4, "--seed", 3)
     assert (status, printed) == (0, f"written to {plan}: 401 rows of time, target and openings to add to a law's\n")
+    believed: list[Parameters] = []
+    made = identify.make_controller
+    monkeypatch.setattr(identify, "make_controller", lambda name, rig: believed.append(rig) or made(name, rig))
     status, printed, _ = call("identify", monkeypatch, capsys, "--simulate", plan, "--parameters", rig, "--out", log)
+    assert (believed[0].mechanics.mass, believed[0].friction) == (Parameters().mechanics.mass, Parameters().friction)
+    assert (believed[0].geometry, believed[0].electronics.control_period) == (TRUE.geometry, TRUE.electronics.control_period)
     assert (status, printed) == (0, f"written to {log}: 4000 rows, 3.999 s\n")
     assert log.read_text().startswith("time,openings_P1,openings_N1,")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "plan.csv", "true.toml"]

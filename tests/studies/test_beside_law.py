@@ -36,6 +36,7 @@ def test_one_seed_stands_beside_its_controller_and_the_mean_of_one_is_itself(tol
     assert own["error"][0] < law["error"][0], "a law of millimetres, a policy of half of one"
     assert own["less"] == every["less"]
     assert own["less"]["median"][0] > 0.0
+    assert law["static"] is None, "what is told the rig in its own environment runs nowhere else"
 
 
 @pytest.mark.slow
@@ -45,6 +46,8 @@ def test_a_trained_policy_is_better_than_its_law_on_ideal_sensors(told):
     medians = {row["who"]: row["error"][0] for row in found["errors"] if row["error"]}
     assert len(medians) >= 3
     assert max(error for who, error in medians.items() if who.startswith("circle")) < medians[LAW]
+    static = {row["who"]: row["static"][0] for row in found["errors"] if row["static"]}
+    assert max(off for who, off in static.items() if who.startswith("circle")) < static[LAW]
     law, *seeds, every = found["felt"]
     assert max(row["error"] for row in seeds) < law["error"], "own error under a multisine hand"
     for row in seeds:

@@ -6,18 +6,16 @@ only + - * / sqrt occur inside. Without ``fastmath`` every operation is IEEE-exa
 whether it runs in a vector register or alone.
 
 Numba's own cache looks at the file of the outermost function only. Ours names a file by everything that the machine code
-depends on: all source files that the kernel's module imports, directly or not, the signature, the processor and the versions.
+depends on: the code of all files that the kernel's module imports, directly or not, the signature, the processor and the
+versions.
 A file that is missing, damaged or cannot be written costs a compilation, never the command.
 """
 
-import contextlib
 import hashlib
 import os
 import pickle
 import sys
-import tempfile
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,8 +28,8 @@ from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher
 
 import birthsim_env.physics.compiled.resolution  # noqa: F401 (what Numba is asked first)
-from birthsim_env.files import whole_file
-from birthsim_env.physics.compiled.sources import PACKAGES, ROOT, source_stamp
+from birthsim_env.physics.compiled.kept import cache_folder, keep, kept
+from birthsim_env.physics.compiled.sources import PACKAGES, source_stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -39,48 +37,6 @@ BLOCK = int(os.environ.get("BIRTHSIM_BLOCK", "32"))
 """Lanes per block: the scratch rows of one block fit the first-level cache, and their constant stride lets LLVM vectorise.
 
 ``birthsim_build`` compiles for one lane alone, in a process of its own with this variable; no lane's bits depend on it."""
-
-_DIGEST = hashlib.sha256().digest_size
-
-
-@cache
-def cache_folder() -> Path | None:
-    """The first writable folder: $NUMBA_CACHE_DIR, beside the sources, the user's cache; None when there is none."""
-    chosen, home = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
-    folders = [Path(chosen)] if chosen else []
-    folders.append(ROOT / "birthsim_env" / "__pycache__")
-    with contextlib.suppress(RuntimeError):  # of a user without a home directory
-        folders.append(Path(home or Path.home() / ".cache") / "birthsim")
-    for folder in folders:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    return None
-
-
-def kept(path: Path) -> bytes | None:
-    """What ``keep`` wrote; None where a file is missing or damaged."""
-    with contextlib.suppress(OSError):
-        content = path.read_bytes()
-        if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
-            return content[_DIGEST:]
-    return None
-
-
-def keep(path: Path, content: bytes) -> None:
-    """Write ``content`` behind its SHA-256, whole or, where there is no room, not at all.
-
-    Files of older sources, whose names differ only after the last ``-``, go.
-    """
-    with contextlib.suppress(OSError):
-        with whole_file(path) as file:
-            file.write(hashlib.sha256(content).digest() + content)
-        for other in path.parent.glob(f"{path.stem.rpartition('-')[0]}-*{path.suffix}"):
-            if other != path:
-                other.unlink(missing_ok=True)
 
 
 class _DiskCache(NullCache):

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from birthsim_env.files import write_text
-from birthsim_env.physics.compiled.compilation import cache_folder
+from birthsim_env.physics.compiled.kept import cache_folder
 from birthsim_env.physics.gradients.graph import Graph, Scalar, Value
 
 if TYPE_CHECKING:

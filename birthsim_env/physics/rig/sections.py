@@ -116,7 +116,7 @@ class Valves(Part):
     sonic_conductance: float = quantity(3.9e-9, "m3/(s Pa)", "from 100 l/min nominal, 6 to 5 bar; C", least=1e-12, most=2e-8)
     critical_ratio: float = quantity(0.30, "-", "from 100 l/min nominal, 6 to 5 bar; b", least=0, most=0.9)
     leakage_ratio: float = quantity(0.005, "-", "assumed; Cl/C", least=0, most=0.5)
-    time_constant: float = quantity(0.004, "s", "assumed; -3 dB near 125 Hz", least=2e-4, most=10, randomized=(0.0015, 0.008))
+    time_constant: float = quantity(0.004, "s", "assumed; -3 dB at 40 Hz", least=2e-4, most=10, randomized=(0.0015, 0.008))
     deadband: float = quantity(
         0.0,
         "-",

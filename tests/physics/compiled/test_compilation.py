@@ -1,6 +1,5 @@
 """Compiled code is never stale, and no cache file, disk or home directory is needed to compile."""
 
-import ast
 import os
 import shutil
 import subprocess
@@ -9,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from birthsim_env.physics.compiled import compilation
-from birthsim_env.physics.compiled.sources import PACKAGES, dependencies, file_of, imports, source_stamp
+from birthsim_env.physics.compiled import kept as kept_on_disk
+from birthsim_env.physics.compiled import sources
+from birthsim_env.physics.compiled.sources import dependencies, imports, source, source_stamp
 
 ROOT = Path(__file__).parents[3]
 PROBE = """
@@ -43,7 +43,7 @@ def package(tmp_path):
         *(f"physics/{part}" for part in ("electronics", "valves")),
         *(
             f"physics/compiled/{part}"
-            for part in ("compilation", "lanes", "exact", "records", "record_types", "resolution", "sources")
+            for part in ("compilation", "kept", "lanes", "exact", "records", "record_types", "resolution", "sources")
         ),
         *(f"physics/rig/{part}" for part in ("parameters", "quantities", "reading", "sections", "values")),
     ):
@@ -68,6 +68,8 @@ def displaced(package, largest_file=10**9):
 def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(package):
     assert displaced(package) == (pytest.approx(5.17), True)
     assert displaced(package) == (pytest.approx(5.17), False)
+    (package / "probe.py").write_text(f"# A comment.\n{PROBE}")
+    assert displaced(package) == (pytest.approx(5.17), False), "prose compiles nothing"
     (kept,) = package.rglob("*.nbc")
     signals = package / "loop" / "signals.py"
     # The helper is made by ``helper(displacement)``: no decorator stands in that file.
@@ -82,7 +84,7 @@ def test_a_changed_helper_in_another_file_is_compiled_anew_and_nothing_else(pack
     assert displaced(package) == (pytest.approx(2.585), False)
     newer.unlink()
     assert displaced(package, largest_file=1000) == (pytest.approx(2.585), True), "a full disk keeps nothing"
-    assert not [path for path in newer.parent.iterdir() if path.suffix != ".pyc"]
+    assert not [path for path in newer.parent.iterdir() if path.suffix not in (".pyc", ".code")]
 
 
 def test_the_stamp_is_of_all_that_a_kernel_imports():
@@ -98,6 +100,8 @@ def test_the_stamp_is_of_all_that_a_kernel_imports():
 
 
 ODD = """
+'import birthsim_env.observation'
+HIDDEN = "baselines.registry:make_controller"
 import birthsim_env.reward, numpy as np; from birthsim_env import info
 if True: import birthsim_env.success as s
 def f():
@@ -110,23 +114,59 @@ def f():
 """
 
 
-def test_no_import_that_the_syntax_tree_has_is_overlooked(tmp_path):
-    """Nor any of the project's; a line of a docstring that reads like an import does no harm."""
-
-    def of_tree(path):
-        for node in ast.walk(ast.parse(path.read_bytes())):
-            if isinstance(node, ast.Import):
-                yield from (file_of(alias.name) for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                for alias in node.names:
-                    yield file_of(f"{node.module}.{alias.name}") or file_of(node.module)
-
+def test_imports_stand_anywhere_and_names_in_strings_count_where_asked_for(tmp_path):
     odd = tmp_path / "odd.py"
     odd.write_text(ODD)
-    for path in [odd, *(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))]:
-        assert set(filter(None, of_tree(path))) <= imports(path), path
-    stems = {path.parent.name if path.stem == "__init__" else path.stem for path in imports(odd)}
-    assert stems == {"reward", "info", "success", "lanes", "exact", "rows"}
+    found = {named: {path.relative_to(ROOT).as_posix() for path in imports(odd, named)} for named in (False, True)}
+    assert found[False] == {
+        *(f"birthsim_env/{name}.py" for name in ("reward", "info", "success", "loop/rows")),
+        *(f"birthsim_env/physics/compiled/{name}.py" for name in ("lanes", "exact")),
+    }  # fmt: skip
+    assert found[True] - found[False] == {"baselines/registry.py"}
+
+
+CODE = """
+from __future__ import annotations
+import birthsim_env
+
+@kernel
+def f(x: int, y=(1, 2)) -> float:
+    \"\"\"What it does.\"\"\"
+    a = x + 1.0  # a comment
+    return {"k": a, **y}
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "same"),
+    [
+        ("What it does.", "What it did, with 'baselines.registry'.", True),
+        ("  # a comment", "", True),
+        ("from __future__ import annotations\n", "", True),
+        ("x + 1.0", "(\n        x\n        + 1.0\n    )", True),
+        ("1.0", "1.1", False),
+        ("1.0", "1", False),
+        ("@kernel\n", "", False),
+        ("@kernel", "@helper", False),
+        ("x: int", "x: float", False),
+        ("(1, 2)", "(2, 1)", False),
+        ("(1, 2)", "[1, 2]", False),
+        ("**y", "'y': y", False),
+        ("a = x", "a = -x", False),
+        ("import birthsim_env", "import birthsim_env as other", False),
+    ],
+)
+def test_code_counts_and_prose_does_not(tmp_path, monkeypatch, then, now, same):
+    monkeypatch.setattr(sources, "cache_folder", lambda: tmp_path)
+    before, after = tmp_path / "before.py", tmp_path / "after.py"
+    before.write_text(CODE)
+    after.write_text(CODE.replace(then, now))
+    assert after.read_text() != CODE
+    assert (source(before) == source(after)) == same
+    assert len(list(tmp_path.glob("*.code"))) == 2
+    assert source.__wrapped__(after) == source(after), "what is kept says the same"
+    monkeypatch.setattr(sources, "cache_folder", lambda: None)
+    assert source.__wrapped__(after) == source(after)
 
 
 def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_path):
@@ -137,7 +177,7 @@ def test_without_a_writable_folder_or_a_home_there_is_no_cache(monkeypatch, tmp_
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
-    monkeypatch.setattr(compilation, "ROOT", tmp_path / "file")
-    assert compilation.cache_folder.__wrapped__() is None
+    monkeypatch.setattr(kept_on_disk, "PACKAGE", tmp_path / "file")
+    assert kept_on_disk.cache_folder.__wrapped__() is None
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
-    assert compilation.cache_folder.__wrapped__() == tmp_path / "own"
+    assert kept_on_disk.cache_folder.__wrapped__() == tmp_path / "own"
