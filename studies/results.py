@@ -29,12 +29,17 @@ def provenance(modules: tuple[str, ...]) -> Content:
     """What makes a result now, whose figures ``modules`` measure; ``dirty`` if one of their sources is not as committed."""
     sources = hashes(*modules)
     return {
-        "command": " ".join(sys.argv), "commit": _git("rev-parse", "HEAD"),
+        "command": " ".join(sys.argv), "commit": commit(),
         "dirty": bool(_git("status", "--porcelain", "--", *sources)), "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "processor": _processor(),
         "versions": {"python": platform.python_version()} | {library: version(library) for library in LIBRARIES},
         "sources": sources,
     }  # fmt: skip
+
+
+def commit() -> str:
+    """The newest commit here."""
+    return _git("rev-parse", "HEAD")
 
 
 def written(content: Any) -> str:

@@ -3,11 +3,13 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 from birthsim_env.files import write_json, write_text
 from studies.kills.tries import SCENARIOS, Outcome
+from studies.results import commit
 
 COLUMNS = ("times", "tries", "equal", "mixed", "broken", "leftovers", "tracebacks", "more than a line", "workers left", "other")
 
@@ -30,7 +32,8 @@ def write_outcomes(path: Path, outcomes: Sequence[Outcome], seed: int) -> list[d
     """Write what was found, and return all of the file; outcomes of other targets and seeds that it holds stay."""
     new = {outcome.target for outcome in outcomes}
     kept = [one for one in (read_outcomes(path) if path.exists() else []) if one["target"] not in new or one["seed"] != seed]
-    every = [*kept, *({**asdict(outcome), "seed": seed} for outcome in outcomes)]
+    made = {"seed": seed, "commit": commit()[:7], "date": date.today().isoformat()}
+    every = [*kept, *(asdict(outcome) | made for outcome in outcomes)]
     write_json(path, {"outcomes": every})
     return every
 
@@ -56,6 +59,9 @@ def write_page(path: Path, outcomes: Sequence[dict[str, Any]]) -> None:
     slowest, count = max(one["seconds"] for one in outcomes), sum(one["count"] for one in outcomes)
     faults = [f"- {one['target']}, {one['scenario']}, {one['moment']}: {word}" for one in outcomes for word in _faults(one)]
     lines += ["", f"{count} times in {len(outcomes)} tries. Nothing of a killed command ran for longer than {slowest:.1f} s."]
+    for made in dict.fromkeys((one["commit"], one["date"]) for one in outcomes):
+        names = dict.fromkeys(one["target"] for one in outcomes if (one["commit"], one["date"]) == made)
+        lines.append(f"Tried at commit {made[0]}, {made[1]}: {', '.join(names)}.")
     if faults:
         lines += ["", "## What fell short", "", *faults]
     write_text(path, "\n".join(lines) + "\n")

@@ -5,10 +5,14 @@ import shutil
 import numpy as np
 import pytest
 
+from birthsim_env.physics.compiled.sources import ROOT
 from studies.kills import checks
-from studies.kills.report import write_outcomes, write_page
+from studies.kills.report import read_outcomes, write_outcomes, write_page
 from studies.kills.targets import TARGETS, Target
 from studies.kills.tries import Course, Outcome
+from studies.results import commit
+
+DOCS = ROOT / "docs"
 
 
 @pytest.mark.slow
@@ -57,6 +61,11 @@ def test_progress_bars_are_no_complaints():
     assert checks.said(said) == ["birthsim-x: terminated"]
 
 
+def test_the_page_is_that_of_its_outcomes(tmp_path):
+    write_page(tmp_path / "kills.md", read_outcomes(DOCS / "kills.json"))
+    assert (tmp_path / "kills.md").read_text() == (DOCS / "kills.md").read_text()
+
+
 def test_the_page_counts_and_names_what_fell_short(tmp_path):
     outcomes = [
         Outcome("tune", "SIGKILL", "1 s", 1, [-9, 0], equal=True),
@@ -68,3 +77,4 @@ def test_the_page_counts_and_names_what_fell_short(tmp_path):
     assert "| tune | SIGKILL | 4 | 2 | 1 | 0 | 0 | 1 | 0 | 0 | 0 | 1 |" in page
     assert "- tune, SIGKILL, 2 s: left: a.partial" in page
     assert "- tune, SIGKILL, 2 s: differs: a" in page
+    assert f"Tried at commit {commit()[:7]}, " in page
