@@ -10,8 +10,6 @@ sample that comes late hands its gradient to the state that it was taken of. Tar
 functions of time. What is random is held, and what a converter rounds passes as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

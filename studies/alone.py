@@ -1,7 +1,5 @@
 """Studies that need a process whose packages are imported under settings of their own."""
 
-from __future__ import annotations
-
 import os
 import sys
 

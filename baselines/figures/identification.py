@@ -1,7 +1,5 @@
 """Figures of an identification: residuals over time and by lag, and intervals of the parameters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -5,8 +5,6 @@ scores s = J'r of the windows, (J'J)^-1 (sum of s s') (J'J)^-1: it also grows wh
 than a sample (White, Econometrica 1982, with windows in the place of observations). The larger one counts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ states are eliminated (``starts``), so that SciPy's ``least_squares`` sees the p
 windows, and begins at the owner's rig and at the best of many drawn ones; a second one takes all of the trial.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

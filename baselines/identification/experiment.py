@@ -6,8 +6,6 @@ added to those of the law, steps of random size and length, tell conductance and
 away from the end stops, so that the experiment is safe where the law is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

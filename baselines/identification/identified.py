@@ -1,7 +1,5 @@
 """The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

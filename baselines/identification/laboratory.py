@@ -1,7 +1,5 @@
 """An experiment on simulated rigs: plan, law, sensors, and the log that a laboratory would have of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

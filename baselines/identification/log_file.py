@@ -1,7 +1,5 @@
 """Trials as files: what a laboratory's log must hold, what is wrong with one that does not, and logs of simulated rigs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

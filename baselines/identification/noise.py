@@ -1,7 +1,5 @@
 """The noise of pressures and positions: guessed from a log alone, and from the residuals of a fit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from baselines.identification.starts import Noise, Slopes

@@ -1,7 +1,5 @@
 """Predictions of the windows of a trial: every window under every set of parameters, side by side as lanes of the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

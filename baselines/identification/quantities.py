@@ -1,7 +1,5 @@
 """What is identified: parameters of a rig, how they are scaled, and how far from the owner's value they may lie."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a log holds of an experiment, as arrays."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from birthsim_env.physics.compiled.lanes import Array

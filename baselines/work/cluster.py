@@ -1,7 +1,5 @@
 """Ray's workers, on this machine or on many."""
 
-from __future__ import annotations
-
 import os
 import socket
 from collections.abc import Callable, Iterator, Sequence

@@ -3,8 +3,6 @@
 It exits with 1 where a case failed. A case is its kind, seed and number.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tempfile

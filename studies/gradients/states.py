@@ -1,7 +1,5 @@
 """Random states of drawn rigs, far from rest: what derivatives are compared at."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env import Plant

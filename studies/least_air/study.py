@@ -1,7 +1,5 @@
 """How much air the schedule of least air saves, and what it does to the errors."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

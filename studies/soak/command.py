@@ -4,8 +4,6 @@ Every lap is written as it ends; interrupted (Ctrl-C), the same command carries 
 reward or state was not finite or outside its space, or where memory grew.
 """
 
-from __future__ import annotations
-
 import json
 import platform
 import sys

@@ -1,7 +1,5 @@
 """A closed loop differentiated: bits of the forward loop, gradients of what is paid against differences, refusals."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The differentiated plant: bits of the primal, gradients against differences and against forward mode, chain rule, vectors."""
 
-from __future__ import annotations
-
 import platform
 import re
 

@@ -1,7 +1,5 @@
 """PyTorch through the closed loop: a loss of one's own, the end of an episode, and a policy that learns."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``--algorithm apg``: a policy that learns from scratch in seconds, and a training that goes on with the same bits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

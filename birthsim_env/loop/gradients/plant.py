@@ -3,8 +3,6 @@
 The tape has the state at the beginning of a control period; its steps are computed again, with the same bits.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from birthsim_env.loop.gradients.traced import Adjoint, Traced

@@ -3,8 +3,6 @@
 Forward it runs the stages themselves, so that every bit is that of ``loop.Loop``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

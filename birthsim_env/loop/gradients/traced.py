@@ -5,8 +5,6 @@ that ``loop.Loop`` lays out, and rows of its tables count on from there. Constan
 cost nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

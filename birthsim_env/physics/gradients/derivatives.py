@@ -5,8 +5,6 @@ its negative side; the square root of 0 has slope 0. So a spool at zero opens bo
 What a converter rounds passes as it is (straight through).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

@@ -4,8 +4,6 @@ They are one-sided at kinks: a spool at zero, an orifice that begins to choke, a
 turns.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@
 ``_rig`` those of the parameters ``RIG`` after them.
 """
 
-from __future__ import annotations
-
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.gradients.derivatives import forward, reverse

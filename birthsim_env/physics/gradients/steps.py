@@ -4,8 +4,6 @@ The tape has the state before every step; going back, the three trial states of 
 What ``dynamics.settle`` sets to zero, below 1e-30, counts as if it went on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

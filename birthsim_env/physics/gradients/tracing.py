@@ -10,8 +10,6 @@ What Python cannot decide while tracing is an ``UntraceableError``: ``while``, a
 that has no bound, and functions that are neither helpers nor known.
 """
 
-from __future__ import annotations
-
 import ast
 import builtins
 import inspect
