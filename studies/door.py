@@ -42,6 +42,7 @@ STUDIES = {
     "recovery-rest": Entry("recovery.study", "AT_REST", "what a log of a rig at rest tells of it"),
     "responses": Entry("responses.study", "STUDY", "frequency responses of the rig, and their resonances"),
     "scores": Entry("scores.study", "STUDY", "what every environment pays to whom"),
+    "sensorless": Entry("sensorless.study", "STUDY", "what a hand feels without a force sensor"),
     "soak": Entry("soak.command", "", "10^8 policy steps over all that there is"),
     "speed": Entry("speed.study", "STUDY", "speeds, beside what they are to be compared with"),
     "stability": Entry("stability.study", "STUDY", "maps of where a controller is stable"),

@@ -52,15 +52,16 @@ class AdmittanceController(StagedController):
     """Renders any stiffness matrix through friction.
 
     The law turns the hand's force into the motion that the hand should find, estimates what is not known of the rig, friction
-    above all, and follows the motion with a stiff loop (``law``). Without a force sensor it estimates the hand's force from
-    pressures and motion, and never reads ``Measurement.user_force``.
+    above all, and follows the motion with a stiff loop (``law``). Without a force sensor it finds the hand's force from
+    pressures and motion, and never reads ``Measurement.user_force``: by an acceleration sensor (``inertial_force``) where the
+    rig as believed has one, else by positions (``force_observer``).
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         force_sensor: whether the hand's force is measured.
         learn: whether it learns the tracker's noise and, with a force sensor, that sensor's bias and the friction of sliding
-            pistons, which nothing else separates from the hand. It then also reads an acceleration sensor, where positions are
-            samples and the rig as believed has one, and yields faster to large oscillations.
+            pistons, which nothing else separates from the hand, and yields faster to large oscillations. Only then does it read
+            an acceleration sensor, where positions are samples and the rig as believed has one.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -92,6 +93,7 @@ class AdmittanceController(StagedController):
         "ideal": IDEAL,
         "lab": LAB,
         "lab, learning": {**LAB, "rest_gain": 45.0},
+        "lab, sensorless": {**LAB, "rest_gain": 45.0, "friction_fraction": 0.3},
         "inertial": {**IDEAL, "rest_gain": 45.0, "pressure_bandwidth": 30.0},
     }
 
@@ -119,9 +121,10 @@ class AdmittanceController(StagedController):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         rig, noisy = self.parameters, sampled
         board, learns_force = rig.electronics, self._learn and self._force_sensor
-        inert = sampled and learns_force and board.acceleration_bandwidth > 0
+        inert = sampled and self._learn and board.acceleration_bandwidth > 0
         sampled = sampled and not inert
-        kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
+        noisy_kind = "lab, sensorless" if not self._force_sensor else "lab, learning" if self._learn else "lab"
+        kind = "inertial" if inert else noisy_kind if sampled else "ideal"
         g = self._gains[kind]
         least, falls = (SAMPLED_LEAST, MOST_FALLS) if sampled and learns_force else (LEAST_FRACTION, 1.0)
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
@@ -129,6 +132,7 @@ class AdmittanceController(StagedController):
         about = knowledge.beliefs(
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
+            weighed=inert and not self._force_sensor,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))

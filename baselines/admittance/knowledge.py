@@ -19,12 +19,14 @@ from baselines.estimation import (
     force_bias,
     force_observer,
     friction_level,
+    inertial_force,
     observers,
     reference_friction,
     stages,
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.inertial import Moving
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
 from birthsim_env.physics import geometry
@@ -40,7 +42,7 @@ BELIEVED_LIMIT = 120.0
 @helper
 def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     """The hand's force and the noise of a sample. What no force sensor measures of the hand, the observers find."""
-    noise, hand, lanes = known.given.noise, known.hand, memory.fresh.shape[0]
+    noise, hand, lanes = known.given.noise, known.given.force, memory.fresh.shape[0]
     for i in range(lanes):
         noise[i] = about.belief.noise
         for k in range(2):
@@ -51,9 +53,6 @@ def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
             noise[i] = math.sqrt(memory.tracker.variance[i])
     if about.most_bias > 0.0:
         force_bias.tare(memory.bias, seen.time, seen.user_force, about.most_bias, about.belief.period, hand)
-    for i in range(lanes):
-        for k in range(2):
-            known.given.force[k, i] = hand[k, i] if about.force_sensor > 0.0 else 0.0
 
 
 @helper
@@ -99,7 +98,11 @@ def learn(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     fresh, belief, joints = memory.fresh, about.belief, memory.joints
     if about.friction_rate > 0.0:
         friction_level.learn(memory.friction, known.drag, joints, known.unexplained, about.friction_rate, belief, fresh)
-    if about.force_sensor == 0.0:
+    if about.weighed > 0.0:
+        place, pressures = int(about.place), memory.chambers.pressure
+        moving = Moving(seen.rows[place : place + Moving.size])
+        inertial_force.observe(memory.hand, memory.hold, seen.time, moving, joints, pressures, belief.rig, belief.period, fresh)
+    elif about.force_sensor == 0.0:
         force_observer.observe(memory.hand, seen.time, joints, known.unexplained, belief.rig, belief.period, fresh)
 
 
@@ -110,7 +113,9 @@ def know(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> int:
     Returns how many stiffness setpoints are not positive definite.
     """
     sense(seen, memory, known, about)
-    missed = admittance.give_way(memory.offset, seen.asked, known.hand, about.compliance, seen.damping_factor, known.motion)
+    missed = admittance.give_way(
+        memory.offset, seen.asked, known.given.force, about.compliance, seen.damping_factor, known.motion
+    )
     admittance.mark_moving(known.motion, known.given.moving)
     predict(seen, memory, known, about)
     correct(seen, memory, known, about)
@@ -137,5 +142,5 @@ def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, flo
         **{"belief": observers.belief(rig, gains["bandwidth"]), "compliance": stages.compliance(rig), "place": POSITION},
         **{"sampled": sampled, "force_sensor": True, "learns_noise": False, "rows_of_memory": len(fresh_memory(rig, sampled))},
         **{"trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period)},
-        **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, **others},
+        **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, "weighed": False, **others},
     }

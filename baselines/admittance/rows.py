@@ -4,6 +4,7 @@ from baselines.estimation.admittance import Compliance
 from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.held_force import Hold
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
@@ -44,6 +45,7 @@ class Memory(Rows):
     bias = rows("bias_x bias_y", "N", "bias of the force sensor")
     friction = part(Friction, "level of friction")
     hand = part(Hand, "force of the hand without a sensor")
+    hold = part(Hold, "whether the head rests, without a force sensor")
     follower = part(Follower, "loop")
     pistons = part(Pistons, "observer")
 
@@ -56,7 +58,6 @@ class Known(Rows):
     unseen = rows("U1 U2", "N", "all that is unseen along the pistons: friction as believed and what is observed besides")
     drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
     unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
-    hand = rows("Fx Fy", "N", "force of the hand, measured or found")
 
 
 class Beliefs(Numbers):
@@ -66,6 +67,7 @@ class Beliefs(Numbers):
     compliance = part(Compliance, "what gives way")
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
+    weighed = number("1", "1 where an acceleration sensor tells the hand's force")
     learns_noise = number("1", "1 where the tracker's noise is learned")
     place = number("1", "row of ``Seen`` at which a ``Point`` stands")
     rows_of_memory = number("1", "rows of the memory")

@@ -42,6 +42,12 @@ class Memory(Rows):
     past = rows(0, "m", "x, y of the last periods in turns, a ring")
 
 
+class Moving(Point):
+    """What the stage hands on."""
+
+    acceleration = rows("ax ay", "m/s2", "acceleration without the bias of its sensor")
+
+
 class Gains(Numbers):
     """Constants of the stage."""
 
@@ -51,8 +57,8 @@ class Gains(Numbers):
 
 
 @helper
-def observe(memory: Memory, signals: Signals, about: Gains, point: Point) -> None:
-    """Carries ``memory`` on by one period and writes ``point``, where the end effector is now.
+def observe(memory: Memory, signals: Signals, about: Gains, point: Moving) -> None:
+    """Carries ``memory`` on by one period and writes ``point``, where and how fast the end effector is now.
 
     The measured velocity counts at a new start only.
     """
@@ -98,14 +104,15 @@ def observe(memory: Memory, signals: Signals, about: Gains, point: Point) -> Non
                 memory.velocity[axis, i] += (to_speed + to_rate * age) * innovation
                 memory.bias[axis, i] -= to_rate * innovation
             point.position[axis, i], point.velocity[axis, i] = memory.position[axis, i], memory.velocity[axis, i]
+            point.acceleration[axis, i] = signals.acceleration[axis, i] - memory.bias[axis, i]
 
 
 @kernel
 def stage(world: int, seen: Seen, memory: int, about: Gains, tables: int, lane: int, n: int) -> int:
-    """Writes a ``Point`` to the first rows that are handed on."""
+    """Writes ``Moving`` to the first rows that are handed on."""
     signals = Seen(seen.rows[:, :n])
     own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
-    observe(own, signals, about, Point(signals.handed[: Point.size]))
+    observe(own, signals, about, Moving(signals.handed[: Moving.size]))
     return 0
 
 

@@ -43,10 +43,10 @@ def pulling_hand(size: float) -> Hand:
     return hand
 
 
-def flight(recording: Recording, target: Array) -> dict[str, Array]:
-    """Of a recording with a target (2, N), m, after the hand is gone, (N,) each: ``overshoot``, m, the farthest point beyond
-    the target, against the pull; ``speed``, m/s, the largest."""
-    after = recording.part(FREE, float(recording.time[-1]) + 1.0)
+def flight(recording: Recording, target: Array, free: float = FREE) -> dict[str, Array]:
+    """Of a recording with a target (2, N), m, after the hand is gone, at ``free``, s, (N,) each: ``overshoot``, m, the farthest
+    point beyond the target, against the pull; ``speed``, m/s, the largest."""
+    after = recording.part(free, float(recording.time[-1]) + 1.0)
     beyond = target[0] - after.position[:, 0]
     return {
         "overshoot": np.maximum(beyond.max(axis=0), 0.0), "speed": np.sqrt((after.velocity**2).sum(axis=1)).max(axis=0)

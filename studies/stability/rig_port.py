@@ -51,7 +51,7 @@ class RigPort:
     With ``force_sensor`` False the law sees a force of zero. Raises ``ValueError`` for a target outside the workspace.
 
     Besides what ``Port`` has: ``air`` (N,), kg from the supply; ``saturated`` (N,), periods with a valve at its limit;
-    ``impacts`` (N,), m/s, the fastest collision with an end stop.
+    ``impacts`` (N,), m/s, the fastest collision with an end stop; ``openings`` (4, N), those last commanded.
     """
 
     def __init__(
@@ -71,6 +71,7 @@ class RigPort:
         self.energy, self.air = np.zeros(self.lanes), np.zeros(self.lanes)
         self.saturated, self.impacts = np.zeros(self.lanes), np.zeros(self.lanes)
         self._hand: Hand = no_hand
+        self.openings = self._loop.opened
         self._loop.close([self._push], carry=[self._answer])
 
     def motion(self) -> Array:

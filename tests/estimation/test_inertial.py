@@ -6,7 +6,6 @@ from scipy.linalg import solve_continuous_are
 
 from baselines.estimation import inertial
 from birthsim_env.loop.rows import Signals
-from birthsim_env.loop.signals import Point
 from birthsim_env.physics.rig.parameters import Parameters
 
 PERIOD, EVERY = 1e-3, 4
@@ -23,7 +22,12 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
     """
     stage, rng = inertial.law_stage(Parameters()), np.random.default_rng(7)
     memory, gains = inertial.Memory(np.repeat(stage.fresh[:, None], lanes, axis=1)), inertial.Gains(stage.constants)
-    point, signals, found, errors = Point(np.empty((4, lanes))), Signals(np.zeros((Signals.size, lanes))), [], []
+    point, signals, found, errors = (
+        inertial.Moving(np.empty((inertial.Moving.size, lanes))),
+        Signals(np.zeros((Signals.size, lanes))),
+        [],
+        [],
+    )
     taken = [(begin, *(np.full((2, lanes), one) for one in motion(begin)))]
     truth = []
     for k in range(ticks):
@@ -40,7 +44,7 @@ def run(ticks, motion, acceleration, noise=0.0, latency=0.004, lost=0.0, lanes=1
             for own, off in zip((memory.position, memory.velocity, memory.bias), wrong, strict=True):
                 own[:] += off
         truth.append(np.array([[x], [x], [v], [v]]) + np.zeros((4, lanes)))
-        found.append(point.rows.copy())
+        found.append(point.rows[:4].copy())
         errors.append(point.position - x)
     return np.array(truth), np.array(found), np.array(errors)[::EVERY]
 

@@ -1,0 +1,69 @@
+"""A force that is found, not measured, at rest: what a resting piston tells of it is noise.
+
+The force is followed while it moves, and held at rest:
+
+- it is at rest once ``quick`` has stayed within ``STIRS`` of ``slow``, which are the force low-passed, for ``SETTLES``;
+- at rest the force is averaged over the time since then, at most over 1/``DRIFT``;
+- a rest ends where ``quick`` is off by more than ``QUICK_LIMIT`` or ``slow`` by more than ``SLOW_LIMIT``.
+"""
+
+from birthsim_env.physics.compiled.compilation import helper
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.records import Rows, row, rows
+
+QUICK, SLOW = 20.0, 3.0
+"""1/s, of the low-passes on which a rest is judged; assumed. At rest they have a noise of 1.4 and 0.7 N."""
+
+STIRS, QUICK_LIMIT, SLOW_LIMIT = 2.5, 8.0, 3.5
+"""N; found by trial. Larger limits miss small pushes, smaller ones let noise end a rest."""
+
+SETTLES = 0.9
+"""s that the force must stay as it is before the head counts as resting; found by trial."""
+
+FIRST, AVERAGED, DRIFT = 0.1, 0.4, 0.2
+"""s, s and 1/s: the force at rest is a mean that begins with the weight of ``FIRST``, for ``AVERAGED``, and then a low-pass."""
+
+
+class Hold(Rows):
+    """What tells a head that rests."""
+
+    quick = rows("quick_x quick_y", "N", "force, low-passed with ``QUICK``")
+    slow = rows("slow_x slow_y", "N", "force, low-passed with ``SLOW``")
+    still = row("s", "since the force moved, until the head counts as resting")
+    rested = row("s", "since the head rests; 0 while it does not")
+
+
+@helper
+def hold(memory: Hold, bare: Array, period: float, fresh: Array, force: Array) -> None:
+    """Writes ``force`` (2, N), N: the ``bare`` one (2, N), or at rest its mean."""
+    for i in range(fresh.shape[0]):
+        _hold(memory, force, bare, i, period, fresh[i] > 0.0)
+
+
+@helper
+def _hold(hold: Hold, force: Array, bare: Array, i: int, period: float, new: bool) -> None:
+    """``hold`` of lane ``i``."""
+    if new:
+        hold.still[i], hold.rested[i] = 0.0, 0.0
+    stirred, quick_off, slow_off = 0.0, 0.0, 0.0
+    for axis in range(2):
+        now = bare[axis, i]
+        quick = now if new else hold.quick[axis, i] + period * QUICK * (now - hold.quick[axis, i])
+        slow = now if new else hold.slow[axis, i] + period * SLOW * (quick - hold.slow[axis, i])
+        hold.quick[axis, i], hold.slow[axis, i] = quick, slow
+        held = force[axis, i]
+        stirred, quick_off, slow_off = (
+            stirred + (quick - slow) ** 2,
+            quick_off + (quick - held) ** 2,
+            slow_off + (slow - held) ** 2,
+        )
+    resting = hold.rested[i] > 0.0
+    if resting and (quick_off > QUICK_LIMIT * QUICK_LIMIT or slow_off > SLOW_LIMIT * SLOW_LIMIT):
+        hold.still[i], hold.rested[i] = 0.0, 0.0
+    elif not resting:
+        hold.still[i] = 0.0 if stirred > STIRS * STIRS else hold.still[i] + period
+    rested = hold.rested[i] + period if hold.still[i] > SETTLES else 0.0
+    hold.rested[i] = rested
+    share = 1.0 if rested == 0.0 else period / (FIRST + rested) if rested < AVERAGED else period * DRIFT
+    for axis in range(2):
+        force[axis, i] = bare[axis, i] if new else force[axis, i] + share * (bare[axis, i] - force[axis, i])

@@ -1,0 +1,1 @@
+"""What a hand feels of a rig without a force sensor."""

@@ -1,0 +1,76 @@
+"""A rig without a force sensor, with and without an acceleration sensor, beside a rig that has a force sensor."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.pieces import controller_settings
+from baselines.bench.statistics import jsonable, number, quantile
+from baselines.work.tasks import Task
+from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.rig.parameters import load_parameters
+from studies.comparison.tables import markdown
+from studies.results import Content
+from studies.sensorless.measures import measure
+from studies.sensorless.rigs import OFF, PLANTS, believed
+from studies.study import Found, Options, Study
+
+RIGS = {
+    "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),
+    "neither": ("admittance-sensorless", None),
+    "force": ("admittance-adaptive", None),
+}
+"""Sensors besides positions and pressures -> the controller that makes the best of them, and its rig."""
+
+LANES = {"nominal": 64, "randomised": 64, "known": 16}
+"""Worlds of a piece, which share what the controller believes."""
+
+COLUMNS = {
+    "stiffness_error": "stiffness error, %", "hunting": "hunting, mm", "clamped_mm": "held by a clamp, mm", "clamped_N": "N",
+    "noticed": "JND at 1 Hz", "overshoot": "overshoot after 190 and 241 N, mm", "circle": "circle, mm",
+    "air": "air of a push, l/min", "clamped_air": "held, l/min", "turns": "valve turns, 1/s",
+}  # fmt: skip
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    found = {}
+    for (rig, (controller, file)), plant in product(RIGS.items(), options.plant):
+        parameters = load_parameters(ROOT / file if file else None)
+        for first in range(options.seed, options.seed + options.episodes, LANES[plant]):
+            own = controller_settings(controller, believed(parameters, plant, first))
+            more = {
+                "sensors": "honest", "force_sensor": rig == "force", "seed": first,
+                "lanes": min(LANES[plant], options.seed + options.episodes - first),
+            }  # fmt: skip
+            stem = f"{rig.replace(', ', '-').replace(' ', '-')}/{plant}-{first}"
+            found[rig, plant, first] = Task(stem, rig, measure, {**own, **more})
+    return found
+
+
+def _kept(options: Options, found: Found) -> Any:
+    rows = []
+    for rig, plant in product(RIGS, options.plant):
+        pieces = [result for key, result in found.items() if key[:2] == (rig, plant)]
+        values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, "lost")}
+        figures = {name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in COLUMNS}
+        lost = int(values["lost"].sum())
+        rows.append({"rig": rig, "plant": plant, "lost": lost, "of": len(values["lost"]), "figures": figures})
+    return jsonable(rows)
+
+
+def _shown(content: Content) -> dict[str, str]:
+    words = {"known": f"known to {100 * OFF:g} %"}
+    rows = [["force or acceleration sensor", "rig", *COLUMNS.values(), "lost"]]
+    for row in content["figures"]:
+        cells = [", ".join(number(value) for value in row["figures"][name][:2]) for name in COLUMNS]
+        rows.append([row["rig"], words.get(row["plant"], row["plant"]), *cells, f"{row['lost']} of {row['of']}"])
+    return {"sensorless.md": markdown(rows) + "\n"}
+
+
+STUDY = Study(
+    ("studies.sensorless.measures",), {"plant": PLANTS, "episodes": 128, "seed": 330000}, _tasks, _kept,
+    {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm", "circle": "mm",
+     "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
+    _shown, allowed={"plant": PLANTS}, words={"plant": "what the controller knows of the rig"},
+)  # fmt: skip
