@@ -67,9 +67,8 @@ def _know(world: int, seen: Seen, memory: int, about: About, tables: int, lane: 
         )
         x, y = r2 * sine, -r2 * cosine
         vx, vy = v2 * sine - kappa * v1 * cosine, -v2 * cosine - kappa * v1 * sine
-        given = compliance(
-            known.hand[0, i], known.hand[1, i], target.stiffness[0, i], target.stiffness[1, i], target.stiffness_coupling[i]
-        )
+        hand, stiffness = known.given.force, target.stiffness
+        given = compliance(hand[0, i], hand[1, i], stiffness[0, i], stiffness[1, i], target.stiffness_coupling[i])
         told.error[0, i], told.error[1, i] = x - motion.position[0, i], y - motion.position[1, i]
         told.error_rate[0, i], told.error_rate[1, i] = vx - motion.velocity[0, i], vy - motion.velocity[1, i]
         for axis in range(2):
