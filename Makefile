@@ -47,7 +47,8 @@ STUDENT := circle_honest_student
 # Policies by gradients: scenario, and its environment.
 BY_GRADIENTS := circle:Circle-v1 probe:Probe-v2 descent:Descent-v1 forceps:Forceps-v1 dystocia:Dystocia-v1 vacuum:Vacuum-v0
 GRADIENTS := $(foreach pair,$(BY_GRADIENTS),$(firstword $(subst :, ,$(pair)))_apg) circle_residual_apg
-LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT)
+HONEST := circle_honest_apg
+LEARNED := $(SCENARIOS) $(ON_CIRCLE) $(GRADIENTS) $(STUDENT) $(HONEST)
 HONEST_RIG := --parameters examples/honest_sensors_rig.toml
 POLICIES := agents/policies
 
@@ -214,6 +215,7 @@ policies: $(READY)
 	for pair in $(BY_GRADIENTS); do id=$${pair#*:}; $(BIN)/birthsim train --config circle_apg --env BirthSIM/$${id%-*}Residual-$${id#*-} \
 	  --seeds 5 --jobs 2 --out $(OUT)/training/$${pair%:*}_apg || exit 1; done
 	$(BIN)/birthsim train --config circle_residual_apg --seeds 5 --jobs 2 --out $(OUT)/training/circle_residual_apg
+	$(BIN)/birthsim train --config $(HONEST) --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/$(HONEST)
 	$(BIN)/birthsim train --config circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) --out $(OUT)/training/circle_honest_told
 	$(BIN)/birthsim distill --teacher $(OUT)/training/circle_honest_told --seeds 5 --jobs 2 $(HONEST_RIG) \
 	  --out $(OUT)/training/$(STUDENT)

@@ -21,6 +21,7 @@ STUDIES = {
     "sweep",
     "scores",
     "beside-law",
+    "own-motion",
     "worst",
     "pools",
     "air",

@@ -20,9 +20,10 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 def run(settings: Settings) -> None:
     """Train every seed and report."""
     training, residual = _settings(settings)
-    check_environment(training.environment, residual=True)
     rig = load_parameters(settings.parameters)
-    check_world(training.environment, parameters=rig, randomize=training.randomize, sensors=training.sensors)
+    for name, hand in training.worlds():
+        check_environment(name, residual=True)
+        check_world(name, parameters=rig, randomize=training.randomize, sensors=training.sensors, **hand)
     first = training.seed if settings.seed is None else settings.seed
     seeds = range(first, first + settings.seeds)
     make_folder(settings.out)

@@ -18,7 +18,7 @@ class _LawInside:
         for name in inside:
             if name in arguments:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
-        own = ("law", "impedance", "authority", "time_constant")
+        own = ("law", "impedance", "authority", "time_constant", "informed")
         refuse_unknown(arguments, (*own, "num_envs", "max_episode_steps", "autoreset_mode"), inside)
         rig = load_parameters(arguments.pop("parameters", None))
         shared = {name: arguments[name] for name in ("policy_period", "force_sensor") if name in arguments}
@@ -47,15 +47,16 @@ class ResidualEnv(_LawInside, BirthSIMEnv):
     ## Observation space
     That of `BirthSIMEnv`. After the last action follow three more groups. First the smoothed action. Then the fractions of the
     authority that are left; they fall where pistons oscillate. Last the forces on pistons 1 and 2 that the model does not
-    explain, in units of 100 N: now, when the piston last moved out, and when it last moved in. `observation_names` lists all.
+    explain, in units of 100 N: now, when the piston last moved out, and when it last moved in. An `informed` policy also sees
+    what the admittance controller would know (`agents.residual.insight`). `observation_names` lists all.
 
     ## Reward, start, end and info
     Those of `BirthSIMEnv`.
 
     ## Arguments
     Those of `BirthSIMEnv` without `action_mode`, `valves` and `actuation`, and `law` (one of `agents.residual.settings.LAWS`),
-    `impedance`, `authority` (N) and `time_constant` (s). Without a `force_sensor` neither the law nor the policy gets the
-    hand's force. It is then a part of the unexplained forces.
+    `impedance`, `authority` (N), `time_constant` (s) and `informed`. Without a `force_sensor` neither the law nor the policy
+    gets the hand's force. It is then a part of the unexplained forces.
 
     ## Version history
     - v1: as `BirthSIMEnv` v1.

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from agents.residual import authority, unexplained
+from agents.residual import authority, insight, unexplained
 from agents.residual.pistons import Found, observed
 from agents.residual.settings import NO_LAW, ResidualSettings
+from baselines.controller import require_stiffness
 from baselines.impedance import Impedance, declared_by
 from baselines.registry import make_controller
 from baselines.staged import CompiledDriving, LawStage, StagedController
@@ -72,7 +73,8 @@ def action_names(settings: ResidualSettings) -> tuple[str, ...]:
 def memory_names(settings: ResidualSettings) -> tuple[str, ...]:
     """What each row of ``ResidualLaw.memory`` says."""
     smooth = (f"smoothed action: {name}" for name in action_names(settings))
-    return (*smooth, *(f"fraction of the authority on cylinder {i}, 1" for i in (1, 2)), *UNEXPLAINED)
+    left = (f"fraction of the authority on cylinder {i}, 1" for i in (1, 2))
+    return (*smooth, *left, *UNEXPLAINED, *(insight.ENTRIES if settings.informed else ()))
 
 
 def observation_names(settings: ResidualSettings) -> tuple[str, ...]:
@@ -110,6 +112,7 @@ class Constants(Numbers):
     has_law = number("1", "1 with a law")
     stiffens = number("1", "1 where the impedance has a stiffness")
     damps = number("1", "1 where it has a damping")
+    told = number("1", "how many entries of ``insight.Insight`` are shown")
     period = number("s", "control period")
     rig = part(Rig, "the rig as described")
 
@@ -175,6 +178,8 @@ def _stage(world: int, seen: Seen, memory: Memory, about: Constants, tables: int
         seen.damping_factor[i] = said.damping_factor[i] if about.damps > 0.0 else 0.0
         for k in range(unexplained.Forces.size):
             shown[size + 2 + k, i] = max(-LIMIT, min(LIMIT, memory.unexplained.rows[k, i] / about.unit))
+        for k in range(int(about.told)):
+            shown[size + 2 + unexplained.Forces.size + k, i] = max(-LIMIT, min(LIMIT, seen.handed[Found.size + k, i]))
         for valve in range(4 if about.has_law == 0.0 else 0):
             seen.opening[valve, i] = action[valve, i]
     if about.stiffens > 0.0:
@@ -193,7 +198,7 @@ class ResidualLaw(StagedController):
         # Every law takes forces to believe in; those that have an impedance also a damping factor.
         self._law: Any = None if settings.law == NO_LAW else make_controller(settings.law, self.parameters)
         self.action: Array = np.zeros((settings.size, 0))
-        self.shown: Array = np.zeros((settings.size + len(UNEXPLAINED) + 2, 0))
+        self.shown: Array = np.zeros((len(memory_names(settings)), 0))
 
     def law_stages(self, sampled: bool) -> list[LawStage]:
         settings, board = self.settings, self.parameters.electronics
@@ -202,16 +207,24 @@ class ResidualLaw(StagedController):
             unit=FORCE_UNIT, has_law=self._law is not None, period=board.control_period, rig=self._p,
             quickness=1.0 - exact.number("exp", -board.control_period / settings.time_constant),
             stiffens=settings.impedance != "fixed", damps=settings.impedance == "variable",
+            told=insight.Insight.size if settings.informed else 0,
         )  # fmt: skip
         own = LawStage(_stage, constants, Memory.lane(limiter=authority.Limiter.lane(left=1.0)))
-        return [observed(self.parameters, sampled), own, *(self._law.law_stages(sampled) if self._law is not None else ())]
+        known = [observed(self.parameters, sampled)]
+        if settings.informed:
+            known = insight.informed(self.parameters, sampled, settings.force_sensor)
+        self._place = len(known)
+        return [*known, own, *(self._law.law_stages(sampled) if self._law is not None else ())]
 
     def declared_impedance(self, reference: Reference) -> Impedance | None:
         """What the law underneath means to render, over N lanes; None without a law."""
         return declared_by(self._law, reference)
 
     def explain(self, measurement: Measurement, reference: Reference) -> None:
-        self._law.explain(measurement, reference)
+        if self._law is None:
+            require_stiffness(reference, 0.0)
+        else:
+            self._law.explain(measurement, reference)
 
     def reset(self, lanes: Mask | None = None) -> None:
         super().reset(lanes)
@@ -235,7 +248,7 @@ class ResidualLaw(StagedController):
     @property
     def limiter(self) -> authority.Limiter:
         """What limits the authority."""
-        return Memory(self._memories[1]).limiter
+        return Memory(self._memories[self._place]).limiter
 
     @property
     def asked(self) -> Reference:

@@ -43,6 +43,7 @@ class ResidualSettings:
     - ``time_constant`` (s) of the low-pass between an action and the law: without it single lanes oscillate.
     - ``policy_period`` (s).
     - ``force_sensor``: without one, neither a law of ``FORCE_LAWS`` nor an impedance that varies, which need the hand's force.
+    - ``informed``: the policy also observes ``agents.residual.insight``.
 
     Raises ``ValueError`` for values outside these limits.
     """
@@ -53,6 +54,7 @@ class ResidualSettings:
     time_constant: float = 0.028
     policy_period: float = 0.01
     force_sensor: bool = True
+    informed: bool = False
 
     def __post_init__(self) -> None:
         for name, low, high in (("authority", 0.0, 500.0), ("time_constant", 0.0, 1.0), ("policy_period", 0.0, 1.0)):
@@ -65,8 +67,9 @@ class ResidualSettings:
                 raise ValueError(f"{name} = {shown(value)}; allowed: {', '.join(map(repr, allowed))}")
         if self.impedance != "fixed" and (self.law.startswith("admittance") or self.law == NO_LAW):
             raise ValueError(f"impedance = {self.impedance!r}; allowed: 'fixed', law = {self.law!r} has no impedance to vary")
-        if not isinstance(self.force_sensor, bool):
-            raise ValueError(f"force_sensor = {shown(self.force_sensor)}; allowed: True, False")
+        for name in ("force_sensor", "informed"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"{name} = {shown(getattr(self, name))}; allowed: True, False")
         if not self.force_sensor and (self.impedance != "fixed" or is_one_of(self.law, FORCE_LAWS)):
             raise ValueError(
                 f"force_sensor = False with law = {self.law!r}, impedance = {self.impedance!r}; allowed: impedance = 'fixed' "

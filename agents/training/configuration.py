@@ -25,6 +25,9 @@ COUNTS = {
 LAYERS, WIDEST = 8, 2048
 """Hidden layers, and units in one."""
 
+TARGETS = ("spring", "impedance")
+"""Where an end effector should be: on the compliant target (19), or where ``admittance``'s mass, damper and spring would be."""
+
 COLLECTED = 2**22
 """Steps of all lanes that PPO keeps between updates: some hundred floats each."""
 
@@ -39,9 +42,11 @@ class TrainingSettings:
     """An experiment and its algorithm.
 
     PPO uses ``rollout``, ``epochs`` and ``gae_lambda``; SAC and TQC use ``gradient_steps``, per step of all lanes; the analytic
-    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount`` alone. The learning
-    rate falls linearly to a hundredth. The training ends early once the pooled settled error of its policy in validation is
-    ``until`` percent below that of the paper's law; with 100 it never ends early. A
+    policy gradient (apg) uses ``rollout``, its horizon, ``learning_rate`` and ``discount``, and it alone takes another
+    ``target`` than the spring, and worlds ``beside`` those of ``environment``, which share the lanes evenly: each an id, and
+    after a space the name of a hand where it is not the scenario's. The learning rate falls linearly to a hundredth. The
+    training ends early once the pooled settled error of its policy in validation is ``until`` percent below that of the
+    paper's law; with 100 it never ends early. A
     ``privileged`` policy observes the true figures of the rig (``agents.residual.privileged``), and runs in no controller.
     Raises ``ValueError`` naming what cannot be.
     """
@@ -66,11 +71,13 @@ class TrainingSettings:
     validations: int = 6
     until: float = 100.0
     privileged: bool = False
+    target: str = "spring"
+    beside: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, allowed in (
             ("algorithm", ALGORITHMS), ("sensors", tuple(SENSORS)), ("randomize", RANDOMIZE),
-            ("privileged", (True, False)),
+            ("privileged", (True, False)), ("target", TARGETS),
         ):  # fmt: skip
             one_of(name, getattr(self, name), allowed)
         if not isinstance(self.environment, str):
@@ -86,6 +93,19 @@ class TrainingSettings:
         whole = all(isinstance(width, int) and not isinstance(width, bool) and 1 <= width <= WIDEST for width in widths)
         if not (whole and 1 <= len(widths) <= LAYERS):
             raise ValueError(f"hidden = {shown(self.hidden)}; allowed: 1 to {LAYERS} whole numbers from 1 to {WIDEST}")
+        if not (isinstance(self.beside, tuple) and all(isinstance(one, str) for one in self.beside)):
+            raise ValueError(f"beside = {shown(self.beside)}; allowed: ids of residual environments, with hands after a space")
+        for name, plain in (("target", TARGETS[0]), ("beside", ())):
+            if self.algorithm != "apg" and getattr(self, name) != plain:
+                raise ValueError(
+                    f"{name} = {shown(getattr(self, name))} with algorithm = {self.algorithm!r}; allowed: {plain!r}"
+                )
+        groups = 1 + len(self.beside)
+        for name in ("lanes", "validation_lanes"):
+            if getattr(self, name) % groups:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)}; allowed: a multiple of {groups}, one part for each of the worlds"
+                )
         if self.algorithm == "apg" and self.privileged:
             raise ValueError("privileged = True with algorithm = 'apg'; allowed: False")
         if self.algorithm in ("ppo", "apg") and self.lanes * self.rollout > COLLECTED:
@@ -96,7 +116,12 @@ class TrainingSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON takes it."""
-        return {**asdict(self), "hidden": list(self.hidden)}
+        return {**asdict(self), "hidden": list(self.hidden), "beside": list(self.beside)}
+
+    def worlds(self) -> list[tuple[str, dict[str, Any]]]:
+        """The id of each kind of worlds, and its hand as an argument, where it is not the scenario's."""
+        named = [one.partition(" ") for one in (self.environment, *self.beside)]
+        return [(name, {"user_force": hand} if hand else {}) for name, _, hand in named]
 
 
 def configuration_names() -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,10 @@ import numpy as np
 
 from agents.policy.files import Policy, policy_content, save_policy
 from agents.policy.network import PolicyNetwork
-from agents.residual.privileged import acting
+from agents.residual.privileged import PolicyFunction, acting
 from agents.residual.settings import ResidualSettings
 from agents.training.configuration import TrainingSettings
-from agents.training.validation import merit, validate
+from agents.training.validation import joined, merit, validate
 from birthsim_env.physics.rig.parameters import Parameters
 
 LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "saturation_percent")
@@ -20,25 +21,25 @@ LOGGED = ("pooled_mm", "tail_mm", "stiffness_error_percent", "hunting_mm", "satu
 
 
 class Reached:
-    """Validates policies at equal intervals in the worlds of ``env``, and keeps the best one in ``folder``.
+    """Validates policies at equal intervals in the worlds of ``envs``, and keeps the best one in ``folder``.
 
     ``past`` is what an earlier one of the same training had written to its checkpoint. ``paper`` has the same worlds under the
     paper's law, where the training shall end once it is far enough below that law's error.
     """
 
     def __init__(
-        self, settings: TrainingSettings, residual: ResidualSettings, env: Any, folder: Path, past: dict[str, Any] | None,
-        paper: Any = None,
+        self, settings: TrainingSettings, residual: ResidualSettings, envs: Sequence[Any], folder: Path,
+        past: dict[str, Any] | None, paper: Sequence[Any] | None = None,
     ) -> None:  # fmt: skip
-        self._settings, self._residual, self.env, self._folder = settings, residual, env, folder
+        self._settings, self._residual, self.envs, self._folder = settings, residual, envs, folder
         if past is None:
-            self.figures: dict[str, Any] = {"law": _without_policy(env), "policy": None, "curve": []}
-            self.figures["paper"] = _without_policy(paper) if paper is not None else None
+            self.figures: dict[str, Any] = {"law": self._without_policy(envs), "policy": None, "curve": []}
+            self.figures["paper"] = self._without_policy(paper) if paper is not None else None
             self._due, self._best = 0.0, b""
-            if self.figures["law"]["infeasible"] == env.num_envs:
+            if self.figures["law"]["infeasible"] == settings.validation_lanes:
                 raise ValueError(
-                    f"all {env.num_envs} validation worlds ask for more than the rig's strength, so that no policy could be "
-                    "told from another; allowed: a stronger rig, milder randomization, or another environment"
+                    f"all {settings.validation_lanes} validation worlds ask for more than the rig's strength, so that no "
+                    "policy could be told from another; allowed: a stronger rig, milder randomization, or another environment"
                 )
         else:
             self.figures, self._due, self._best = past["reached"], past["due"], past["best"].tobytes()
@@ -64,7 +65,19 @@ class Reached:
 
     def validate(self, network: PolicyNetwork) -> dict[str, float]:
         """Figures of a policy."""
-        return validate(self.env, acting(network.acting(), self.env, self._settings.privileged)).to_dict()
+        privileged = self._settings.privileged
+        return self._figures([(env, acting(network.acting(), env, privileged)) for env in self.envs])
+
+    def _without_policy(self, envs: Sequence[Any]) -> dict[str, float]:
+        """Figures of the law alone: actions of zero."""
+
+        def zero(env: Any) -> PolicyFunction:
+            return lambda seen: np.zeros((len(seen), *env.single_action_space.shape), dtype=np.float32)
+
+        return self._figures([(env, zero(env)) for env in envs])
+
+    def _figures(self, worlds: Sequence[tuple[Any, PolicyFunction]]) -> dict[str, float]:
+        return joined([validate(env, act, target=self._settings.target) for env, act in worlds]).to_dict()
 
     def add(self, network: PolicyNetwork, figures: dict[str, float], about: dict[str, Any]) -> bool:
         """Add to the curve; returns whether the policy is the best so far, for ``keep`` once a checkpoint holds it."""
@@ -106,17 +119,11 @@ class Reached:
 
     def describe(self) -> dict[str, Any]:
         """The settings that a checkpoint must share."""
-        return described(self._settings, self._residual, self.env.simulation.parameters)
+        return described(self._settings, self._residual, self.envs[0].simulation.parameters)
 
     def result(self) -> dict[str, Any]:
         """Validation figures of the law and of the kept policy, and the learning curve."""
         return {"settings": self.describe(), **self.figures}
-
-
-def _without_policy(env: Any) -> dict[str, float]:
-    """Validation figures of the law alone: actions of zero."""
-    zero = np.zeros((env.num_envs, *env.single_action_space.shape), dtype=np.float32)
-    return validate(env, lambda _: zero).to_dict()
 
 
 def described(settings: TrainingSettings, residual: ResidualSettings, rig: Parameters) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,10 @@ from agents.training.validation import SEED_SPACING, TRAINING_SEED
 
 
 class StableBaselines:
-    """PPO, SAC or TQC in the lanes of ``env``."""
+    """PPO, SAC or TQC in the lanes of the only one of ``envs``."""
 
-    def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None:
+    def __init__(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> None:
+        (env,) = envs
         self._env, self._folder = SB3VecEnv(env, staggered=True), folder
         self._settings = settings
         seen = Privileged(self._env) if settings.privileged else self._env

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -22,9 +23,9 @@ from agents.training.stable_baselines import StableBaselines
 
 
 class Learner(Protocol):
-    """What learns in the lanes of ``env``."""
+    """What learns in the lanes of ``envs``."""
 
-    def __init__(self, settings: TrainingSettings, env: Any, folder: Path) -> None: ...
+    def __init__(self, settings: TrainingSettings, envs: Sequence[Any], folder: Path) -> None: ...
 
     @property
     def steps(self) -> int:
@@ -59,15 +60,18 @@ def train(
         "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }  # fmt: skip
-    env = gymnasium.make_vec(settings.environment, num_envs=settings.lanes, **arguments)
-    checks: Any = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **arguments)
-    paper = None
+
+    def made(lanes: int) -> list[Any]:
+        worlds = settings.worlds()
+        return [gymnasium.make_vec(name, num_envs=lanes // len(worlds), **hand, **arguments) for name, hand in worlds]
+
+    envs, checks, paper = made(settings.lanes), made(settings.validation_lanes), None
     if settings.until < 100:
-        law = {**arguments, **ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()}
-        paper = gymnasium.make_vec(settings.environment, num_envs=settings.validation_lanes, **law)
-    about = described(settings, residual, checks.simulation.parameters)
+        arguments |= ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()
+        paper = made(settings.validation_lanes)
+    about = described(settings, residual, checks[0].simulation.parameters)
     kind: type[Learner] = PolicyGradient if settings.algorithm == "apg" else StableBaselines
-    learner = kind(settings, env, folder)
+    learner = kind(settings, envs, folder)
     began = time.perf_counter()
     past = learner.load(about)
     if past is not None:
@@ -89,7 +93,6 @@ def train(
         raise
     finally:
         bar.close()
-        for worlds in (env, checks, paper):
-            if worlds is not None:
-                worlds.close()
+        for one in (*envs, *checks, *(paper or ())):
+            one.close()
     return reached.result()

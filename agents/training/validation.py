@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.training.configuration import TARGETS
+from agents.training.declared import Declared
 from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.metrics import EpisodeMetrics
 from baselines.bench.statistics import LOST_ERROR, penalize_lost, quantile
@@ -33,7 +35,7 @@ Lanes = NDArray[np.float64]
 class Score:
     """Figures per lane, (N,); NaN where an episode says nothing.
 
-    - ``error``: settled RMS of sqrt(ex^2 + ey^2), mm;
+    - ``error``: settled RMS of sqrt(ex^2 + ey^2), mm, or RMS of the distance from the declared motion;
     - ``stiffness``: error of the rendered stiffness, %, the mean settled error along the push over the displacement asked for;
     - ``hunting``, mm; ``saturation``, time with a valve at its limit, %;
     - ``required_strength_ratio``: the fraction of the rig's strength that the world asks for.
@@ -86,18 +88,34 @@ def merit(figures: dict[str, float]) -> float:
     return figures["pooled_mm"] + figures["tail_mm"]
 
 
-def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed: int = VALIDATION_SEED) -> Score:
+def joined(scores: Sequence[Score]) -> Score:
+    """The score of all lanes of several environments."""
+
+    def every(name: str) -> Lanes:
+        return np.concatenate([getattr(one, name) for one in scores])
+
+    return Score(
+        every("error"), every("stiffness"), every("hunting"), every("saturation"), every("required_strength_ratio"),
+        sum(one.lost for one in scores),
+    )  # fmt: skip
+
+
+def validate(
+    env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed: int = VALIDATION_SEED, target: str = TARGETS[0]
+) -> Score:  # fmt: skip
     """Run one episode in every lane of a residual vector environment under ``act``: observations (N, D) -> actions (N, size).
 
-    ``act`` stands at the beginning of an episode. Figures are sampled once per policy step.
+    ``act`` stands at the beginning of an episode. Figures are sampled once per policy step. Where the ``target`` is the
+    declared motion, ``Score.error`` is the distance from it, from ``SETTLED`` s after the beginning on.
     """
     observation, info = env.reset(seed=seed)
     asked = required_strength_ratio(env)
     lanes = env.num_envs
     metrics = EpisodeMetrics(lanes, env.simulation.period * env.simulation.periods)
     alive: NDArray[np.bool_] = np.ones(lanes, dtype=np.bool_)
-    rendered, counts = np.zeros((2, lanes))
-    for _ in range(env.steps):
+    rendered, counts, squares, instants = np.zeros((4, lanes))
+    declared = Declared(env.simulation) if target != TARGETS[0] else None
+    for step in range(env.steps):
         metrics.add(info, env.simulation.openings, alive)
         size = np.hypot(*info["user_force"].T)
         given = info["compliant_target"] - info["target"]
@@ -107,10 +125,16 @@ def validate(env: Any, act: Callable[[NDArray[np.float32]], NDArray[Any]], seed:
         counts += counted
         observation, _, terminated, _, info = env.step(act(observation))
         alive &= ~terminated
+        # Where an episode has ended the next has begun.
+        if declared is not None and step < env.steps - 1:
+            counted = alive & (step * env.simulation.periods * env.simulation.period >= SETTLED)
+            apart = env.simulation.motion[:2] - declared.follow()[:2]
+            squares, instants = squares + np.where(counted, (apart**2).sum(axis=0), 0.0), instants + counted
     result = metrics.result()
     with np.errstate(invalid="ignore"):
+        error = result["settled_rms"] if declared is None else 1e3 * np.sqrt(squares / instants)
         return Score(
-            penalize_lost(result["settled_rms"], ~alive, True, LOST_ERROR),
+            penalize_lost(error, ~alive, True, LOST_ERROR),
             100 * rendered / np.where(counts > 0, counts, np.nan),
             np.fmax(result["hunting_x"], result["hunting_y"]),
             result["saturation"],

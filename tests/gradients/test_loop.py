@@ -24,6 +24,7 @@ SCENARIO_LOOPS: dict[str, dict[str, Any]] = {
     "paper's law": {"world": "BirthSIM/ProbeResidual-v2", "law": "backstepping", "sensors": "honest"},
     "residual of 5": {"world": "BirthSIM/DystociaResidual-v1", "law": "backstepping-force-first", "impedance": "variable"},
     "admittance": {"world": "BirthSIM/DescentResidual-v1", "law": "admittance-backstepping"},
+    "informed": {"world": "BirthSIM/CircleResidual-v1", "law": "none", "informed": True, "sensors": "honest"},
     "a hand that feels": {"world": "BirthSIM/Probe-v2", "user_force": "guided"},
     "an accelerometer": {
         "world": "BirthSIM/Circle-v1", "controller": "admittance", "sensors": "honest",

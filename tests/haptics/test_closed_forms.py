@@ -1,11 +1,12 @@
 """Every estimator of what a hand feels, on ports whose answer is known: mass, damper and spring, and a spring that is late."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from baselines.impedance import mass_spring_damper
+from baselines.impedance import DeclaredMotion, mass_spring_damper
 from birthsim_env.physics.compiled.lanes import Array
 from studies.haptics import backdriving, release
 from studies.haptics.backdriving import beyond_spring, guiding_hand
@@ -82,6 +83,20 @@ def test_an_ideal_impedance_has_no_error_of_its_own_and_gives_no_energy(ideal: t
     missing = 1 / impedance(FREQUENCIES, MASS, DAMPING, STIFFNESS) - 1 / STIFFNESS
     np.testing.assert_allclose(spring, np.sqrt((np.abs(missing[:, None] * lines) ** 2).sum(axis=0) / 2), rtol=1e-3)
     assert recording.energy.max() < 1e-12
+
+
+def test_where_an_impedance_would_be_agrees_with_its_matrix_exponential() -> None:
+    """Under forces that change from policy step to policy step, with coupled and unequal stiffness."""
+    reference = resting([(0.5, 0.0)] * 2, [5000.0, 1000.0])
+    reference.stiffness[1], reference.stiffness_coupling[0] = (2000.0, 4500.0), 300.0
+    impedance = mass_spring_damper(reference, MASS, 0.9)
+    force = np.random.default_rng(0).standard_normal((100, 2, 2)).cumsum(axis=0)
+    motion, found = DeclaredMotion(2), [np.zeros((2, 2))]
+    for before, after in pairwise(force):
+        motion.advance(impedance, before, after, 0.01)
+        found.append(motion.offset[:2])
+    # (w h)^4/120 of a substep of 2 ms at 41 rad/s.
+    np.testing.assert_allclose(found, declared_offset(impedance, force, 0.01), atol=4e-7 * np.abs(found).max())
 
 
 @pytest.mark.slow

@@ -265,6 +265,6 @@ def test_the_largest_settings_are_allowed():
     settings = ResidualSettings("backstepping-weight", "variable", 500, 1, 1)
     assert settings.to_dict() == {
         "law": "backstepping-weight", "impedance": "variable", "authority": 500, "time_constant": 1, "policy_period": 1,
-        "force_sensor": True,
+        "force_sensor": True, "informed": False,
     }  # fmt: skip
     assert ResidualSettings(**settings.to_dict()) == settings

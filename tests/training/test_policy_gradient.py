@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,8 @@ SHORT = TrainingSettings(
     discount=1.0, hidden=(32, 32), validation_lanes=8, validations=2,
 )  # fmt: skip
 PURE = ResidualSettings(law="none", policy_period=0.02)
+BESIDE = replace(SHORT, target="impedance", beside=("BirthSIM/ProbeResidual-v2 guided",))
+INFORMED = replace(PURE, informed=True)
 
 
 @pytest.fixture(scope="module")
@@ -35,29 +38,45 @@ def test_a_policy_from_scratch_learns_in_80_updates(whole: tuple[Path, dict]) ->
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("training", "residual"), [(SHORT, PURE), (BESIDE, INFORMED)])
 def test_a_killed_training_ends_with_the_same_policy(
-    whole: tuple[Path, dict],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,  # type: ignore[type-arg]
+    training: TrainingSettings, residual: ResidualSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    reached = train(training, residual, tmp_path / "whole")
+    assert reached["policy"]["pooled_mm"] < 0.8 * reached["law"]["pooled_mm"]
     updates, update = [], policy_gradient.PolicyGradient._update
 
-    def killed(self: policy_gradient.PolicyGradient) -> float:
+    def killed(self: policy_gradient.PolicyGradient) -> None:
         updates.append(self.steps)
         if len(updates) == 60:
             raise KeyboardInterrupt
-        return update(self)
+        update(self)
 
     monkeypatch.setattr(policy_gradient.PolicyGradient, "_update", killed)
     with pytest.raises(KeyboardInterrupt):
-        train(SHORT, PURE, tmp_path)
-    train(SHORT, PURE, tmp_path)
+        train(training, residual, tmp_path / "killed")
+    train(training, residual, tmp_path / "killed")
     # It went on from the validation half way.
-    assert updates[60] == SHORT.steps // 2
-    assert (tmp_path / WEIGHTS).read_bytes() == (whole[0] / WEIGHTS).read_bytes()
+    assert updates[60] == training.steps // 2
+    assert (tmp_path / "killed" / WEIGHTS).read_bytes() == (tmp_path / "whole" / WEIGHTS).read_bytes()
 
 
 def test_what_it_cannot_differentiate_is_refused() -> None:
     with pytest.raises(ValueError, match=r"privileged.*apg.*allowed"):
         replace(SHORT, privileged=True)
     assert load_configuration("circle_apg")[0].algorithm == "apg"
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"target": "wall"}, r"target = 'wall'; allowed: 'spring', 'impedance'"),
+        ({"target": "impedance", "algorithm": "ppo"}, r"target = 'impedance' with algorithm = 'ppo'; allowed: 'spring'"),
+        ({"beside": ("BirthSIM/ProbeResidual-v2",), "algorithm": "sac"}, r"beside = .* with algorithm = 'sac'; allowed: \(\)"),
+        ({"beside": 3}, r"beside = 3; allowed: ids of residual environments"),
+        ({"beside": ("a", "b")}, r"lanes = 32; allowed: a multiple of 3"),
+    ],
+)
+def test_what_it_is_to_aim_at_and_where_is_refused_by_name(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        replace(SHORT, **values)

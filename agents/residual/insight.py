@@ -1,0 +1,90 @@
+"""What the admittance controller would know, for a policy that has no memory of its own.
+
+Its observers run beside whatever drives the valves: they see the same measurements, and the openings as they were put out.
+"""
+
+import numpy as np
+
+from agents.residual.pistons import Found
+from baselines.admittance import knowledge
+from baselines.admittance.controller import AdmittanceController
+from baselines.admittance.rows import Beliefs, Known, Memory
+from baselines.staged import LawStage
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Reference, compliance
+from birthsim_env.loop.stage import block, scratch
+from birthsim_env.observation import Entry
+from birthsim_env.physics import geometry
+from birthsim_env.physics.compiled.compilation import kernel
+from birthsim_env.physics.compiled.records import Rows, rows
+from birthsim_env.physics.rig.parameters import Parameters
+
+
+class Insight(Rows):
+    """What is shown. The motion is the one that the hand should find, with the controller's mass and damping."""
+
+    error = rows("x y", "m", "end effector, estimated, from the motion, {}")
+    error_rate = rows("x y", "m/s", "rate of that error, {}")
+    owed = rows("x y", "m", "motion from the compliant target, {}")
+    velocity = rows("x y", "m/s", "velocity of the motion, from the target's, {}")
+    acceleration = rows("x y", "m/s2", "acceleration of the motion, from the target's, {}")
+    unseen = rows("1 2", "N", "force unseen on piston {}: friction believed, and what is observed besides")
+    friction = rows("1 2", "N", "friction along the motion of piston {}, as believed")
+
+
+SCALES = np.repeat([1e-3, 0.02, 5e-3, 0.1, 2.0, 20.0, 20.0], 2)
+"""What maps to 1."""
+
+ENTRIES = tuple(
+    str(Entry(about.format(name), unit, scale)) for (name, unit, about, _), scale in zip(Insight.entries(), SCALES, strict=True)
+)
+
+
+class About(Beliefs):
+    """Constants of the stage."""
+
+    scales = rows(Insight.size, "SI", "what maps to 1")
+
+
+@kernel
+def _know(world: int, seen: Seen, memory: int, about: About, tables: int, lane: int, n: int) -> int:
+    signals, known, p = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n]), about.belief.rig
+    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+    for i in range(n):
+        for valve in range(4):
+            own.chambers.opening[valve, i] = signals.opening[valve, i]
+        for k in range(Reference.size):
+            signals.asked.rows[k, i] = signals.reference.rows[k, i]
+        signals.damping_factor[i] = 0.0
+    missed = knowledge.know(signals, own, known, about)
+    found, told = Found(signals.handed[: Found.size]), Insight(signals.handed[Found.size : Found.size + Insight.size])
+    motion, target = known.motion, signals.reference
+    for i in range(n):
+        y1, y2 = own.joints.position[0, i], own.joints.position[1, i]
+        v1, v2 = own.joints.speed[0, i], own.joints.speed[1, i]
+        _, r2, _, _, _, kappa, sine, cosine = geometry.pose(
+            y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
+        )
+        x, y = r2 * sine, -r2 * cosine
+        vx, vy = v2 * sine - kappa * v1 * cosine, -v2 * cosine - kappa * v1 * sine
+        hand, stiffness = known.given.force, target.stiffness
+        given = compliance(hand[0, i], hand[1, i], stiffness[0, i], stiffness[1, i], target.stiffness_coupling[i])
+        told.error[0, i], told.error[1, i] = x - motion.position[0, i], y - motion.position[1, i]
+        told.error_rate[0, i], told.error_rate[1, i] = vx - motion.velocity[0, i], vy - motion.velocity[1, i]
+        for axis in range(2):
+            told.owed[axis, i] = motion.position[axis, i] - target.position[axis, i] - given[axis]
+            told.velocity[axis, i] = motion.velocity[axis, i] - target.velocity[axis, i]
+            told.acceleration[axis, i] = motion.acceleration[axis, i] - target.acceleration[axis, i]
+        for k in range(2):
+            found.joints.position[k, i], found.joints.speed[k, i] = own.joints.position[k, i], own.joints.speed[k, i]
+            found.disturbance[k, i] = known.unexplained[k, i] / (p.mass * kappa * kappa if k == 0 else p.mass)
+            told.unseen[k, i], told.friction[k, i] = known.unseen[k, i], known.drag[k, i]
+        for k in range(Insight.size):
+            told.rows[k, i] /= about.scales[k]
+    return missed
+
+
+def informed(rig: Parameters, sampled: bool, force_sensor: bool) -> list[LawStage]:
+    """The stages that know, in place of ``pistons.observed``; ``Insight``, over its ``SCALES``, follows ``Found``."""
+    *before, law = AdmittanceController(rig, force_sensor).law_stages(sampled)
+    return [*before, LawStage(_know, np.concatenate([law.constants[: Beliefs.size], SCALES]), law.fresh)]

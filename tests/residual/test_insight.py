@@ -1,0 +1,53 @@
+"""What an informed policy is shown: where the hand should find the end effector, and how far it is from there."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import agents
+from agents.residual.insight import SCALES, Insight
+from agents.residual.settings import ResidualSettings
+from birthsim_env.loop.signals import Reference
+from birthsim_env.observation import LIMIT
+
+assert agents  # importing it registers the ids
+CIRCLE, LANES, PERIOD = "BirthSIM/CircleResidual-v1", 3, 1e-3
+
+
+def lanes(**arguments):
+    env = gymnasium.make_vec(CIRCLE, num_envs=LANES, user_force="noise", randomize=True, **arguments)
+    env.reset(seed=3)
+    return env
+
+
+@pytest.mark.parametrize(("law", "reach"), [("admittance-adaptive", 0.3), ("none", 0.02)])
+def test_what_is_shown_is_true_with_exact_sensors(law, reach):
+    """Place = target + F/K + what is owed + error, and the same of speeds, a control period before the observation."""
+    env, rng, largest = lanes(law=law, informed=True, policy_period=PERIOD), np.random.default_rng(0), 0.0
+    for _ in range(300):
+        simulation = env.simulation
+        motion, reference, force = simulation.motion, simulation.reference, simulation.force
+        seen, *_ = env.step(rng.uniform(-reach, reach, env.action_space.shape).astype(np.float32))
+        told = Insight(seen[:, -Insight.size :].T * SCALES[:, None])
+        given = Reference(reference.rows).compliant_target(force)
+        error = np.clip(motion[:2] - given - told.owed, -LIMIT * SCALES[0], LIMIT * SCALES[0])
+        np.testing.assert_allclose(error, told.error, atol=1e-8)
+        rate = np.clip(motion[2:] - reference.velocity - told.velocity, -LIMIT * SCALES[2], LIMIT * SCALES[2])
+        np.testing.assert_allclose(rate, told.error_rate, atol=1e-6)
+        largest = max(largest, float(np.abs(told.owed).max()))
+    assert largest > 1e-4, "a pushed mass comes late"
+
+
+def test_knowing_moves_nothing():
+    states = []
+    for informed in (False, True):
+        env = lanes(law="admittance-adaptive", sensors="honest", informed=informed)
+        for _ in range(60):
+            env.step(np.zeros((LANES, 2), np.float32))
+        states.append(env.simulation.plant.state.copy())
+    np.testing.assert_array_equal(*states)
+
+
+def test_informed_is_true_or_false():
+    with pytest.raises(ValueError, match=r"informed = 'yes'; allowed: True, False"):
+        ResidualSettings(informed="yes")
