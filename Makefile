@@ -36,7 +36,7 @@ LOCK := $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --
   --custom-compile-command "make lock" --constraint constraints.txt --output-file requirements
 TORCH_CPU := --index-url https://download.pytorch.org/whl/cpu --retries 1
 # What an installation here has; cluster (Ray) is left out.
-EXTRAS := agents onnx mpc tune sweep control jax build log video live docs dev
+EXTRAS := agents onnx tune sweep control jax build log video live docs dev
 CUDA := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti nvidia-cuda-nvrtc nvidia-cuda-runtime \
   nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 \
   nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx

@@ -57,13 +57,10 @@ SHORT_NAMES = {
 """Short name -> controller with options. Tables, trained policies and recordings have the short names."""
 
 LISTED = ("backstepping", *SHORT_NAMES, "pid", "lqr", "sliding-mode", "nonlinear-mpc")
-"""Controllers that ``birthsim study comparison``, scores, the page and the stored bits compare."""
+"""Controllers that scores, the page and the stored bits have."""
 
 UNCONTROLLED: dict[str, Factory] = {"shut-valves": ShutValves, "slammed-valves": SlammedValves, "random-valves": RandomValves}
 """What any controller should beat; ``birthsim study comparison`` leaves them out."""
-
-SLOW = frozenset({"nonlinear-mpc"})
-"""Controllers far from real time, which ``birthsim study comparison`` leaves out unless they are named."""
 
 
 def controller_names() -> list[str]:

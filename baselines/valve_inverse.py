@@ -2,10 +2,8 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from birthsim_env.physics import control_model, valves
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 
 CLEARANCE = 0.002
@@ -131,8 +129,10 @@ def pressure_openings(
     return force_first_openings(rate, wanted_rate - c4 * (stiffness_of(c, p) - wanted), c, p)
 
 
-@kernel
-def _flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Array, present: Array) -> None:
+@helper
+def flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Array, present: Array) -> None:
+    """Writes the least and the largest mass flow that valves can send into chambers P1, N1, P2, N2, and that of ``spools``,
+    kg/s; ``pressures``, Pa, and ``spools`` in [-1, 1]; all (4, N)."""
     c, leak = p.conductance, p.leakage
     for chamber in range(4):
         for i in range(pressures.shape[1]):
@@ -142,26 +142,10 @@ def _flow_ranges(pressures: Array, spools: Array, p: Rig, least: Array, most: Ar
             present[chamber, i] = shut + c * (max(spool, 0.0) * fill - max(-spool, 0.0) * drain)
 
 
-def flow_ranges(pressures: Array, spools: Array, lane_parameters: Array) -> tuple[Array, Array, Array]:
-    """Least and largest mass flow that valves can send into chambers P1, N1, P2, N2, and that of ``spools``, kg/s, (4, N) each.
-
-    ``pressures`` (4, N), Pa, ``spools`` (4, N) in [-1, 1], one rig's parameters (PARAMETERS,).
-    """
-    least, most, present = np.empty_like(pressures), np.empty_like(pressures), np.empty_like(pressures)
-    _flow_ranges(pressures, spools, Rig(lane_parameters), least, most, present)
-    return least, most, present
-
-
-@kernel
-def _openings_for_flows(flows: Array, pressures: Array, p: Rig, openings: Array) -> None:
+@helper
+def openings_for_flows(flows: Array, pressures: Array, p: Rig, openings: Array) -> None:
+    """Writes openings in [-1, 1] at which chambers P1, N1, P2, N2 get ``flows``, kg/s, or come near; (4, N) each."""
     for chamber in range(4):
         for i in range(pressures.shape[1]):
             fill, drain = driving_flows(pressures[chamber, i], p)
             openings[chamber, i] = valves.opening_for_flow(flows[chamber, i], fill, drain, p.conductance, p.leakage)
-
-
-def openings_for_flows(flows: Array, pressures: Array, lane_parameters: Array) -> Array:
-    """Openings in [-1, 1] at which chambers P1, N1, P2, N2 get ``flows``, kg/s, or come near; (4, N) each."""
-    openings = np.empty_like(flows)
-    _openings_for_flows(flows, pressures, Rig(lane_parameters), openings)
-    return openings

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 ABOUT = {
     "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
     "build": "export --to wasm, c, fmu", "log": "export --to parquet, mcap", "tune": "tune", "video": "films of episodes",
-    "mpc": "the controller nonlinear-mpc", "control": "linear models for python-control", "cluster": "--cluster ray",
+    "control": "linear models for python-control", "cluster": "--cluster ray",
     "sweep": "sweeps of trainings", "jax": "gradients for JAX",
 }  # fmt: skip
 """Extra -> what it is for."""

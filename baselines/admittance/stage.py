@@ -1,7 +1,7 @@
-"""The admittance law as a stage of the closed loop: what is known, then ``law.command``; and what is known by itself."""
+"""The admittance law as a stage of the closed loop: what is known, then ``law.command``."""
 
 from baselines.admittance import knowledge, law
-from baselines.admittance.rows import Beliefs, Constants, Known, Memory
+from baselines.admittance.rows import Constants, Known, Memory
 from birthsim_env.loop.rows import Seen
 from birthsim_env.loop.stage import block, scratch
 from birthsim_env.physics.compiled.compilation import kernel
@@ -18,10 +18,3 @@ def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, 
         for i in range(n):
             own.chambers.opening[valve, i] = signals.opening[valve, i]
     return missed
-
-
-@kernel
-def inform(world: int, seen: Seen, memory: int, about: Beliefs, tables: int, lane: int, n: int) -> int:
-    """Hands on what is ``Known`` to who then commands by himself and writes ``Memory.chambers.opening``."""
-    signals, own = Seen(seen.rows[:, :n]), Memory(block(memory, int(about.rows_of_memory))[:, :n])
-    return knowledge.know(signals, own, Known(signals.handed[: Known.size]), about)

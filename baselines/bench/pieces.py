@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.evaluation import Evaluation, evaluate, merged
-from baselines.registry import SLOW, bare_name, make_controller
+from baselines.registry import bare_name, make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
 
-EPISODES, SLOW_EPISODES = 64, 4
+EPISODES = 64
 """Episodes of a piece, and of one whose controller is slow: a minute's work at most on this project's machines."""
 
 
@@ -49,17 +49,16 @@ def evaluation_tasks(
     ``world`` holds the environment's arguments as JSON takes them, the rig only where it is not as believed;
     ``work`` is ``evaluate_piece`` or what calls it.
     """
-    every = SLOW_EPISODES if bare_name(settings["controller"]) in SLOW else EPISODES
     hashes = [file_hash(value) for value in world.values() if isinstance(value, str)]
     return [
         Task(
             f"pieces/{file_stem(label)}/{first}", label, work or evaluate_piece,
             {
                 **settings, "environment": environment, "world": world, "files": hashes, "seed": first,
-                "episodes": min(every, seed + episodes - first),
+                "episodes": min(EPISODES, seed + episodes - first),
             },
         )
-        for first in range(seed, seed + episodes, every)
+        for first in range(seed, seed + episodes, EPISODES)
     ]  # fmt: skip
 
 

@@ -9,11 +9,8 @@ K, whatever its own stiffness. The mass is the rig's own, so that the hand feels
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from birthsim_env.loop.signals import InPlane, Motion, Point, Reference
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Numbers, number
 
@@ -125,26 +122,24 @@ def mark_moving(motion: Motion, moving: Array) -> None:
         moving[i] = 1.0 if vx * vx + vy * vy > MOVING_SPEED * MOVING_SPEED else 0.0
 
 
-@kernel
-def forecast(
-    offset: Point, asked: Reference, force: Array, about: Compliance, ticks: NDArray[np.int64], ahead: Array
-) -> None:  # fmt: skip
-    """Writes ``ahead`` (M, 4, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
+@helper
+def forecast(offset: Point, asked: Reference, force: Array, about: Compliance, ticks: Array, ahead: Array) -> None:
+    """Writes ``ahead`` (4 M, N): x, y (m), vx, vy (m/s) of the motion ``ticks`` (M,) periods from now, if nothing new happens.
 
     The force (2, N) and the stiffness stay, and the target goes on with the jerk that it has. ``offset`` is that of one period
-    from now, as ``give_way`` leaves it; ``ticks`` are increasing whole numbers from 1 on.
+    from now, as ``give_way`` leaves it, and is carried on; ``ticks`` are increasing whole numbers from 1 on.
     """
-    z, mass = Point(offset.rows.copy()), about.mass
-    period, push = about.period, InPlane(force)
+    mass, period, push = about.mass, about.period, InPlane(force)
     for i in range(force.shape[1]):
         spring, tick = spring_of(asked, i, mass, about.damping_ratio), 1
         for k in range(len(ticks)):
             while tick < ticks[k]:
-                advance(z, i, period, derivatives(z, i, push.x[i] / mass, push.y[i] / mass, spring), spring)
+                advance(offset, i, period, derivatives(offset, i, push.x[i] / mass, push.y[i] / mass, spring), spring)
                 tick += 1
-            t, now = tick * period, Point(ahead[k])
+            t, first = tick * period, Point.size * k
+            now = Point(ahead[first : first + Point.size])
             for axis in range(2):
                 v, a, j = asked.velocity[axis, i], asked.acceleration[axis, i], asked.jerk[axis, i]
                 x = asked.position[axis, i] + t * (v + t * (a / 2.0 + t * j / 6.0))
-                now.position[axis, i] = x + z.position[axis, i]
-                now.velocity[axis, i] = v + t * (a + t * j / 2.0) + z.velocity[axis, i]
+                now.position[axis, i] = x + offset.position[axis, i]
+                now.velocity[axis, i] = v + t * (a + t * j / 2.0) + offset.velocity[axis, i]

@@ -3,12 +3,10 @@
 It is there before an observer sees it, and since it never looks at the measured speed it cannot excite itself.
 """
 
-import numpy as np
-
-from birthsim_env.loop.signals import Joints, Motion
+from birthsim_env.loop.signals import Joints, Motion, Point
 from birthsim_env.loop.stage import scratch
 from birthsim_env.physics import friction
-from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array, Rig
 from birthsim_env.physics.inverse_kinematics import piston_motion
 
@@ -42,12 +40,12 @@ def rub(motion: Motion, p: Rig, period: float, bristles: Array, drag: Array) -> 
     _rub(joints, p, period, bristles, drag)
 
 
-@kernel
+@helper
 def forecast(ahead: Array, p: Rig, steps: Array, bristles: Array, drag: Array) -> None:
-    """Writes the friction ``drag`` (M, 2, N), N, along a motion ``ahead`` (M, 4, N) with x, y, vx, vy at the ends of the M
-    ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them."""
-    z, lanes = bristles.copy(), bristles.shape[1]
-    joints = Joints(np.empty((Joints.size, lanes)))
-    for k in range(ahead.shape[0]):
-        piston_motion(ahead[k], p, joints.rows, lanes)
-        _rub(joints, p, steps[k], z, drag[k])
+    """Writes the friction ``drag`` (2 M, N), N, along a motion ``ahead`` (4 M, N) with x, y, vx, vy at the ends of the M
+    ``steps``, s, that begins with ``bristles`` (2, N) as ``rub`` leaves them, and carries these on."""
+    joints, (cylinders, lanes) = Joints(scratch(Joints.size)), bristles.shape
+    for k in range(len(steps)):
+        motion, own = Point.size * k, cylinders * k
+        piston_motion(ahead[motion : motion + Point.size], p, joints.rows, lanes)
+        _rub(joints, p, steps[k], bristles, drag[own : own + cylinders])

@@ -1,82 +1,139 @@
-"""Nonlinear model predictive control: what could be had with the same knowledge if computing time did not matter.
+"""Nonlinear model predictive control: both pistons and all chambers planned ahead, in real time.
 
-At every control period the flows into the four chambers are planned over a horizon of ``prediction``, with the least sum of
-squares of its residuals within what the valves can give: one Gauss-Newton step from the plan of the period before (real-time
-iteration), a quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their
-characteristic. Motion, friction and disturbances are those that the admittance law knows when it does not learn.
+At every control period the flows into the four chambers are planned over a ``horizon``, with the least sum of squares of its
+residuals within what the valves can give: one Gauss-Newton step from the plan of the period before (real-time iteration), a
+quadratic programme with bounds. The first flow goes to the valves through the exact inverse of their characteristic. Motion,
+friction and disturbances are those that the admittance law knows when it does not learn.
 
 These commands found the tolerances (with ideal, then with lab and 16 trials) by the search that birthsim tune had before it
 used Optuna. It was as short as its trials are long; the best was the same for both:
     birthsim tune --controller nonlinear-mpc --trials 9 --lanes 4 --seed 0 --sensors ideal --out out/tune
 """
 
+import math
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from baselines.admittance.informed import Informed
-from baselines.controller import check_gains
+from baselines.admittance import knowledge
+from baselines.admittance.rows import Beliefs, Known, Memory
+from baselines.controller import check_gains, require_stiffness
+from baselines.estimation import admittance, reference_friction
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Impedance, mass_spring_damper
-from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, residuals, symbols
-from baselines.staged import one_lane
+from baselines.rivals.horizon import FLOWS, GENERATED, HALF, NODES, SIZE, Horizon, Situation, programme
+from baselines.rivals.quadratic import minimise, slope
+from baselines.staged import LawStage, StagedController
 from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.loop.signals import Mask, Measurement, Reference
-from birthsim_env.physics.compiled.lanes import Array, parameter_column
-from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from birthsim_env.loop.rows import Seen
+from birthsim_env.loop.signals import Measurement, Point, Reference
+from birthsim_env.loop.stage import block, scratch
+from birthsim_env.physics.compiled import exact
+from birthsim_env.physics.compiled.compilation import helper, kernel
+from birthsim_env.physics.compiled.lanes import PARAMETERS, Array
+from birthsim_env.physics.compiled.records import part
+from birthsim_env.physics.rig.parameters import Parameters
+
+__all__ = ["GENERATED", "NonlinearMPC"]
 
 STEPS = (0.002, 0.003, 0.005, 0.007, 0.010, 0.013, 0.017)
 """s, assumed: from node to node of the horizon, 57 ms in all; rounded to whole control periods."""
 
+NODES_WEIGH = 0.01
+"""s: a node that stands for so much time has the weight 1."""
 
-class Buffered:
-    """A CasADi function that reads the arrays ``inputs`` and writes the arrays ``outputs``, name -> non-zeros by columns."""
-
-    def __init__(self, function: Any) -> None:
-        self.inputs = {function.name_in(i): np.zeros(function.nnz_in(i)) for i in range(function.n_in())}
-        self.outputs = {function.name_out(i): np.zeros(function.nnz_out(i)) for i in range(function.n_out())}
-        self._buffer, self.call = function.buffer()  # the second needs the first alive
-        for connect, arrays in ((self._buffer.set_arg, self.inputs), (self._buffer.set_res, self.outputs)):
-            for index, array in enumerate(arrays.values()):
-                view: Any = array
-                connect(index, memoryview(view))
+LAST = 3.0
+"""Weight of the last node, which stands for the time beyond the horizon; assumed."""
 
 
-class Planner:
-    """Improves a plan of one lane by a Gauss-Newton step. Arguments are those of ``residuals``."""
+class Constants(Beliefs):
+    """Of the stage."""
 
-    def __init__(self, parameters: Parameters, steps: Array, tolerances: dict[str, float]) -> None:
-        size = FLOWS * len(steps)
-        self._residuals = Buffered(residuals(parameters, [float(step) for step in steps], tolerances))
-        dense = {"h": symbols().Sparsity.dense(size, size)}
-        self._programme = Buffered(symbols().conic("programme", "daqp", dense))
-
-    def improve(self, plan: Array, given: Array, low: Array, high: Array) -> Array:
-        """A better plan (4 M,) with flows between ``low`` and ``high`` (4,), all in FLOW; no flow in a lane without numbers.
-
-        Where a prediction runs away, so that its programme has no solution, the plan stays as it is.
-        """
-        asked, programme = self._residuals.inputs, self._programme.inputs
-        asked["commanded"][:], asked["given"][:] = plan, given
-        self._residuals.call()
-        found = self._residuals.outputs["residuals"]
-        if not np.isfinite(found).all():
-            return np.zeros_like(plan)
-        slopes = self._residuals.outputs["slopes"].reshape(len(plan), -1)
-        curvature = slopes @ slopes.T
-        programme["h"][:], programme["g"][:] = curvature.ravel(), slopes @ found - curvature @ plan
-        least, most = programme["lbx"], programme["ubx"]
-        least[:], most[:] = np.resize(low, len(plan)), np.resize(high, len(plan))
-        try:
-            self._programme.call()
-        except RuntimeError:
-            return np.clip(plan, least, most)
-        return self._programme.outputs["x"].copy()
+    horizon = part(Horizon, "of the plan")
 
 
-class NonlinearMPC:
-    """The law of this module. A call takes about half a millisecond per lane: it shows what computing can reach, not real time.
+@helper
+def foresee(seen: Seen, memory: Memory, known: Known, about: Constants, given: Situation) -> None:
+    """Writes all of ``given`` but the present flows: friction follows the motion, what was observed besides stays."""
+    ticks, steps, n = about.horizon.tick, about.horizon.step, memory.fresh.shape[0]
+    offset, bristles = Point(scratch(Point.size)[:, :n]), scratch(2)[:, :n]
+    for row in range(4):
+        for i in range(n):
+            given.joints.rows[row, i], given.pressure[row, i] = memory.joints.rows[row, i], memory.chambers.pressure[row, i]
+            offset.rows[row, i] = memory.offset.rows[row, i]
+    for row in range(2):
+        for i in range(n):
+            given.force[row, i], bristles[row, i] = known.given.force[row, i], memory.bristle[row, i]
+    admittance.forecast(offset, seen.asked, known.given.force, about.compliance, ticks, given.motion)
+    reference_friction.forecast(given.motion, about.belief.rig, steps, bristles, given.unseen)
+    for k in range(NODES):
+        for axis in range(2):
+            row = 2 * k + axis
+            for i in range(n):
+                observed = known.unseen[axis, i] - known.given.believed[axis, i]
+                given.unseen[row, i] = observed - about.friction_fraction * given.unseen[row, i]
+                given.stiffness[row, i] = (
+                    seen.asked.pneumatic_stiffness[axis, i]
+                    + about.belief.period * ticks[k] * seen.asked.pneumatic_stiffness_rate[axis, i]
+                )
+
+
+@helper
+def improve(plan: Array, given: Situation, low: Array, high: Array, about: Constants, n: int) -> None:
+    """A Gauss-Newton step of ``plan`` (SIZE, n) within flows (FLOWS, n); no flow in a lane without numbers."""
+    h, g, c, p = scratch(HALF), scratch(SIZE), scratch(SIZE), scratch(PARAMETERS)
+    for row in range(PARAMETERS):
+        for i in range(n):
+            p[row, i] = about.belief.rig.rows[row]
+    programme(plan, given, p, about.horizon, h, g, n)
+    for row in range(SIZE):
+        for i in range(n):
+            c[row, i] = 0.0
+    slope(h, plan, c, c, n)
+    for row in range(SIZE):
+        for i in range(n):
+            c[row, i] = g[row, i] - c[row, i]
+    for i in range(n):
+        total = 0.0
+        for row in range(SIZE):
+            total += abs(c[row, i])
+        if not math.isfinite(total):
+            for row in range(SIZE):
+                plan[row, i], c[row, i] = 0.0, 0.0
+            for row in range(HALF):
+                h[row, i] = 1.0
+            for row in range(FLOWS):
+                low[row, i], high[row, i] = 0.0, 0.0
+    minimise(h, c, low, high, plan, n)
+
+
+@kernel
+def control(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    """One control period of a block; returns how many stiffness setpoints are not positive definite."""
+    whole = block(memory, SIZE + int(about.rows_of_memory))
+    signals, known = Seen(seen.rows[:, :n]), Known(scratch(Known.size)[:, :n])
+    plan, own = whole[:SIZE], Memory(whole[SIZE:, :n])
+    given, low, high = Situation(scratch(Situation.size)[:, :n]), scratch(FLOWS)[:, :n], scratch(FLOWS)[:, :n]
+    missed = knowledge.know(signals, own, known, about)
+    foresee(signals, own, known, about, given)
+    flow_ranges(given.pressure, own.chambers.spool, about.belief.rig, low, high, given.flow)
+    improve(plan, given, low, high, about, n)
+    openings_for_flows(plan[:FLOWS, :n], given.pressure, about.belief.rig, own.chambers.opening)
+    for valve in range(4):
+        for i in range(n):
+            signals.opening[valve, i] = own.chambers.opening[valve, i]
+    # The plan as the next period will see it: each step's flow moves towards that of the next.
+    for k in range(NODES - 1):
+        fraction = about.belief.period / about.horizon.step[k]
+        for row in range(FLOWS * k, FLOWS * (k + 1)):
+            for i in range(n):
+                plan[row, i] += fraction * (plan[row + FLOWS, i] - plan[row, i])
+    return missed
+
+
+class NonlinearMPC(StagedController):
+    """The controller of this module.
 
     Arguments:
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
@@ -84,7 +141,7 @@ class NonlinearMPC:
             speed_tolerance (m/s), stiffness_tolerance (N/m) and flow_tolerance (kg/s) are errors that count as much as a
             position error of ``POSITION_TOLERANCE``. The others are gains of ``AdmittanceController`` too.
 
-    Needs CasADi, the extra ``mpc``. Raises ``ValueError`` for unknown gains and values out of range.
+    Raises ``ValueError`` for unknown gains and values out of range.
     """
 
     POSITION_TOLERANCE = 1e-4
@@ -111,60 +168,25 @@ class NonlinearMPC:
 
     def __init__(self, parameters: Parameters | str | Path | None = None, **gains: float) -> None:
         check_gains(self, gains)
-        self.parameters = load_parameters(parameters)
-        self._p, self._period = parameter_column(self.parameters), self.parameters.electronics.control_period
-        chosen = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
-        self._informed = Informed(self.parameters, chosen)
-        periods = np.maximum(np.round(np.array(STEPS) / self._period), 1)
-        self._steps, self._ticks = periods * self._period, np.cumsum(periods).astype(np.int64)
-        self._planners = {kind: self._planner(own) for kind, own in chosen.items()}
-        self._plan: Array = np.empty((0, 0))
-
-    def _planner(self, gains: dict[str, float]) -> Planner:
-        names = ("speed", "stiffness", "flow")
-        tolerances = {"position": self.POSITION_TOLERANCE, **{name: gains[f"{name}_tolerance"] for name in names}}
-        return Planner(self.parameters, self._steps, tolerances)
+        super().__init__(parameters)
+        self._gains = {kind: {**tuned, **gains} for kind, tuned in self.TUNED.items()}
 
     def declared_impedance(self, reference: Reference) -> Impedance:
         """The mass, damper and spring of the admittance, over N lanes."""
         return mass_spring_damper(reference, self.parameters.mechanics.mass, DAMPING_RATIO)
 
-    def reset(self, lanes: Mask | None = None) -> None:
-        """Forget the past of all lanes, or of those where ``lanes`` (N,) is True."""
-        self._informed.reset(lanes)
-        if lanes is None:
-            self._plan = np.empty((0, 0))
-        elif len(self._plan):
-            self._plan[lanes] = 0.0
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        rig, gains = self.parameters, self._gains["lab" if sampled else "ideal"]
+        period, tau = rig.electronics.control_period, rig.valves.time_constant
+        periods = np.maximum(np.round(np.array(STEPS) / period), 1)
+        time = periods * period
+        horizon = Horizon.numbers(
+            tick=np.cumsum(periods), step=time, kept=np.array([exact.number("exp", -one / 2 / tau) for one in time]),
+            weight=np.sqrt(time / NODES_WEIGH * np.where(np.arange(NODES) == NODES - 1, LAST, 1.0)),
+            position=self.POSITION_TOLERANCE, **{name: gains[f"{name}_tolerance"] for name in ("speed", "stiffness", "flow")},
+        )  # fmt: skip
+        about = Constants.numbers(**knowledge.beliefs(rig, sampled, sampled, gains), horizon=horizon)
+        return [LawStage(control, about, np.concatenate([np.zeros(SIZE), knowledge.fresh_memory(rig, sampled)]))]
 
-    def command(self, measurement: Measurement, reference: Reference) -> Array:
-        """Spool openings in [-1, 1] of the valves of chambers P1, N1, P2, N2: (4, N), or (4,) for one rig without lanes.
-
-        Called once per control period. Raises ``ValueError`` for signals over different numbers of lanes, and for a stiffness
-        setpoint that is not positive definite.
-        """
-        if measurement.position.ndim == 1:
-            return self.command(*one_lane(measurement, reference))[:, 0]
-        informed, planner = self._informed, self._planners["lab" if measurement.sampled else "ideal"]
-        informed.update(measurement, reference)
-        known, memory = informed.known, informed.memory
-        lanes, pressures = known.drag.shape[1], memory.chambers.pressure
-        if len(self._plan) != lanes:
-            self._plan = np.zeros((lanes, FLOWS * len(self._steps)))
-        low, high, flows = (q / FLOW for q in flow_ranges(pressures, memory.chambers.spool, self._p))
-        ahead, unseen = informed.forecast(reference, self._ticks)
-        asked = reference.pneumatic_stiffness + self._period * self._ticks[:, None, None] * reference.pneumatic_stiffness_rate
-        now = [memory.joints.rows, pressures / PRESSURE, flows, known.given.force]
-        given = np.concatenate([*now, *(along.reshape(-1, lanes) for along in (unseen, ahead, asked))])
-        for lane in range(lanes):
-            self._plan[lane] = planner.improve(self._plan[lane], given[:, lane], low[:, lane], high[:, lane])
-        openings = openings_for_flows(FLOW * np.ascontiguousarray(self._plan[:, :FLOWS].T), pressures, self._p)
-        self._advance_plan()
-        memory.chambers.opening[:] = openings
-        return openings
-
-    def _advance_plan(self) -> None:
-        """The plan as the next period will see it: each step's flow moves towards that of the next."""
-        plan = self._plan.reshape(len(self._plan), -1, FLOWS)
-        fraction = (self._period / self._steps[:-1])[:, None]
-        plan[:, :-1] += fraction * (plan[:, 1:] - plan[:, :-1])
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        require_stiffness(reference, 0.0)

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
 from baselines.commands.tables import aligned
-from baselines.registry import LISTED, SLOW
+from baselines.registry import LISTED
 from birthsim_build.building import Report, build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
@@ -84,7 +84,7 @@ def _bundle(settings: Settings) -> Bundle:
     if RESIDUAL in controllers:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        controllers = [name for name in LISTED if name not in SLOW]
+        controllers = list(LISTED)
     return make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, alone)
 
 

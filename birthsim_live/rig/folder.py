@@ -5,7 +5,6 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +62,6 @@ def offer(content: dict[str, Any], rig: Parameters, asked: Iterable[str] = ()) -
     content["python"] = [name for name, one in known.items() if "missing" in one]
     for name in content["python"]:
         known[name].pop("missing")
-    if find_spec("casadi") is None:
-        known["nonlinear-mpc"]["missing"] = "pip install 'birthsim[mpc]'"
     choices["compare"][1:] = choices["controller"]
 
 

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from baselines.bench.pieces import controller_settings
-from baselines.registry import SLOW, bare_name
 from baselines.work.tasks import Task
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.comparison.grid import default_controllers
@@ -15,8 +14,7 @@ from studies.study import Found, Options, Study
 
 def _tasks(options: Options) -> dict[Any, Task]:
     rig = load_parameters(options.parameters or None)
-    quick = [name for name in dict.fromkeys(options.controller) if bare_name(name) not in SLOW]
-    return study_tasks([controller_settings(name, rig) for name in quick], rig)
+    return study_tasks([controller_settings(name, rig) for name in dict.fromkeys(options.controller)], rig)
 
 
 def _kept(_: Options, found: Found) -> Any:

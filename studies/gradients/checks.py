@@ -6,9 +6,10 @@ import numpy as np
 
 import agents  # noqa: F401  registers the residual environments
 from baselines.bench.statistics import quantile
-from baselines.registry import LIMITED, LISTED, SLOW
+from baselines.registry import LIMITED
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.sensors.sensors import SENSORS
+from studies.comparison.grid import default_controllers
 from studies.comparison.tables import markdown
 from studies.gradients.loops import begun, compared
 from studies.results import Content
@@ -17,7 +18,7 @@ from studies.study import Found, Options, Study
 CIRCLE = "BirthSIM/Circle-v1"
 SCENARIOS = (CIRCLE, *(f"BirthSIM/{name}" for name in ("Probe-v2", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0")))
 
-CONTROLLERS = (*(name for name in LISTED if name not in SLOW), f"{LIMITED}pid", f"{LIMITED}admittance-adaptive")
+CONTROLLERS = (*default_controllers(), f"{LIMITED}pid", f"{LIMITED}admittance-adaptive")
 
 NEAR = 1e-6
 """Relative error up to which a gradient agrees with a difference."""

@@ -116,35 +116,26 @@ def causes(
 def _shown(content: Content) -> dict[str, str]:
     settings, metric = content["settings"], content["settings"]["metric"]
     named = f"{metric}, {UNITS[metric]}"
-    rows = [["controller", "sensors", named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
-    parts = []
-    for found in content["figures"]:
-        sizes = [", ".join(map(_number, found[name])) for name in (metric, "unrest")]
-        listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in found["named"])
-        rows.append([
-            found["controller"], found["sensors"], sizes[0], str(found["above"]), sizes[1], str(found["lost"]), listed,
-            _number(found["found"]["size"]),
-        ])  # fmt: skip
-        parts.append(_explained(found, named))
+    head = ["controller", "sensors"]
+    rows = [[*head, named, f"above {settings['limit']:g}", "unrest, mm", "lost", "worst worlds", "found"]]
+    names = list(content["figures"][0]["found"]["figures"])
+    worlds = [[*head, "found in world", "push, N", "mm asked for", "% of the strength", *names]]
+    changed = [[*head, "figure", "of the world found", "put to", named]]
+    for row in content["figures"]:
+        own, found = [row["controller"], row["sensors"]], row["found"]
+        sizes = [", ".join(map(_number, row[name])) for name in (metric, "unrest")]
+        listed = ", ".join(f"{seed} ({_number(size)})" for seed, size in row["named"])
+        rows.append([*own, sizes[0], str(row["above"]), sizes[1], str(row["lost"]), listed, _number(found["size"])])
+        asked = (found["push_n"], found["way_mm"], 100 * found["strength"], *found["figures"].values())
+        worlds.append([*own, str(found["seed"]), *map(number, asked)])
+        changed += [[*own, figure, f"{was:.4g}", f"{put:.4g}", _number(size)] for figure, was, put, size in found["changes"]]
+        changed.append([*own, "all that are randomised", "", "as believed", _number(found["as_believed"])])
     text = (
         f"{settings['episodes']} worlds of {ENVIRONMENT} from seed {settings['seed']}, rigs and scenarios randomised, "
         f"{settings['rest']:g} s of rest before the push. Cells are median, 95th percentile and worst. The last column has "
         f"what {settings['episodes']} further episodes found by moving the rigs of the worst worlds within their ranges."
     )
-    return {"worst.md": "\n\n".join([text, markdown(rows), *parts]) + "\n"}
-
-
-def _explained(row: dict[str, Any], named: str) -> str:
-    found = row["found"]
-    text = (
-        f"{row['controller']}, {row['sensors']} sensors, found in world {found['seed']}: {named.replace(',', '')} "
-        f"{_number(found['size'])}, a push of {found['push_n']:.3g} N over {found['way_mm']:.3g} mm, "
-        f"{100 * found['strength']:.0f} % of the rig's strength. "
-        f"Figures of the rig: {', '.join(f'{name} {value:.4g}' for name, value in found['figures'].items())}."
-    )
-    rows = [["figure", "of this world", "put to", named]]
-    rows += [[figure, f"{own:.4g}", f"{put:.4g}", _number(size)] for figure, own, put, size in found["changes"]]
-    return f"{text}\n\n{markdown([*rows, ['all that are randomised', '', 'as believed', _number(found['as_believed'])]])}"
+    return {"worst.md": "\n\n".join([text, *map(markdown, (rows, worlds, changed))]) + "\n"}
 
 
 def _number(value: float | str) -> str:

@@ -11,7 +11,6 @@ from baselines.bench import evaluation
 from baselines.bench.pieces import controller_settings, file_stem
 from birthsim_env import Parameters
 from studies.comparison import figure as comparison_figures
-from studies.comparison import grid as comparison
 from studies.comparison.grid import (
     ENVIRONMENTS,
     METRICS,
@@ -22,7 +21,6 @@ from studies.comparison.grid import (
     all_conditions,
     cell_task,
     costs,
-    default_controllers,
     gather,
     run_cell,
     settings_of,
@@ -126,13 +124,6 @@ def test_the_grid_is_six_environments_two_sensor_models_and_two_plants():
     drawn = [one for one in all_conditions(sensors=("ideal", "lab", "honest")) if one.plant == "drawn-sensors"]
     assert {one.sensors for one in drawn} == {"honest"}, "the only ones whose figures can be drawn"
     assert str(drawn[0]) == "Circle, honest sensors, figures drawn, nominal rig"
-
-
-def test_slow_controllers_are_left_out_unless_named(monkeypatch):
-    assert "backstepping-weight" in default_controllers()
-    monkeypatch.setattr(comparison, "SLOW", frozenset({"backstepping-weight"}))
-    assert "backstepping-weight" not in default_controllers()
-    assert "backstepping" in default_controllers()
 
 
 def test_settings_tell_a_file_from_its_next_version_and_controllers_have_files_of_their_own(tmp_path):

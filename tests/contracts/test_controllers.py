@@ -10,7 +10,7 @@ import pytest
 
 from agents.policy.seeds import shipped_names
 from agents.residual.settings import NO_LAW
-from baselines.registry import CONTROLLERS, LIMITED, LISTED, SLOW, controller_names, known_options, make_controller
+from baselines.registry import CONTROLLERS, LIMITED, LISTED, controller_names, known_options, make_controller
 from baselines.staged import COMMAND_OPTIONS
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.sensors.sensors import SENSORS
@@ -24,20 +24,16 @@ POLICIES = [f"residual[policy={name}]" for name in shipped_names()]
 CHOICES = [*LISTED, *(name for name in controller_names() if name not in CONTROLLERS)]
 NAMES = [*CHOICES, *POLICIES, *(LIMITED + name for name in ("backstepping", "admittance-adaptive"))]
 CASES = [
-    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}", marks=[pytest.mark.slow] * (name in SLOW))
+    pytest.param(name, sensors, RIG, id=f"{name}-{sensors}")
     for name in NAMES for sensors in SENSORS
 ]  # fmt: skip
 CASES.append(pytest.param("admittance-adaptive", "honest", FELT, id="admittance-adaptive-acceleration"))
 RANDOM = {"random-valves"}
 """Its openings are drawn from one stream for all lanes."""
-CONTROLLED = [
-    pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES if not name.endswith("-valves")
-]  # fmt: skip
+CONTROLLED = [name for name in NAMES if not name.endswith("-valves")]
 
 
 def made(name, rig=RIG, **options):
-    if name in SLOW:
-        pytest.importorskip("casadi", reason="pip install 'birthsim[mpc]'")
     return make_controller(name, rig, **options)
 
 
@@ -72,7 +68,7 @@ def lane_of(signals, lane):
 @pytest.mark.parametrize(("name", "sensors", "rig"), CASES)
 def test_one_rig_is_a_lane_of_many_and_a_reset_starts_it_alone(name, sensors, rig):
     """Of the first and of the next block of lanes; told of no force a law is the one that nothing is told, to the bit."""
-    ticks, lanes = (16, 3) if name in SLOW else (60, 34)
+    ticks, lanes = 60, 34
     chosen = (1, lanes - 1)
     fresh = np.isin(np.arange(lanes), chosen)
     kept, reset, again, zero = (made(name, rig) for _ in range(4))

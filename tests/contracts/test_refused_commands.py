@@ -18,7 +18,7 @@ COMPILED = "allowed: a compiled one: backstepping"
 TABLE = {
     "export --to riscv": "--to 'riscv'; allowed: onnx, wasm, c, x86-64, aarch64, cortex-m7",
     "export --to wasm --env CartPole-v1 --out x": "--env 'CartPole-v1'; allowed: BirthSIM/Circle-v1",
-    "export --to wasm --controller nonlinear-mpc --out x": f"controller = 'nonlinear-mpc'; {COMPILED}",
+    "export --to wasm --controller shut-valves --out x": f"controller = 'shut-valves'; {COMPILED}",
     "export --to wasm --controller nothing --out x": "controller = 'nothing'; allowed: backstepping",
     "export --to wasm --controller pid[gain=1] --out x": "gain = 1.0 is unknown; allowed for pid: ",
     "export --to wasm --controller residual --out x": "--controller residual; allowed: --policy NAME",
@@ -27,7 +27,7 @@ TABLE = {
     "export --to cortex-m7 --env BirthSIM/Circle-v1 --out x": "--env with cortex-m7; allowed: without it",
     "export --to wasm --parameters nowhere.toml --out x": "'nowhere.toml'",
     "export --to fmu --out x.zip": "--out 'x.zip'; allowed: a file that ends in .fmu",
-    "export --to fmu --controller nonlinear-mpc --out x.fmu": f"controller = 'nonlinear-mpc'; {COMPILED},",
+    "export --to fmu --controller shut-valves --out x.fmu": f"controller = 'shut-valves'; {COMPILED},",
     "export --to fmu --controller pid --policy circle --out x.fmu": "--controller with --policy; allowed: one of them",
     "export --to fmu --env BirthSIM/Square-v1 --out x.fmu": "--env 'BirthSIM/Square-v1'; allowed: BirthSIM/Circle-v1",
     "identify": f"nothing given; {ONE_OF}",

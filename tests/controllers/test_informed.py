@@ -6,10 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from baselines.admittance.informed import Informed
+from baselines.admittance import knowledge
 from baselines.admittance.knowledge import BELIEVED_LIMIT
+from baselines.admittance.rows import Known, Memory
+from baselines.controller import require_stiffness
 from baselines.estimation.admittance import MOVING_SPEED
+from baselines.rivals.horizon import NODES, Horizon, Situation
+from baselines.rivals.predictive import GENERATED as GENERATED
+from baselines.rivals.predictive import Constants, foresee
+from baselines.staged import LawStage, StagedController
+from birthsim_env.loop.rows import HANDED, Seen
 from birthsim_env.loop.signals import Measurement, Reference
+from birthsim_env.loop.stage import block
+from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_array
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.plant import Plant
@@ -24,11 +33,55 @@ RIG = Parameters().replace({"geometry.gamma3": 1.4, "valves.leakage_ratio": 0.0}
 PISTON = np.array([[0.02, -0.04], [-0.05, 0.08]])
 """m: the pistons of two lanes."""
 
+ONES = dict.fromkeys(("kept", "weight"), np.ones(NODES)) | dict.fromkeys(("position", "speed", "stiffness", "flow"), 1.0)
+EVERY_PERIOD = Horizon(Horizon.numbers(tick=np.arange(1.0, NODES + 1), step=np.full(NODES, PERIOD), **ONES))
+
 either = pytest.mark.parametrize("sampled", [False, True], ids=["ideal", "lab"])
 
 
-class Aware(Informed):
-    """``known`` and ``memory`` by their names, which are good until the next ``update``."""
+@kernel
+def inform(world: int, seen: Seen, memory: int, about: Constants, tables: int, lane: int, n: int) -> int:
+    """Hands on what is ``Known``."""
+    own = Memory(block(memory, int(about.rows_of_memory))[:, :n])
+    signals = Seen(seen.rows[:, :n])
+    return knowledge.know(signals, own, Known(signals.handed[: Known.size]), about)
+
+
+class Aware(StagedController):
+    """What a planner knows, by its names, which are good until the next ``update``; gains for ``ideal`` and ``lab`` sensors."""
+
+    def __init__(self, rig: Parameters, gains: dict[str, dict[str, float]], horizon: Horizon = EVERY_PERIOD) -> None:
+        super().__init__(rig)
+        self._gains, self._horizon = gains, horizon
+
+    def law_stages(self, sampled: bool) -> list[LawStage]:
+        known = knowledge.beliefs(self.parameters, sampled, sampled, self._gains["lab" if sampled else "ideal"])
+        constants = Constants.numbers(**known, horizon=self._horizon.rows)
+        self.about = Constants(constants)
+        return [LawStage(inform, constants, knowledge.fresh_memory(self.parameters, sampled))]
+
+    def more_rows(self, lanes: int) -> list[tuple[Array, int]]:
+        self.known = Known(np.zeros((Known.size, lanes)))
+        return [(self.known.rows, HANDED)]
+
+    def explain(self, measurement: Measurement, reference: Reference) -> None:
+        require_stiffness(reference, 0.0)
+
+    def update(self, measurement: Measurement, reference: Reference) -> None:
+        if self.run_stages(measurement, reference):
+            self.explain(measurement, reference)
+
+    @property
+    def memory(self) -> Memory:
+        return Memory(self._memories[0])
+
+    def foreseen(self, reference: Reference) -> Situation:
+        """What the planner begins with, but for the flows, and expects at the nodes of its horizon."""
+        lanes = self.known.drag.shape[1]
+        seen, given = Seen(np.zeros((Seen.size, lanes))), Situation(np.zeros((Situation.size, lanes)))
+        seen.asked.rows[:] = reference.rows
+        foresee(seen, self.memory, self.known, self.about, given)
+        return given
 
     def now(self, measurement: Measurement, reference: Reference) -> SimpleNamespace:
         self.update(measurement, reference)
@@ -248,7 +301,7 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
     Targets turn round on the way, and friction with them. Asking changes nothing.
     """
     part, kept = aware(friction_fraction=fraction), aware(friction_fraction=fraction)
-    push, ticks = (np.array([[9.0, -4.0], [-6.0, 7.0]]), np.arange(1, 26))
+    push = np.array([[9.0, -4.0], [-6.0, 7.0]])
 
     def both(tick: int) -> tuple[SimpleNamespace, SimpleNamespace]:
         measured, wanted = turning(tick, push)
@@ -257,14 +310,15 @@ def test_a_forecast_has_the_friction_of_the_motion_to_come_and_the_disturbance_o
 
     for tick in range(401):
         now, _ = both(tick)
-    observed, believed = now.unseen - now.believed, now.believed.copy()
-    assert np.abs(observed).min() > 1
-    ahead, unseen = part.forecast(turning(400, push)[1], ticks)
-    later = []
-    for k, tick in enumerate(ticks):
-        now, other = both(400 + tick)
-        np.testing.assert_allclose(ahead[k], now.motion[:4], rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(unseen[k] - observed, now.believed, rtol=1e-9, atol=1e-9)
-        assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
-        later.append(now.believed - believed)
+    believed, later = now.believed.copy(), []
+    assert np.abs(now.unseen - now.believed).min() > 1
+    for begun in range(400, 428, NODES):
+        observed = now.unseen - now.believed
+        given = part.foreseen(turning(begun, push)[1])
+        for k in range(NODES):
+            now, other = both(begun + 1 + k)
+            np.testing.assert_allclose(given.motion[4 * k : 4 * k + 4], now.motion[:4], rtol=1e-10, atol=1e-12)
+            np.testing.assert_allclose(given.unseen[2 * k : 2 * k + 2] - observed, now.believed, rtol=1e-9, atol=1e-9)
+            assert all(np.array_equal(value, getattr(other, name)) for name, value in vars(now).items())
+            later.append(now.believed - believed)
     assert np.all(np.abs(later).max(axis=0) >= 10 * fraction)

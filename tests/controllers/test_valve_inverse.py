@@ -3,14 +3,26 @@
 import numpy as np
 import pytest
 
-from baselines.valve_inverse import flow_ranges, openings_for_flows
-from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, parameter_column
+from baselines import valve_inverse
+from birthsim_env.physics.compiled.lanes import PRESSURES, SPOOLS, Array, Rig, parameter_column
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
 
 RIG = Parameters()
 VALVES = {"default": RIG, "hot, leaking": RIG.replace({"air.temperature": 320.0, "valves.leakage_ratio": 0.08})}
 every_valve = pytest.mark.parametrize("rig", VALVES.values(), ids=VALVES)
+
+
+def flow_ranges(pressures: Array, spools: Array, rig: Parameters) -> tuple[Array, Array, Array]:
+    least, most, present = np.empty_like(pressures), np.empty_like(pressures), np.empty_like(pressures)
+    valve_inverse.flow_ranges(pressures, spools, Rig(parameter_column(rig)), least, most, present)
+    return least, most, present
+
+
+def openings_for_flows(flows: Array, pressures: Array, rig: Parameters) -> Array:
+    openings = np.empty_like(flows)
+    valve_inverse.openings_for_flows(flows, pressures, Rig(parameter_column(rig)), openings)
+    return openings
 
 
 def into_chambers(rig: Parameters, pressures: Array, spools: Array) -> Array:
@@ -26,7 +38,7 @@ def test_flow_ranges_are_those_of_the_plants_valves(rig: Parameters) -> None:
     """Least and most over all openings, and the flow at given spools; pressures also beyond supply and atmosphere."""
     rng, lanes = np.random.default_rng(0), 60
     pressures, spools = rng.uniform(0.6e5, 8.5e5, (4, lanes)), rng.uniform(-1, 1, (4, lanes))
-    least, most, present = flow_ranges(pressures, spools, parameter_column(rig))
+    least, most, present = flow_ranges(pressures, spools, rig)
     every = np.array([into_chambers(rig, pressures, np.full((4, lanes), s)) for s in np.linspace(-1, 1, 41)])
     np.testing.assert_allclose(least, every.min(axis=0), rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(most, every.max(axis=0), rtol=1e-12, atol=1e-15)
@@ -36,20 +48,19 @@ def test_flow_ranges_are_those_of_the_plants_valves(rig: Parameters) -> None:
 @every_valve
 def test_openings_for_flows_are_the_inverse(rig: Parameters) -> None:
     """Flow to opening to flow through the plant's valves, and opening to flow to opening; beyond the range fully open."""
-    rng, lanes, p = np.random.default_rng(1), 200, parameter_column(rig)
+    rng, lanes = np.random.default_rng(1), 200
     pressures, spools = rng.uniform(1.1e5, 6.9e5, (4, lanes)), rng.uniform(-1, 1, (4, lanes))
-    least, most, present = flow_ranges(pressures, spools, p)
+    least, most, present = flow_ranges(pressures, spools, rig)
     wanted = rng.uniform(least, most)
-    got = openings_for_flows(wanted, pressures, p)
+    got = openings_for_flows(wanted, pressures, rig)
     assert np.abs(got).max() <= 1
     np.testing.assert_allclose(into_chambers(rig, pressures, got), wanted, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(openings_for_flows(present, pressures, p), spools, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(openings_for_flows(least - 1e-6, pressures, p), -1.0)
-    np.testing.assert_array_equal(openings_for_flows(most + 1e-6, pressures, p), 1.0)
+    np.testing.assert_allclose(openings_for_flows(present, pressures, rig), spools, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(openings_for_flows(least - 1e-6, pressures, rig), -1.0)
+    np.testing.assert_array_equal(openings_for_flows(most + 1e-6, pressures, rig), 1.0)
 
 
 def test_a_valve_without_driving_pressure_stays_shut() -> None:
     """Above the supply nothing can fill, below the atmosphere nothing can drain: opening would do the contrary."""
-    p = parameter_column(RIG)
     pressures = np.full((4, 2), [8e5, 0.9e5])
-    assert not openings_for_flows(np.full((4, 2), [1e-3, -1e-3]), pressures, p).any()
+    assert not openings_for_flows(np.full((4, 2), [1e-3, -1e-3]), pressures, RIG).any()

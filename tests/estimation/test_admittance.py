@@ -46,9 +46,10 @@ class Follower:
         return motion.rows
 
     def forecast(self, reference: Reference, force: Array, ticks: Array) -> Array:
-        ahead = np.empty((len(ticks), *self.offset.rows.shape))
-        admittance.forecast(self.offset, reference, force, self._about, ticks, ahead)
-        return ahead
+        offset = Point(self.offset.rows.copy())
+        ahead = np.empty((4 * len(ticks), force.shape[1]))
+        admittance.forecast(offset, reference, force, self._about, ticks.astype(float), ahead)
+        return ahead.reshape(len(ticks), 4, -1)
 
 
 def generator(stiffness: Array, mass: float = MASS, ratio: float = DAMPING_RATIO) -> tuple[Array, Array]:

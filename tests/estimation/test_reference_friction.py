@@ -29,9 +29,10 @@ class Friction:
         return drag
 
     def forecast(self, ahead: Array, ticks: Array) -> Array:
-        drag = np.empty((len(ticks), *self.bristles.shape))
-        reference_friction.forecast(ahead, self._p, self._period * np.diff(ticks, prepend=0), self.bristles, drag)
-        return drag
+        lanes, steps = self.bristles.shape[1], self._period * np.diff(ticks, prepend=0)
+        drag = np.empty((2 * len(ticks), lanes))
+        reference_friction.forecast(ahead.reshape(-1, lanes), self._p, steps, self.bristles.copy(), drag)
+        return drag.reshape(-1, 2, lanes)
 
 
 def circle(times: Array, size: float = 0.06) -> Array:

@@ -33,7 +33,7 @@ def test_series_of_a_piston() -> None:
     assert missed(0.1) / missed(0.05) == pytest.approx(8, rel=0.01)
 
 
-@pytest.mark.parametrize("name", sorted(set(LISTED) - {"nonlinear-mpc"}))
+@pytest.mark.parametrize("name", sorted(set(LISTED)))
 def test_every_law_declares_the_stiffness_that_is_asked_for(name: str) -> None:
     """(18) loses nothing of a stiffness that is the same along x and y; mass and damping are positive definite."""
     declared = declared_by(make_controller(name, RIG), resting(POSES, [1000.0, 4000.0]))

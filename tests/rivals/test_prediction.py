@@ -1,20 +1,14 @@
-"""What the nonlinear MPC expects of the rig: Newton, polytropic chambers and SciPy along the horizon; its residuals."""
+"""What the nonlinear MPC expects of the rig: Newton, polytropic chambers and SciPy along the horizon; its programme."""
 
-import dataclasses
-import subprocess
-import sys
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from baselines.registry import make_controller
-from baselines.rivals import prediction
-from baselines.rivals.prediction import FLOW, FLOWS, PRESSURE, ControlModel, residuals
-from baselines.rivals.predictive import STEPS, Buffered, NonlinearMPC
-from birthsim_env.physics.compiled.lanes import Array
+from baselines.rivals import horizon
+from baselines.rivals.horizon import FLOWS, FORCES, HALF, NODES, OUTPUTS, POINTS, SIZE, STATE, Horizon, Situation
+from birthsim_env.physics.compiled.lanes import Array, Rig, parameter_column, parameter_columns
 from birthsim_env.physics.rig.parameters import Parameters
 from tests.oracles import derived_law, rigid_body
 from tests.oracles import linkage_by_points as by_points
@@ -28,20 +22,17 @@ TILTED = Parameters().replace(
 )  # fmt: skip
 RIGS = {"default": Parameters(), "tilted": TILTED}
 TOLERANCES = {"position": 2e-4, "speed": 7e-3, "stiffness": 250.0, "flow": 3e-3}
-HORIZON = (0.002, 0.003, 0.007, 0.012)
-NODE, NODES = 10, len(HORIZON)
-"""Residuals of a node: x, y, vx, vy, two stiffnesses and four changes of flows."""
+STEPS = np.array([0.002, 0.003, 0.002, 0.007, 0.004, 0.012, 0.009])
+PRESSURE, FLOW = 1e5, 1e-3
+"""Pa, kg/s: what pressures and flows of the second model are counted in."""
+
+UNITS = np.repeat([1.0, PRESSURE], [4, 4])
 
 on_both_rigs = pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
 
 
-def numbers(value: Any) -> Array:
-    """A CasADi matrix of one column, or a sequence of numbers."""
-    return np.array(casadi.vertcat(*value) if isinstance(value, tuple | list) else value).ravel()
-
-
 def states(rig: Parameters, count: int, seed: int, speed: float = 0.3, push: float = 40.0) -> Array:
-    """Random states (8, N) as ``ControlModel`` has them, near balance."""
+    """Random states (8, N), near balance, pressures in PRESSURE."""
     now = rigid_body.near_balance(rig, count, seed, speed, push)
     return np.concatenate([now.piston, now.speed, now.pressures / PRESSURE])
 
@@ -86,22 +77,34 @@ def seen_from_outside(state: Array, rig: Parameters) -> Array:
 @on_both_rigs
 def test_rates_are_those_of_newton_and_polytropic_chambers(rig: Parameters) -> None:
     """With dead volume, a user's force and forces unseen; random states, every row to 1e-9 of its size."""
-    model, rng, found, expected = ControlModel(rig), np.random.default_rng(1), [], []
-    for state in states(rig, 40, 0).T:
-        flows, force, disturbance_force = rng.normal(0, 2, 4), rng.normal(0, 30, 2), rng.normal(0, 20, 2)
-        found.append(numbers(model.rates(*map(casadi.DM, (state, flows, force, disturbance_force)))))
-        expected.append(second_rates(state, flows, force, disturbance_force, rig))
+    rng, state = np.random.default_rng(1), states(rig, 40, 0)
+    flows, pushes = rng.normal(0, 2, (FLOWS, 40)), rng.normal(0, 25, (FORCES, 40))
+    found, p = np.empty((STATE, 40)), Rig(parameter_column(rig))
+    for lane in range(40):
+        horizon.rates(state * UNITS[:, None], FLOW * flows, pushes, p, found, lane)
+    expected = np.array(
+        [second_rates(*lane[:2], *np.split(lane[2], 2), rig) for lane in zip(state.T, flows.T, pushes.T, strict=True)]
+    )
     size = np.abs(expected).max(axis=0)
     assert np.all(size > [0.1, 0.1, 5, 5, 5, 5, 5, 5])
-    np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.T / UNITS / size, expected / size, rtol=0, atol=1e-9)
 
 
-def stepped(model: ControlModel, state: Array, flows: Array, commanded: Array, pushes: Array, times: list[float]) -> Array:
-    """State and flows (12,) after steps of these ``times``; ``pushes`` (4,): the user's force, then that disturbance_force."""
-    now, flowing, held = casadi.DM(state), casadi.DM(flows), (casadi.DM(pushes[:2]), casadi.DM(pushes[2:]))
-    for time in times:
-        now, flowing = model.step(now, flowing, casadi.DM(commanded), *held, time)
-    return np.concatenate([numbers(now), numbers(flowing)])
+def about(rig: Parameters, steps: Array, weight: Array) -> Horizon:
+    kept = np.exp(-steps / 2 / rig.valves.time_constant)
+    return Horizon(Horizon.numbers(tick=np.zeros(NODES), step=steps, kept=kept, weight=weight, **TOLERANCES))
+
+
+def stepped(rig: Parameters, state: Array, flows: Array, commanded: Array, pushes: Array, time: float, count: int = 1) -> Array:
+    """State and flows (12, N) in their units after ``count`` steps of ``time``, s; ``pushes`` (4, N)."""
+    lanes = state.shape[1]
+    now, flowing, plan = state * UNITS[:, None], FLOW * flows, np.zeros((SIZE, lanes))
+    plan[:FLOWS] = FLOW * commanded
+    rows, of = parameter_columns(rig, lanes), about(rig, np.full(NODES, time), np.ones(NODES))
+    points, total, q = np.empty((POINTS, lanes)), np.empty((STATE, lanes)), np.empty((FLOWS, lanes))
+    for _ in range(count):
+        horizon.step_to(now, flowing, plan, np.array(pushes), rows, 0, of, points, total, q, lanes)
+    return np.concatenate([now / UNITS[:, None], flowing / FLOW])
 
 
 @on_both_rigs
@@ -110,20 +113,20 @@ def test_a_step_is_a_classical_runge_kutta_step_with_exact_lag(rig: Parameters) 
 
     The flows are exact; half the step leaves about a sixteenth of the error: below 0.1 nm and 0.01 Pa with steps of 0.5 ms.
     """
-    model, rng, span = ControlModel(rig), np.random.default_rng(2), 0.008
-    for state in states(rig, 2, 5).T:
-        flows, commanded, pushes = rng.normal(0, 1, 4), rng.normal(0, 2, 4), rng.normal(0, 25, 4)
+    rng, span, state = np.random.default_rng(2), 0.008, states(rig, 2, 5)
+    flows, commanded, pushes = rng.normal(0, 1, (4, 2)), rng.normal(0, 2, (4, 2)), rng.normal(0, 25, (4, 2))
+    found = [stepped(rig, state, flows, commanded, pushes, span / count, count) for count in (4, 8, 16)]
+    for lane in range(2):
 
-        def slope(time: float, both: Array, commanded: Array = commanded, pushes: Array = pushes) -> Array:
-            lag = (commanded - both[8:]) / rig.valves.time_constant
-            return np.concatenate([second_rates(both[:8], both[8:], pushes[:2], pushes[2:], rig), lag])
+        def slope(time: float, both: Array, lane: int = lane) -> Array:
+            lag = (commanded[:, lane] - both[8:]) / rig.valves.time_constant
+            return np.concatenate([second_rates(both[:8], both[8:], *np.split(pushes[:, lane], 2), rig), lag])
 
-        exact = solve_ivp(slope, (0, span), np.concatenate([state, flows]), method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-        errors = []
-        for count in (4, 8, 16):
-            found = stepped(model, state, flows, commanded, pushes, [span / count] * count)
-            np.testing.assert_allclose(found[8:], exact[8:], rtol=0, atol=1e-9)
-            errors.append(np.abs(found - exact)[:8])
+        begun = np.concatenate([state, flows])[:, lane]
+        exact = solve_ivp(slope, (0, span), begun, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+        for one in found:
+            np.testing.assert_allclose(one[8:, lane], exact[8:], rtol=0, atol=1e-9)
+        errors = [np.abs(one[:8, lane] - exact[:8]) for one in found]
         shrunk = np.linalg.norm(errors[:-1], axis=1) / np.linalg.norm(errors[1:], axis=1)
         assert np.all((shrunk > 15) & (shrunk < 17))
         assert np.all(errors[-1] < [1e-10, 1e-10, 2e-8, 2e-8, 1e-7, 1e-7, 1e-7, 1e-7])
@@ -133,140 +136,76 @@ def test_a_step_is_a_classical_runge_kutta_step_with_exact_lag(rig: Parameters) 
 def test_end_effector_and_pneumatic_stiffness(rig: Parameters) -> None:
     """Of the linkage made of points; and how the force falls along the stroke where shut chambers, as (9) has them without
     dead volume, are squeezed."""
-    model = ControlModel(rig)
-    for state in states(rig, 30, 7).T:
-        expected = seen_from_outside(state, rig)
-        np.testing.assert_allclose(numbers(model.end_effector(casadi.DM(state))), expected[:4], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(numbers(model.pneumatic_stiffness(casadi.DM(state))), expected[4:], rtol=1e-6)
+    state, found = states(rig, 30, 7), np.empty((OUTPUTS, 30))
+    for lane in range(30):
+        horizon.outputs(state * UNITS[:, None], Rig(parameter_column(rig)), found, lane)
+        expected = seen_from_outside(state[:, lane], rig)
+        np.testing.assert_allclose(found[:4, lane], expected[:4], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found[4:, lane], expected[4:], rtol=1e-6)
 
 
-@dataclasses.dataclass
-class Case:
-    """Arguments of ``residuals``, drawn at random; forces, motion and stiffnesses node by node (M, rows)."""
-
-    state: Array
-    flows: Array
-    force: Array
-    disturbance_force: Array
-    motion: Array
-    asked: Array
-    commanded: Array
-
-    @property
-    def given(self) -> Array:
-        nodes = [part.ravel() for part in (self.disturbance_force, self.motion, self.asked)]
-        return np.concatenate([self.state, self.flows, self.force, *nodes])
+def drawn(rig: Parameters, lanes: int, seed: int) -> Situation:
+    """Random situations; motion and stiffnesses are some tolerances away."""
+    rng, given = np.random.default_rng(seed), Situation(np.empty((Situation.size, lanes)))
+    state = states(rig, lanes, seed) * UNITS[:, None]
+    given.joints.rows[:], given.pressure[:], given.flow[:] = state[:4], state[4:], FLOW * rng.normal(0, 1, (FLOWS, lanes))
+    given.force[:], given.unseen[:] = rng.normal(0, 20, (2, lanes)), rng.normal(0, 20, (2 * NODES, lanes))
+    given.motion[:] = rng.normal(0, 0.3, (4 * NODES, lanes))
+    given.stiffness[:] = rng.normal(3000, 900, (2 * NODES, lanes))
+    return given
 
 
-def drawn(rig: Parameters, seed: int) -> Case:
-    rng = np.random.default_rng(seed)
-    return Case(
-        states(rig, 1, seed)[:, 0],
-        rng.normal(0, 1, 4),
-        rng.normal(0, 20, 2),
-        rng.normal(0, 20, (NODES, 2)),
-        rng.normal(0, 0.3, (NODES, 4)),
-        rng.normal(3000, 900, (NODES, 2)),
-        rng.normal(0, 1, (NODES, FLOWS)),
-    )  # fmt: skip
-
-
-def written_out(case: Case, rig: Parameters, last: float, unit: float) -> Array:
-    """The residuals (10 M,) as the module's documentation states them."""
-    model, state, flows, before, found = ControlModel(rig), case.state, case.flows, case.flows, []
-    for k, time in enumerate(HORIZON):
-        pushes = np.concatenate([case.force, case.disturbance_force[k]])
-        state, flows = np.split(stepped(model, state, flows, case.commanded[k], pushes, [time]), [8])
-        weight = np.sqrt((last if k == NODES - 1 else 1.0) * time / unit)
-        away = seen_from_outside(state, rig) - np.concatenate([case.motion[k], case.asked[k]])
+def written_out(rig: Parameters, given: Situation, plan: Array, weight: Array) -> Array:
+    """The residuals (10 NODES, N) as the module's documentation states them; ``plan`` (SIZE, N) in FLOW."""
+    now = np.concatenate([given.joints.rows, given.pressure / PRESSURE, given.flow / FLOW])
+    before, found = now[8:], []
+    for k, time in enumerate(STEPS):
+        commanded = plan[FLOWS * k : FLOWS * (k + 1)]
+        pushes = np.concatenate([given.force, given.unseen[2 * k : 2 * k + 2]])
+        now = stepped(rig, now[:8], now[8:], commanded, pushes, time)
+        seen = np.stack([seen_from_outside(lane, rig) for lane in now[:8].T], axis=1)
+        asked = np.concatenate([given.motion[4 * k : 4 * k + 4], given.stiffness[2 * k : 2 * k + 2]])
         sizes = np.repeat([TOLERANCES[name] for name in ("position", "speed", "stiffness")], 2)
-        found += [weight * away / sizes, FLOW * (case.commanded[k] - before) / TOLERANCES["flow"]]
-        before = case.commanded[k]
+        found += [weight[k] * (seen - asked) / sizes[:, None], FLOW * (commanded - before) / TOLERANCES["flow"]]
+        before = commanded
     return np.concatenate(found)
 
 
+def programmes(rig: Parameters, given: Situation, plan: Array, weight: Array) -> tuple[Array, Array]:
+    """Squared slopes (HALF, N) and slopes (SIZE, N), by flows in FLOW; ``plan`` in FLOW."""
+    lanes = plan.shape[1]
+    h, g = np.empty((HALF, lanes)), np.empty((SIZE, lanes))
+    horizon.programme(FLOW * plan, given, parameter_columns(rig, lanes), about(rig, STEPS, weight), h, g, lanes)
+    return FLOW**2 * h, FLOW * g
+
+
 @on_both_rigs
-def test_residuals_are_errors_over_tolerances_weighed_by_time(rig: Parameters, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Node by node: position, speed and stiffness against what is asked for there, times the root of the time that the node
-    stands for; changes of the commanded flows, the first from what flows now, whatever time there is for them."""
-    for last, unit in ((prediction.LAST, prediction.NODES_WEIGH), (5.0, 0.002)):
-        monkeypatch.setattr(prediction, "LAST", last)
-        monkeypatch.setattr(prediction, "NODES_WEIGH", unit)
-        function = residuals(rig, HORIZON, TOLERANCES)
-        for seed in range(3):
-            case = drawn(rig, seed)
-            found = numbers(function(case.commanded.ravel(), case.given)[0])
-            np.testing.assert_allclose(found, written_out(case, rig, last, unit), rtol=1e-6, atol=1e-6)
+def test_the_programme_is_that_of_errors_over_tolerances_weighed_by_time(rig: Parameters) -> None:
+    """Node by node: position, speed and stiffness against what is asked for there; changes of the commanded flows, the first
+    from what flows now. J'J and J'r of these residuals, of which J is taken by central differences."""
+    rng, size = np.random.default_rng(9), 1e-3
+    given, plan, weight = drawn(rig, 2, 11), rng.normal(0, 0.5, (SIZE, 2)), rng.uniform(0.3, 2.0, NODES)
+    h, g = programmes(rig, given, plan, weight)
+    ways = size * np.eye(SIZE)[:, :, None]
+    sides = [[written_out(rig, given, plan + sign * way, weight) for way in ways] for sign in (1, -1)]
+    slopes, values = (np.array(sides[0]) - np.array(sides[1])) / (2 * size), written_out(rig, given, plan, weight)
+    for lane in range(2):
+        j, r = slopes[:, :, lane], values[:, lane]
+        np.testing.assert_allclose(g[:, lane], j @ r, rtol=0, atol=2e-5 * np.abs(j @ r).max())
+        np.testing.assert_allclose(h[:, lane], (j @ j.T)[np.tril_indices(SIZE)], rtol=0, atol=2e-5 * np.abs(j @ j.T).max())
 
 
-def test_a_plan_that_keeps_the_balance_leaves_no_residual() -> None:
-    """At rest on the target, chambers shut, stiffnesses as asked for: zero; also where what is unseen holds the user off."""
+def test_a_plan_that_keeps_the_balance_leaves_nothing_to_improve() -> None:
+    """At rest on the target, chambers shut, stiffnesses as asked for; also where what is unseen holds the user off."""
     for rig in RIGS.values():
-        now = rigid_body.near_balance(rig, 3, 3, 0.0, 0.0)
-        function, push = residuals(rig, HORIZON, TOLERANCES), np.array([12.0, -25.0])
-        for lane, jacobian in enumerate(rigid_body.jacobians(now.piston, rig)):
-            state = np.concatenate([now.piston[:, lane], np.zeros(2), now.pressures[:, lane] / PRESSURE])
-            target = np.concatenate([rigid_body.pose_of(now.piston, rig).end_effector[:, lane], np.zeros(2)])
-            for force in (np.zeros(2), push):
-                disturbance_force, asked = np.tile(-jacobian.T @ force, (NODES, 1)), np.tile(now.stiffness[:, lane], (NODES, 1))
-                case = Case(
-                    state, np.zeros(4), force, disturbance_force, np.tile(target, (NODES, 1)), asked, np.zeros((NODES, 4))
-                )
-                found = numbers(function(case.commanded.ravel(), case.given)[0])
-                np.testing.assert_allclose(found, 0, rtol=0, atol=1e-7)
-
-
-def test_what_comes_later_changes_nothing_before() -> None:
-    """A flow acts from its step on, and forces, motion and stiffness at their own node (a force from there on)."""
-    rig, case = TILTED, drawn(TILTED, 4)
-    function = residuals(rig, HORIZON, TOLERANCES)
-    base = numbers(function(case.commanded.ravel(), case.given)[0]).reshape(NODES, NODE)
-    stays = {"commanded": False, "disturbance_force": False, "motion": True, "asked": True}
-    for name, only_there in stays.items():
-        changed = dataclasses.replace(case, **{name: getattr(case, name).copy()})
-        getattr(changed, name)[1] += 0.1
-        found = numbers(function(changed.commanded.ravel(), changed.given)[0]).reshape(NODES, NODE)
-        differs = (found != base).any(axis=1)
-        assert differs.tolist() == [False, True, not only_there, not only_there], name
-
-
-@on_both_rigs
-def test_slopes_are_the_residuals_derivatives(rig: Parameters) -> None:
-    """Central differences; CasADi's own matrix, and what ``Buffered`` reads and writes, which it does column by column."""
-    function, step = residuals(rig, STEPS, TOLERANCES), 1e-4
-    size = FLOWS * len(STEPS)
-    buffered, rng = Buffered(function), np.random.default_rng(9)
-    for state in states(rig, 3, 11).T:
-        commanded = rng.normal(0, 0.5, size)
-        pushes, targets = rng.normal(0, 10, 2 + 2 * len(STEPS)), rng.normal(0, 0.3, 4 * len(STEPS))
-        given = np.concatenate([state, rng.normal(0, 1, 4), pushes, targets, np.full(2 * len(STEPS), 3000.0)])
-        values, slopes = (np.array(part) for part in function(commanded, given))
-        differences = np.empty_like(slopes)
-        for column in range(size):
-            shift = step * (np.arange(size) == column)
-            ahead, behind = (numbers(function(commanded + s, given)[0]) for s in (shift, -shift))
-            differences[:, column] = (ahead - behind) / (2 * step)
-        np.testing.assert_allclose(slopes, differences, rtol=0, atol=1e-6 * np.abs(slopes).max())
-        buffered.inputs["commanded"][:], buffered.inputs["given"][:] = commanded, given
-        buffered.call()
-        assert np.array_equal(buffered.outputs["residuals"], values[:, 0])
-        assert np.array_equal(buffered.outputs["slopes"].reshape(size, -1).T, slopes)
-
-
-def test_without_casadi_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "casadi", None)
-    for make in (NonlinearMPC, lambda: make_controller("nonlinear-mpc", Parameters()), lambda: ControlModel(Parameters())):
-        with pytest.raises(ValueError, match=r"nonlinear-mpc needs CasADi, .*allowed: after pip install 'birthsim\[mpc\]'"):
-            make()
-
-
-def test_all_other_controllers_do_without_casadi() -> None:
-    """In an interpreter that cannot import it."""
-    code = (
-        "import sys; sys.modules['casadi'] = None\n"
-        "from baselines.registry import LISTED, make_controller\n"
-        "from birthsim_env.physics.rig.parameters import Parameters\n"
-        "for name in set(LISTED) - {'nonlinear-mpc'}: make_controller(name, Parameters())\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+        now, given = rigid_body.near_balance(rig, 3, 3, 0.0, 0.0), Situation(np.zeros((Situation.size, 3)))
+        given.joints.position[:], given.pressure[:] = now.piston, now.pressures
+        given.stiffness[:] = np.tile(now.stiffness, (NODES, 1))
+        given.motion[:] = np.tile(
+            np.concatenate([rigid_body.pose_of(now.piston, rig).end_effector, np.zeros((2, 3))]), (NODES, 1)
+        )
+        given.force[:] = [[0.0, 12.0, -8.0], [0.0, -25.0, 9.0]]
+        held = -np.einsum("nci,cn->in", rigid_body.jacobians(now.piston, rig), given.force)
+        given.unseen[:] = np.tile(held, (NODES, 1))
+        h, g = programmes(rig, given, np.zeros((SIZE, 3)), np.ones(NODES))
+        assert np.abs(g).max() < 1e-6 * np.sqrt(h.max())

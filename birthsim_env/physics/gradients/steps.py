@@ -15,21 +15,9 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.dynamics import load, store
 from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, made
 from birthsim_env.physics.gradients.right_hand_side import GENERATED as GENERATED
+from birthsim_env.physics.gradients.runge_kutta import STAGES, ahead_of, weight_of
 
-STAGES = 4
 adjoint, adjoint_rig, tangent_rig = made.adjoint, made.adjoint_rig, made.tangent_rig
-
-
-@helper
-def weight_of(stage: int, step: float) -> float:
-    """What the rates of a stage count for at the end of the step, s."""
-    return step / 6.0 if stage == 0 or stage == 3 else step / 3.0
-
-
-@helper
-def ahead_of(stage: int, step: float) -> float:
-    """How far a stage's rates take the next trial state, s."""
-    return 0.0 if stage == 3 else step if stage == 2 else step / 2.0
 
 
 @helper

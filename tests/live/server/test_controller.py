@@ -134,12 +134,12 @@ def test_what_is_not_offered_does_not_run(name: str, live: TestClient) -> None:
 def test_the_page_offers_what_python_can_run(own: str) -> None:
     content = packed_page(Parameters()).content
     missing = [one["name"] for one in content["hello"]["choices"]["controller"] if "missing" in one]
-    assert missing == ["nonlinear-mpc", "shut-valves", "slammed-valves", "random-valves"]
+    assert missing == ["shut-valves", "slammed-valves", "random-valves"]
     offer(content, Parameters(), [f"{own}:Law", "backstepping"])
     assert content["python"] == [*missing, f"{own}:Law"]
     for name in ("controller", "compare"):
         choices = {one["name"]: one for one in content["hello"]["choices"][name]}
         assert choices[f"{own}:Law"]["title"] == "mine.py:Law"
-        assert all("missing" not in choices[name] or "mpc" in choices[name]["missing"] for name in missing)
+        assert all("missing" not in choices[name] for name in missing)
     with pytest.raises(ValueError, match=r"controller = 'nobody'"):
         offer(content, Parameters(), ["nobody"])

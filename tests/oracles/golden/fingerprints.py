@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.policy.files import load_policy
 from agents.policy.seeds import best_policy, shipped_names
-from baselines.registry import LISTED, SLOW, make_controller
+from baselines.registry import LISTED, make_controller
 from birthsim_env import Parameters
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 
@@ -24,7 +24,6 @@ LANES, SEED = 3, 7
 PERIODS, STEPS = 800, 80
 
 EXCEPTIONS = {
-    "nonlinear-mpc": "CasADi plans",
     "training": "PyTorch sums gradients in an order that depends on the processor",
 }
 """What is not the same bits everywhere, and why."""
@@ -32,7 +31,7 @@ EXCEPTIONS = {
 
 def rows() -> dict[str, tuple[str, str, str]]:
     """Name -> (scenario, sensors, who drives: "openings", "residual" or a controller)."""
-    chosen = [("circle", "lab", name) for name in LISTED if name not in {*SLOW, *EXCEPTIONS}]
+    chosen = [("circle", "lab", name) for name in LISTED]
     for scenario in SCENARIOS:
         driven = ("openings", "backstepping", *(["residual"] if scenario in shipped_names() else []))
         chosen += [(scenario, "ideal", who) for who in driven]
