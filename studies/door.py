@@ -37,7 +37,7 @@ STUDIES = {
     "limits": Entry("haptics.study", "LIMITS", "what a hand feels of a controller in a limiter"),
     "mutation": Entry("mutation.command", "", "how many small changes of the code tests notice"),
     "odd-rigs": Entry("fuzz.odd_rigs", "", "random rigs through every command"),
-    "own-motion": Entry("residual.own_motion", "STUDY", "policies beside the impedance that their controller declares"),
+    "own-motion": Entry("residual.own_motion", "STUDY", "policies beside the impedance they are to render"),
     "pools": Entry("pools", "STUDY", "what other processes and hosts cost"),
     "recovery": Entry("recovery.study", "STUDY", "how well identification finds rigs that are known"),
     "recovery-rest": Entry("recovery.study", "AT_REST", "what a log of a rig at rest tells of it"),
