@@ -98,7 +98,7 @@ def test_what_is_kept_is_the_best_in_error_and_tail_together_and_not_the_last(tm
     monkeypatch.setattr(monitor, "network_of", lambda *args: (networks.append(take(*args)), networks[-1])[1])
     errors, nothing = iter([(3.0, 3.0), (3.0, 3.0), (1.0, 9.0), (2.0, 2.5), (1.9, 4.0), (2.1, 2.5)]), np.full(4, np.nan)
 
-    def scored(env, act):
+    def scored(env, act, **options):
         most, one = next(errors)
         return Score(np.array([most, most, one, most]), nothing, nothing, nothing, np.zeros(4), 0)
 
