@@ -40,7 +40,6 @@ def reference_scores(environment: str, sensors: str = "ideal", randomize: bool =
     The figures are the ``controller``'s name, the mean ``return`` of an episode, undiscounted, the ``error`` (mm, median over
     episodes of the settled error; None where most are lost), and the fractions ``lost`` and ``success``.
 
-    ``Vacuum-v0``, for which no policy comes with the package, has no "best learned policy".
     The figures are of the id with its default arguments, apart from ``sensors`` and ``randomize`` (rig and scenario together,
     or neither). An environment with a law inside has the scores of the one without. Raises ``ValueError`` naming what has no
     scores.

@@ -93,7 +93,6 @@ class AdmittanceController(StagedController):
         "ideal": IDEAL,
         "lab": LAB,
         "lab, learning": {**LAB, "rest_gain": 45.0},
-        "lab, sensorless": {**LAB, "rest_gain": 45.0, "friction_fraction": 0.3},
         "inertial": {**IDEAL, "rest_gain": 45.0, "pressure_bandwidth": 30.0},
     }
 
@@ -123,8 +122,7 @@ class AdmittanceController(StagedController):
         board, learns_force = rig.electronics, self._learn and self._force_sensor
         inert = sampled and self._learn and board.acceleration_bandwidth > 0
         sampled = sampled and not inert
-        noisy_kind = "lab, sensorless" if not self._force_sensor else "lab, learning" if self._learn else "lab"
-        kind = "inertial" if inert else noisy_kind if sampled else "ideal"
+        kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
         g = self._gains[kind]
         least, falls = (SAMPLED_LEAST, MOST_FALLS) if sampled and learns_force else (LEAST_FRACTION, 1.0)
         quickness = 1.0 - exact.number("exp", -board.control_period / g["lead_time"])
@@ -133,6 +131,7 @@ class AdmittanceController(StagedController):
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
             weighed=inert and not self._force_sensor,
+            believed_limit=knowledge.BELIEVED_LIMIT if self._force_sensor or inert else knowledge.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))

@@ -35,14 +35,15 @@ from birthsim_env.physics.compiled.compilation import helper
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
-BELIEVED_LIMIT = 120.0
-"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below it."""
+BELIEVED_LIMIT, BELIEVED_HAND = 120.0, 400.0
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below the first,
+and with the strongest hand, which acts unseen without a force sensor, below the second."""
 
 
 @helper
 def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     """The hand's force and the noise of a sample. What no force sensor measures of the hand, the observers find."""
-    noise, hand, lanes = known.given.noise, known.given.force, memory.fresh.shape[0]
+    noise, hand, lanes = known.given.noise, known.hand, memory.fresh.shape[0]
     for i in range(lanes):
         noise[i] = about.belief.noise
         for k in range(2):
@@ -53,6 +54,9 @@ def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
             noise[i] = math.sqrt(memory.tracker.variance[i])
     if about.most_bias > 0.0:
         force_bias.tare(memory.bias, seen.time, seen.user_force, about.most_bias, about.belief.period, hand)
+    for i in range(lanes):
+        for k in range(2):
+            known.given.force[k, i] = hand[k, i] if about.force_sensor + about.weighed > 0.0 else 0.0
 
 
 @helper
@@ -89,7 +93,7 @@ def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         for k in range(2):
             found = (p.mass * kappa * kappa if k == 0 else p.mass) * pistons.disturbance[k, i]
             known.unexplained[k, i] = given.believed[k, i] + found
-            known.unseen[k, i] = given.believed[k, i] + max(-BELIEVED_LIMIT, min(BELIEVED_LIMIT, found))
+            known.unseen[k, i] = given.believed[k, i] + max(-about.believed_limit, min(about.believed_limit, found))
 
 
 @helper
@@ -113,9 +117,7 @@ def know(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> int:
     Returns how many stiffness setpoints are not positive definite.
     """
     sense(seen, memory, known, about)
-    missed = admittance.give_way(
-        memory.offset, seen.asked, known.given.force, about.compliance, seen.damping_factor, known.motion
-    )
+    missed = admittance.give_way(memory.offset, seen.asked, known.hand, about.compliance, seen.damping_factor, known.motion)
     admittance.mark_moving(known.motion, known.given.moving)
     predict(seen, memory, known, about)
     correct(seen, memory, known, about)
@@ -142,5 +144,6 @@ def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, flo
         **{"belief": observers.belief(rig, gains["bandwidth"]), "compliance": stages.compliance(rig), "place": POSITION},
         **{"sampled": sampled, "force_sensor": True, "learns_noise": False, "rows_of_memory": len(fresh_memory(rig, sampled))},
         **{"trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period)},
-        **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, "weighed": False, **others},
+        **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, "weighed": False},
+        **{"believed_limit": BELIEVED_LIMIT, **others},
     }

@@ -58,6 +58,7 @@ class Known(Rows):
     unseen = rows("U1 U2", "N", "all that is unseen along the pistons: friction as believed and what is observed besides")
     drag = rows("drag1 drag2", "N", "friction along the motion, as believed of the rig")
     unexplained = rows("R1 R2", "N", "what pressures, weight, motion and measured force leave unexplained along the pistons")
+    hand = rows("Fx Fy", "N", "force of the hand, measured or found")
 
 
 class Beliefs(Numbers):
@@ -68,6 +69,7 @@ class Beliefs(Numbers):
     sampled = number("1", "1 where positions are samples")
     force_sensor = number("1", "1 with a force sensor")
     weighed = number("1", "1 where an acceleration sensor tells the hand's force")
+    believed_limit = number("N", "that is believed to act unseen on a piston, at most")
     learns_noise = number("1", "1 where the tracker's noise is learned")
     place = number("1", "row of ``Seen`` at which a ``Point`` stands")
     rows_of_memory = number("1", "rows of the memory")

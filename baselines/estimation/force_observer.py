@@ -1,11 +1,11 @@
 """The hand's force without a force sensor: what the force balance of the pistons leaves once friction is taken off.
 
     J^T F = R + friction,   friction = a s0 z,   z = clip(z + dy, -Fc/s0, Fc/s0)
-R is what pressures, weight and motion leave unexplained, with what F explained before. Friction is an elastic-plastic element
-(Prandtl) on the measured motion: unlike LuGre's it does not creep under noise. A resting piston reveals the hand by its
-bristles alone, which give way by 20 um for 1 N. A sliding one reveals it up to the error of the friction believed. The fraction
-a < 1 keeps the loop from feeding itself where less friction is there than believed. What is left at the start, before a hand
-comes, is taken for an error of the mass and of the pressure cells.
+R is what pressures, weight and motion leave unexplained. Friction is an elastic-plastic element (Prandtl) on the measured
+motion: unlike LuGre's it does not creep under noise. A resting piston reveals the hand by its bristles alone, which give way by
+20 um for 1 N. A sliding one reveals it up to the error of the friction believed. The fraction a < 1 keeps the loop from feeding
+itself where less friction is there than believed. What is left at the start, before a hand comes, is taken for an error of the
+mass and of the pressure cells.
 """
 
 from baselines.estimation import force_bias
@@ -37,7 +37,7 @@ class Hand(Rows):
 
 @helper
 def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig, period: float, fresh: Array) -> None:
-    """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is what is left of R beside ``hand.force``."""
+    """Carries ``hand`` on by one period; ``unexplained`` (2, N), N, is R."""
     share, left = period / (1.0 / QUICKNESS + period), PerPiston(unexplained)
     for i in range(time.shape[0]):
         _, _, _, _, _, kappa, sine, cosine = geometry.pose(
@@ -53,8 +53,7 @@ def observe(hand: Hand, time: Array, joints: Joints, unexplained: Array, p: Rig,
         f1 = left.first[i] + FRICTION_FRACTION * p.s0 * hand.bristle[0, i]
         f2 = left.second[i] + FRICTION_FRACTION * p.s0 * hand.bristle[1, i]
         across, along = -f1 / kappa, f2
-        x = hand.force[0, i] + across * cosine + along * sine
-        y = hand.force[1, i] + across * sine - along * cosine
+        x, y = across * cosine + along * sine, across * sine - along * cosine
         hand.filtered[0, i] = 0.0 if new else hand.filtered[0, i] + share * (x - hand.filtered[0, i])
         hand.filtered[1, i] = 0.0 if new else hand.filtered[1, i] + share * (y - hand.filtered[1, i])
     force_bias.tare(hand.bias, time, hand.filtered, MOST_BIAS, period, hand.force)

@@ -93,9 +93,6 @@ def test_the_hand_is_found_from_what_the_force_balance_leaves(slides):
         left = np.array([mechanics.user_force1(*push, kappa, sine, cosine), mechanics.user_force2(*push, sine, cosine)])
         # Unknown friction is what the fraction leaves out of the believed one.
         left -= force_observer.FRICTION_FRACTION * np.array([p.fc1, p.fc2]) * np.sign(moved)
-        # The observer is given what its last force does not explain.
-        known = found.force[:, 0]
-        left -= [mechanics.user_force1(*known, kappa, sine, cosine), mechanics.user_force2(*known, sine, cosine)]
         joints = np.array([*y, moved, moved])[:, None]
         force_observer.observe(found, np.array([k * PERIOD]), Joints(joints), left[:, None], p, PERIOD, fresh)
         fresh[:] = 0.0
