@@ -33,22 +33,25 @@ DRAWS = 300
 SECONDS = (SETTLING + MEASURED) / FUNDAMENTAL
 
 
-def phases(seed: int) -> Array:
-    """Phases (F,), rad, of equal sines with a low peak: the best of ``DRAWS`` random sets."""
-    drawn = np.random.default_rng(seed).uniform(0, 2 * np.pi, (DRAWS, len(MULTIPLES)))
-    time = np.arange(0, 1 / FUNDAMENTAL, 4e-3)
-    peaks = [np.abs(_sum(time, one)).max() for one in drawn]
-    return np.asarray(drawn[int(np.argmin(peaks))])
+def unit_multisine(seed: int, frequency: Array = FREQUENCIES, period: float = 1 / FUNDAMENTAL) -> tuple[float, Array]:
+    """Size of the equal sines of ``frequency`` (F,), Hz, whose sum has a peak of 1, and their phases (F,), rad.
+
+    The phases are the best of ``DRAWS`` random sets; every line is a whole multiple of 1/``period``.
+    """
+    drawn = np.random.default_rng(seed).uniform(0, 2 * np.pi, (DRAWS, len(frequency)))
+    time = np.arange(0, period, 4e-3)
+    peaks = [np.abs(sines(time, frequency, one)).max() for one in drawn]
+    chosen = np.asarray(drawn[int(np.argmin(peaks))])
+    return 1 / float(np.abs(sines(np.arange(0, period, 1e-3), frequency, chosen)).max()), chosen
 
 
 def multisine_hand(direction: Array, peak: Array, seed: int) -> Hand:
     """A hand that pushes and pulls along unit vectors ``direction`` (2, N) with at most ``peak`` (N,), N."""
-    chosen = phases(seed)
-    largest = np.abs(_sum(np.arange(0, 1 / FUNDAMENTAL, 1e-3), chosen)).max()
-    force = direction * peak / largest
+    size, chosen = unit_multisine(seed)
+    force = direction * peak * size
 
     def hand(now: float, position: Array, velocity: Array) -> Array:
-        return np.asarray(force * min(now / FADE, 1.0) * _sum(np.array([now]), chosen)[0])
+        return np.asarray(force * min(now / FADE, 1.0) * sines(np.array([now]), FREQUENCIES, chosen)[0])
 
     return hand
 
@@ -69,6 +72,6 @@ def impedance_felt(recording: Recording, direction: Array) -> Complex:
     return np.asarray((turns @ force) / (turns @ motion))
 
 
-def _sum(time: Array, angles: Array) -> Array:
-    """Sum of unit sines at times (T,), (T,)."""
-    return np.asarray(np.sin(2 * np.pi * FREQUENCIES * time[:, None] + angles).sum(axis=1))
+def sines(time: Array, frequency: Array, angles: Array) -> Array:
+    """Sum of unit sines of ``frequency`` (F,), Hz, with phases ``angles`` (F,), rad, at times (T,), s: (T,)."""
+    return np.asarray(np.sin(2 * np.pi * frequency * time[:, None] + angles).sum(axis=1))

@@ -77,6 +77,6 @@ LIMITS = _haptics(
     controller=("backstepping", "limited:backstepping", "admittance-adaptive", "limited:admittance-adaptive"),
 )  # fmt: skip
 ACCELERATION = _haptics(
-    "acceleration-feel", no_pictures, sensors=("lab", "honest"), subject=("impedance", "release"), seed=70_000, rigs=8,
+    "acceleration-feel", no_pictures, sensors=("lab", "honest"), subject=("release",), seed=70_000, rigs=8,
     controller=("admittance-adaptive",), parameters="examples/acceleration_sensor_rig.toml",
 )  # fmt: skip

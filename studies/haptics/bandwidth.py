@@ -1,0 +1,182 @@
+"""Up to which frequency a hand feels the impedance declared, on a dense grid, and up to which one the valves allow it."""
+
+from typing import Any
+
+import numpy as np
+
+from baselines.bench.pieces import controller_settings, file_stem
+from baselines.bench.probes import board_limit
+from baselines.bench.resting import RestingRigs
+from baselines.bench.statistics import crossed_interval, jsonable, number, quantile
+from baselines.estimation.admittance import DAMPING_RATIO
+from baselines.impedance import Complex, declared_by, mass_spring_damper
+from baselines.work.tasks import Result, Task
+from birthsim_env.loop.signals import Mask, Reference
+from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.compiled.sources import ROOT
+from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.comparison.tables import markdown
+from studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
+from studies.haptics.limits_of_air import commanded_openings
+from studies.haptics.multisine import FADE, sines, unit_multisine
+from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
+from studies.results import Content
+from studies.study import Found, Options, Study
+
+STIFFNESS = 2000.0
+"""N/m."""
+
+BANDS = ((0.1, 0.95, 80.0, 1), (1.0, 20.0, 20.0, 2))
+"""Hz from and to; s of a period, and periods that are measured. Two multisines, so that a line has a force worth feeling."""
+
+SETTLING = 5.0
+"""s before the measured periods; assumed."""
+
+CHUNK = 1000
+"""Control periods whose positions are kept at once."""
+
+ACCELERATION = "examples/acceleration_sensor_rig.toml"
+RIGS = {"ideal": ("ideal", None), "honest": ("honest", None), "honest, acceleration": ("honest", ACCELERATION)}
+"""Sensors by their name in the table -> sensor model, and the rig's file."""
+
+MEASURED = (
+    ("backstepping", "honest"), ("admittance-adaptive", "ideal"), ("admittance-adaptive", "honest"),
+    ("admittance-adaptive", "honest, acceleration"), ("admittance-sensorless", "honest, acceleration"),
+)  # fmt: skip
+"""Controllers, and the sensors of ``RIGS`` that they have."""
+
+
+def lines(low: float, high: float, period: float) -> Array:
+    """Frequencies (F,), Hz: 20 a decade (ISO 3, R 20), to the nearest whole multiple of 1/``period``."""
+    steps = np.arange(np.floor(20 * np.log10(low)), np.ceil(20 * np.log10(high)) + 1)
+    exact = 10 ** (steps / 20)
+    kept = exact[(exact > 0.99 * low) & (exact < 1.01 * high)]
+    return np.asarray(np.unique(np.round(kept * period)) / period)
+
+
+def hand_lines(peak: float, seed: int, frequency: Array, period: float) -> Complex:
+    """Complex amplitudes (F,), N, of a multisine with a peak of ``peak``, N: the force is the real part of their sum."""
+    size, phases = unit_multisine(seed, frequency, period)
+    return np.asarray(peak * size * np.exp(1j * (phases - np.pi / 2)))
+
+
+def felt_impedance(
+    condition: Condition, rigs: list[Parameters], reference: Reference, direction: Array, frequency: Array, force: Complex,
+    period: float, periods: int,
+) -> tuple[Complex, Mask]:  # fmt: skip
+    """Z = Fu/(x - xt), N/m, (F, N), of lanes with ``rigs`` at a resting ``reference``, and which of them were lost, (N,).
+
+    The hand pushes along ``direction`` (2, N) with the lines ``force`` (F,), N, of ``frequency`` (F,), Hz, which repeat after
+    ``period``, s; ``periods`` of them are measured.
+    """
+    loop = RestingRigs(rigs, reference, condition.law(), condition.sensors, condition.seed, condition.force_sensor)
+    settling, count = round(SETTLING / loop.period), round(periods * period / loop.period)
+    # The hand's force is held for a control period: at what it is half a period later, once it has been measured.
+    time: Array = 0.5 * loop.period * np.arange(2 * (settling + count))
+    pushes = np.abs(force[0]) * sines(time, frequency, np.asarray(np.angle(force) + np.pi / 2)) * np.minimum(time / FADE, 1.0)
+    now = iter(pushes)
+
+    def push(_: int) -> None:
+        loop.pushed[:] = direction * next(now)
+
+    loop.close([push], [push])
+    loop.run(settling)
+    moved = np.zeros((len(frequency), len(rigs)), dtype=np.complex128)
+    for first in range(0, count, CHUNK):
+        offset = loop.path(min(CHUNK, count - first)) - reference.position
+        turns = np.exp(-2j * np.pi * frequency[:, None] * loop.period * (settling + first + np.arange(len(offset))))
+        moved += 2 / count * turns @ np.einsum("tin,in->tn", offset, direction)
+    lost = ~np.isfinite(moved).all(axis=0) | (loop.impacts.max(axis=0) > board_limit(rigs))
+    return np.asarray(force[:, None] / moved), np.asarray(lost)
+
+
+def _cases(condition: Condition) -> tuple[list[Parameters], Array, Reference]:
+    """Lanes: each of a condition's rigs, at one of ``POSES`` in turn, pushed along x and along y."""
+    rigs = condition.drawn()
+    cases = [(rig, way, POSES[k % len(POSES)]) for way in DIRECTIONS for k, rig in enumerate(rigs)]
+    each, directions, poses = (list(side) for side in zip(*cases, strict=True))
+    return each, np.transpose(directions), resting(poses, [STIFFNESS] * len(cases))
+
+
+def measure(peak: float, **settings: Any) -> Result:
+    """Bandwidth, and up to where 1 JND holds, Hz, under pushes of ``peak`` N at most: over directions and rigs, (2, R) each."""
+    condition = condition_of(**settings)
+    rigs, direction, reference = _cases(condition)
+    declared = declared_by(condition.law(), reference)
+    if declared is None:
+        raise ValueError(f"controller = {condition.controller!r}; allowed: one that declares an impedance")
+    frequency = np.concatenate([lines(low, high, period) for low, high, period, _ in BANDS])
+    felt, lost = [], np.zeros(len(rigs), dtype=np.bool_)
+    for low, high, period, periods in BANDS:
+        own = lines(low, high, period)
+        force = hand_lines(peak, condition.seed, own, period)
+        found, gone = felt_impedance(condition, rigs, reference, direction, own, force, period, periods)
+        felt.append(found)
+        lost |= gone
+    impedances = np.concatenate(felt), declared.along(frequency, direction), frequency
+    figures = {"bandwidth": bandwidth(*impedances), "unnoticed": unnoticed_up_to(*impedances)}
+    kept = {name: np.where(lost, 0.0, values).reshape(len(DIRECTIONS), -1).tolist() for name, values in figures.items()}
+    return {**kept, "lost": int(lost.sum())}
+
+
+def allowed(peak: float, **settings: Any) -> Result:
+    """The last line, Hz, up to which valves can render ``admittance``'s impedance exactly, over directions and rigs, (2, R)."""
+    condition = condition_of(**settings)
+    low, high, period, _ = BANDS[-1]
+    frequency = lines(low, high, period)
+    force, found = hand_lines(peak, condition.seed, frequency, period)[:, None], []
+    for lane, rig in enumerate((cases := _cases(condition))[0]):
+        direction, reference = cases[1][:, [lane]], Reference(cases[2].rows[:, [lane]])
+        declared = mass_spring_damper(reference, condition.rig.mechanics.mass, DAMPING_RATIO)
+        openings = commanded_openings(rig, reference, declared, direction, frequency, force, period)
+        found.append(float(last_before(openings <= 1.0, frequency)[0]))
+    return {"allowed": np.reshape(found, (len(DIRECTIONS), -1)).tolist()}
+
+
+def _settings(controller: str, sensors: str, peak: float, options: Options) -> dict[str, Any]:
+    model, file = RIGS[sensors]
+    own = controller_settings(controller, load_parameters(ROOT / file if file else None))
+    return {**own, "sensors": model, "seed": options.seed, "rigs": options.rigs, "force_sensor": True, "peak": peak}
+
+
+def _tasks(options: Options) -> dict[Any, Task]:
+    found: dict[Any, Task] = {}
+    for peak in options.peak:
+        for controller, sensors in MEASURED:
+            stem = f"{file_stem(controller)}/{file_stem(sensors)}-{peak:g}"
+            found[controller, sensors, peak] = Task(stem, controller, measure, _settings(controller, sensors, peak, options))
+        found[peak] = Task(f"allowed/{peak:g}", "valves", allowed, _settings("admittance-adaptive", "ideal", peak, options))
+    return found
+
+
+def _summary(values: Any) -> list[float]:
+    """Median over rigs, its interval, and the worst."""
+    low, high = crossed_interval(lambda drawn: quantile(drawn, 0.5), np.reshape(values, (-1, 1)))
+    return [quantile(values, 0.5), low, high, float(np.min(values))]
+
+
+def _kept(options: Options, found: Found) -> Any:
+    return jsonable([
+        {
+            "controller": controller, "sensors": sensors, "peak": peak, "axis": axis,
+            "lost": found[controller, sensors, peak]["lost"],
+            **{name: _summary(found[controller, sensors, peak][name][way]) for name in ("bandwidth", "unnoticed")},
+            "allowed": _summary(found[peak]["allowed"][way]),
+        }
+        for controller, sensors in MEASURED for peak in options.peak for way, axis in enumerate("xy")
+    ])  # fmt: skip
+
+
+def _shown(content: Content) -> dict[str, str]:
+    rows = [["controller", "sensors", "push, N", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]]
+    for row in content["figures"]:
+        cells = ["{} [{}, {}]; {}".format(*map(number, row[name])) for name in ("bandwidth", "unnoticed", "allowed")]
+        rows.append([row["controller"], row["sensors"], f"{row['peak']:g}", row["axis"], *cells, str(row["lost"])])
+    return {"bandwidth.md": markdown(rows) + "\n"}
+
+
+STUDY = Study(
+    ("studies.haptics.bandwidth",), {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000}, _tasks, _kept,
+    {"bandwidth": "Hz", "unnoticed": "Hz", "allowed": "Hz", "peak": "N"}, _shown,
+    words={"peak": "N, of the hand's force", "rigs": "randomised ones"},
+)  # fmt: skip
