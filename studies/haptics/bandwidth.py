@@ -72,7 +72,7 @@ def felt_impedance(
     loop = RestingRigs(rigs, reference, condition.law(), condition.sensors, condition.seed, condition.force_sensor)
     settling, count = round(SETTLING / loop.period), round(periods * period / loop.period)
     # The hand's force is held for a control period: at what it is half a period later, once it has been measured.
-    time: Array = 0.5 * loop.period * np.arange(2 * (settling + count))
+    time = 0.5 * loop.period * np.arange(2 * (settling + count), dtype=np.float64)
     pushes = np.abs(force[0]) * sines(time, frequency, np.asarray(np.angle(force) + np.pi / 2)) * np.minimum(time / FADE, 1.0)
     now = iter(pushes)
 
