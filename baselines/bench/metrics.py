@@ -32,11 +32,13 @@ UNITS = {
     "settled_rms_y": "mm", "settled_rms": "mm", "settled_max_x": "mm", "settled_max_y": "mm", "stiffness_error": "%",
     "cross_motion": "mm", "unrest": "mm", "hunting_x": "mm", "hunting_y": "mm", "restarts": "1/s",
     "pneumatic_rms_1": "%", "pneumatic_rms_2": "%", "air": "l/min", "saturation": "%",
+    "valve_turns": "1/s", "valve_travel": "1/s",
 }  # fmt: skip
 """Metric -> unit. ``settled_rms`` is that of sqrt(ex^2 + ey^2). ``stiffness_error`` is rendered over asked-for stiffness
 along the push, less one; ``cross_motion`` the displacement across the push beyond the one asked for; both from the compliant
 target. ``unrest`` is the motion, peak to peak, in the ``WINDOW`` before the push. All three say something only where the
-reference stands still all along and the episode ends in a held push."""
+reference stands still all along and the episode ends in a held push. ``valve_turns`` says how often the command of a valve
+turns back, ``valve_travel`` how many full openings it moves; both are means of the valves: their wear, and what is heard."""
 
 
 class Asked(Rows):
@@ -61,6 +63,10 @@ class Tally(Rows):
     settled_peak = rows(2, "m", "the same, settled")
     supplied = row("kg", "air")
     saturated = row("1", "samples with a valve at its limit")
+    opening = rows(4, "1", "at the last sample")
+    way = rows(4, "1", "in which each opening last changed")
+    turned = row("1", "changes of these ways")
+    travelled = row("1", "sizes of all changes of openings")
     quiet_now = row("s", "for which all that is asked for has been constant")
     quiet_time = row("s", "of quiet that counted")
     low = rows(2, "m", "least position of this quiet window")
@@ -96,6 +102,11 @@ def _add_errors(now: Info, command: Array, period: float, tally: Tally, i: int) 
     largest = 0.0
     for k in range(4):
         largest = max(largest, abs(command[k, i]))
+        change = command[k, i] - tally.opening[k, i] if tally.count[i] > 1.0 else 0.0
+        tally.turned[i] += 1.0 if change * tally.way[k, i] < 0.0 else 0.0
+        tally.way[k, i] = change if change != 0.0 else tally.way[k, i]
+        tally.travelled[i] += abs(change)
+        tally.opening[k, i] = command[k, i]
     tally.saturated[i] += 1.0 if largest >= 1.0 else 0.0
 
 
@@ -234,6 +245,8 @@ def figures_of(tally: Tally, period: float) -> dict[str, Array]:
             "pneumatic_rms_2": pneumatic[1],
             "air": 60e3 * tally.supplied / NORMAL_DENSITY / (count * period),
             "saturation": 100 * tally.saturated / count,
+            "valve_turns": 0.25 * tally.turned / (count * period),
+            "valve_travel": 0.25 * tally.travelled / (count * period),
         }
         values["stiffness_error"], values["cross_motion"], values["unrest"] = _rendered(tally)
     return {name: values[name] for name in UNITS}

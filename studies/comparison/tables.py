@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.bench.statistics import number
-from studies.comparison.grid import METRICS, MOVING, REFERENCE, RIGS
+from studies.comparison.grid import METRICS, MOVING, RIGS
 
 Figures = Sequence[dict[str, Any]]
 """What ``studies.comparison.grid.statistics`` returns."""
@@ -17,23 +17,26 @@ DATA = (
     *("ratio", "ratio_low", "ratio_high", "lost", "episodes"),
 )
 """Columns of the data file. The first seven say where, what and who. The next five are the median over the episodes with its
-95 % interval, the 95th percentile and the worst. Then come the median of the ratios to ``REFERENCE`` in the same world, with
+95 % interval, the 95th percentile and the worst. Then come the median of the ratios to ``backstepping`` in the same world, with
 its interval, and how many of the episodes were lost."""
 
 OWN_HAND = "own"
 """What the data file calls the environment's own hand, which is none of ``MOVING``."""
 
-IN_FULL = ("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "cross_motion", "hunting", "air", "saturation")
+IN_FULL = (
+    *("settled_rms", "settled_max_x", "settled_max_y", "stiffness_error", "cross_motion", "hunting", "air", "saturation"),
+    *("valve_turns", "valve_travel"),
+)
 """Metrics of the data file; the JSON file holds all."""
 
 SUMMARY = ("median", "low", "high", "q95", "worst")
 RATIO = ("ratio", "ratio_low", "ratio_high")
-"""Columns of a figure and of its ratio to ``REFERENCE``."""
+"""Columns of a figure and of its ratio to that of ``backstepping``."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the overview: a metric under some conditions; with ``worst`` beside its median, or the ratio instead.
+    """A column of the overview: a metric under some conditions; with ``worst`` beside its median.
 
     ``hand`` is one of ``MOVING``, or "" for the environment's own."""
 
@@ -42,7 +45,6 @@ class Column:
     sensors: str
     plant: str
     metric: str
-    kind: str = "metrics"
     worst: bool = False
     hand: str = ""
 
@@ -53,22 +55,24 @@ class Column:
 
     def text(self, figures: dict[str, Any]) -> str:
         """The entry of one cell."""
-        found = figures[self.kind].get(self.metric)
+        found = figures["metrics"].get(self.metric)
         if found is None:
-            return "1" if self.kind == "ratios" else "-"
+            return "-"
         return f"{number(found['median'])}; {number(found['worst'])}" if self.worst else interval(found)
 
 
 CIRCLE, PROBE, FORCEPS = "BirthSIM/Circle-v1", "BirthSIM/Probe-v2", "BirthSIM/Forceps-v1"
 COLUMNS = (
     Column("circle: settled error, mm", CIRCLE, "ideal", "randomised", "settled_rms"),
-    Column(f"over {REFERENCE}", CIRCLE, "ideal", "randomised", "settled_rms", "ratios"),
     Column("the same, lab sensors, mm", CIRCLE, "lab", "randomised", "settled_rms"),
     Column("rendered stiffness off by, % (median; worst)", PROBE, "ideal", "nominal", "stiffness_error", worst=True),
     Column("the same, lab sensors", PROBE, "lab", "nominal", "stiffness_error", worst=True),
     Column("hunting, mm (median; worst)", PROBE, "ideal", "nominal", "hunting", worst=True),
     Column("the same, lab sensors", PROBE, "lab", "nominal", "hunting", worst=True),
     Column("air, l/min", CIRCLE, "ideal", "nominal", "air"),
+    Column("air, lab sensors, l/min", CIRCLE, "lab", "nominal", "air"),
+    Column("valve turns, lab sensors, 1/s", CIRCLE, "lab", "nominal", "valve_turns"),
+    Column("valve travel, lab sensors, 1/s", CIRCLE, "lab", "nominal", "valve_travel"),
     *(
         Column(f"circle, {hand} hand, lab sensors: settled error, mm", CIRCLE, "lab", "randomised", "settled_rms", hand=hand)
         for hand in MOVING

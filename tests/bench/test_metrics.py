@@ -90,6 +90,15 @@ def test_saturation_is_the_fraction_of_time_with_any_valve_at_its_limit():
     assert measure(8, command=command)["saturation"] == pytest.approx(100 * 3 / 8)
 
 
+def test_valve_turns_and_travel_are_those_of_the_mean_valve():
+    command = np.zeros((6, 4, 1))
+    command[:, 0, 0] = [0.5, 0.7, 0.7, 0.6, 0.6, 0.9]  # up, still, down, still, up: turns twice, travels 0.6
+    command[:, 1, 0] = [0, -1, 0, -1, 0, -1]  # turns four times, travels 5
+    found = measure(6, period=0.01, command=command)
+    assert found["valve_turns"] == pytest.approx((2 + 4) / 4 / 0.06)
+    assert found["valve_travel"] == pytest.approx((0.6 + 5) / 4 / 0.06)
+
+
 def test_a_lane_that_is_not_alive_is_left_as_it_is():
     rng = np.random.default_rng(0)
     signals = {
