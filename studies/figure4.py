@@ -5,9 +5,9 @@ from typing import Any
 from baselines.commands.figure4 import figures_of, record_run
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Options, Study
+from studies.tables import markdown
 
 
 def measure(controller: str) -> Result:

@@ -5,9 +5,9 @@ from typing import Any
 
 from baselines.work.side_by_side import side_by_side
 from baselines.work.tasks import Result, Task
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Options, Study
+from studies.tables import markdown
 
 PIECES, LASTS = 200, 0.05
 """Pieces of a measurement, and s that each lasts."""

@@ -54,10 +54,9 @@ def read_result(name: str, folder: Path = RESULTS) -> Content | None:
 
 
 def changed(content: Content, modules: tuple[str, ...]) -> list[str]:
-    """Sources of ``modules`` that changed, came or went since a result was measured, but for ``ENGINE``."""
+    """Sources of ``modules`` that changed or came since a result was measured, but for ``ENGINE``."""
     then, now = content["sources"], hashes(*modules)
-    paths = (path for path in then.keys() | now.keys() if not path.startswith(ENGINE))
-    return sorted(path for path in paths if then.get(path) != now.get(path))
+    return sorted(path for path, code in now.items() if not path.startswith(ENGINE) and then.get(path) != code)
 
 
 def _lines(content: Any, indent: str = "\n") -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from baselines.bench.statistics import number
 from studies.comparison.grid import METRICS, MOVING, RIGS
+from studies.tables import markdown
 
 Figures = Sequence[dict[str, Any]]
 """What ``studies.comparison.grid.statistics`` returns."""
@@ -197,9 +198,3 @@ def data(figures: Figures) -> str:
 
 def _place(cell: dict[str, Any]) -> tuple[str, ...]:
     return cell["environment"], cell["sensors"], cell["plant"], cell.get("hand", "")
-
-
-def markdown(rows: Sequence[Sequence[str]]) -> str:
-    """A table whose first row is its head."""
-    lines = ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join([lines[0], "|" + "---|" * len(rows[0]), *lines[1:]])

@@ -10,10 +10,10 @@ from baselines.registry import LIMITED
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from studies.comparison.grid import default_controllers
-from studies.comparison.tables import markdown
 from studies.gradients.loops import begun, compared
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 CIRCLE = "BirthSIM/Circle-v1"
 SCENARIOS = (CIRCLE, *(f"BirthSIM/{name}" for name in ("Probe-v2", "Descent-v1", "Forceps-v1", "Dystocia-v1", "Vacuum-v0")))
@@ -57,4 +57,4 @@ def _shown(content: Content) -> dict[str, str]:
 
 
 UNITS = {"equal": "1", "lanes": "1", "median": "1", "middle": "1", "any": "1", "worst": "1"}
-STUDY = Study((__name__,), {"states": 1000, "lanes": 256}, _tasks, _kept, UNITS, _shown)
+STUDY = Study((__name__, "agents.residual.env"), {"states": 1000, "lanes": 256}, _tasks, _kept, UNITS, _shown)

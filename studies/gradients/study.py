@@ -16,11 +16,11 @@ from birthsim_env.gradients import Recorder
 from birthsim_env.physics.compiled import lanes as at
 from birthsim_env.physics.equilibrium import balanced_state
 from birthsim_env.physics.gradients.plant import Derivatives, jvp, vjp
-from studies.comparison.tables import markdown
 from studies.gradients.figure import friction_figure
 from studies.gradients.states import plant_of
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 STEP, TURNS = 0.01, 25
 """s of a policy step; turns of which the median is taken."""
@@ -158,4 +158,4 @@ UNITS = {
     "forward": "s", "taped": "s", "backward": "s", "after": "s", "change": "1", "median": "1", "q90": "1",
     "opening": "1", "moved": "m", "slope": "m",
 }  # fmt: skip
-STUDY = Study((__name__,), {}, _tasks, _kept, UNITS, _shown, _drawn, timed=True)
+STUDY = Study((__name__, "agents.residual.env"), {}, _tasks, _kept, UNITS, _shown, _drawn, timed=True)

@@ -15,13 +15,13 @@ from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from studies.comparison.tables import markdown
 from studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
 from studies.haptics.limits_of_air import commanded_openings
 from studies.haptics.multisine import FADE, sines, unit_multisine
 from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 STIFFNESS = 2000.0
 """N/m."""

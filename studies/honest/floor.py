@@ -8,10 +8,10 @@ from baselines.bench.statistics import number, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 from studies.comparison.grid import as_described
-from studies.comparison.tables import markdown
 from studies.honest.sensor_floor import probe_floor
 from studies.results import Content
 from studies.study import Options, Study
+from studies.tables import markdown
 
 UNITS = {"stiffness_error": "%", "held_error": "mm"}
 FRACTIONS = {"median": 0.5, "q95": 0.95, "worst": 1.0}

@@ -21,10 +21,10 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, field_of, load_parameters
 from birthsim_env.physics.rig.values import checked_number
 from studies.comparison.grid import as_described
-from studies.comparison.tables import markdown
 from studies.honest.search import Seeds, drawn_places, figures_at, hardest, rigs_at
 from studies.results import Content
 from studies.study import Options, Study
+from studies.tables import markdown
 
 ENVIRONMENT = environment_id("probe")
 PUSHED = SCENARIOS["probe"].duration - PROBE_REST

@@ -14,9 +14,9 @@ from baselines.bench.pieces import controller_settings, evaluation_tasks, file_h
 from baselines.work.tasks import Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 
 class Run(NamedTuple):

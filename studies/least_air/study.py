@@ -11,10 +11,10 @@ from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.tables import markdown
 from studies.least_air.schedule import least_air
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 PUSHES = {"circle": [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0), (0.0, -30.0)], "descent": [(80.0, 0.0)]}
 """N: the strongest pushes of the scenarios' hands."""

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from baselines.backstepping.controller import BacksteppingController
 from baselines.identification.experiment import Plan, propose
 from baselines.identification.identified import identify
 from baselines.identification.laboratory import run_plan
 from baselines.identification.quantities import value_of
-from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
 from birthsim_env.parts.drawn.randomization import draw_parameters
 from birthsim_env.parts.drawn.seeding import stream
@@ -34,7 +34,7 @@ RANGES: dict[str, tuple[float, float]] = {
 }  # fmt: skip
 """What is drawn, uniformly: the documented ranges, and for the rest ranges about the default; assumed."""
 
-CONTROLLER, SENSORS = "backstepping", "lab"
+SENSORS = "lab"
 
 
 def drawn_rig(seed: int) -> Parameters:
@@ -57,7 +57,7 @@ def recover(seed: int, duration: float, experiment: str) -> Result:
     rig on."""
     owner, rig = Parameters(), drawn_rig(seed)
     plan = EXPERIMENTS[experiment](propose(owner, duration, seed))
-    trial = run_plan(plan, [rig], make_controller(CONTROLLER, owner), SENSORS, seed)[0]
+    trial = run_plan(plan, [rig], BacksteppingController(owner), SENSORS, seed)[0]
     found = identify(trial, owner, seed)
     rows = {
         row.name: {

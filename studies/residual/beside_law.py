@@ -23,11 +23,11 @@ from birthsim_env.files import finite
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from studies.comparison.tables import markdown
 from studies.haptics.rendering import rendering
 from studies.haptics.worlds import Condition
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 ERRORS = {"error": "settled error, mm", "stiffness": "error along the push, %"}
 STATIC = "static stiffness error, %: median", "95 %"

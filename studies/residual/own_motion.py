@@ -16,9 +16,9 @@ from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 HANDS = ("steps", "sine", "noise", "guided")
 PARTS = (0.5, 0.95, 1.0)

@@ -14,9 +14,9 @@ from baselines.work.tasks import Result, Task
 from birthsim_env import balanced_pressures, linearize
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.linear.model import LinearModel
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 FREQUENCY = np.geomspace(0.05, 200, 2000)
 """Hz."""

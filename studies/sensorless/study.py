@@ -10,11 +10,11 @@ from baselines.bench.statistics import jsonable, number, quantile
 from baselines.work.tasks import Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.sensorless.measures import measure
 from studies.sensorless.rigs import OFF, PLANTS, believed
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 RIGS = {
     "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),

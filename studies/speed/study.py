@@ -20,12 +20,12 @@ from baselines.work.tasks import Result, Task
 from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import Array
 from studies.comparison.grid import default_controllers
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.speed import speeds as speed
 from studies.speed.stopwatch import seconds_per_call, step, vector_step
 from studies.speed.twin import Twin, has_compiler
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 POLICY_PERIOD = 0.01
 PERIODS = 50

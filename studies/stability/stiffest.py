@@ -11,10 +11,10 @@ from typing import Any
 
 from baselines.backstepping.stiffest import PART
 from baselines.work.tasks import Task
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.stability.swinging import stiffest
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 MASSES, LAGS, LATENCIES = (1.5, 3.0, 6.0), (0.002, 0.004, 0.008), (0.0, 0.004, 0.012)
 """kg, s and s; without latency positions are exact."""

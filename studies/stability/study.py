@@ -7,11 +7,11 @@ from baselines.bench.pieces import controller_settings
 from baselines.work.tasks import Task
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.stability import maps as stability
 from studies.stability.maps import MAPS, describe_map, stability_tasks
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 
 def _tasks(options: Options) -> dict[Any, Task]:

@@ -6,10 +6,10 @@ import numpy as np
 
 from baselines.bench.statistics import penalize_lost
 from baselines.work.tasks import Task
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.strangers.tasks import STRANGERS, stranger_tasks
 from studies.study import Found, Options, Study
+from studies.tables import markdown
 
 BELIEFS = ("owner", "identified")
 

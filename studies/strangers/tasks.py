@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from baselines.backstepping.controller import BacksteppingController
 from baselines.bench.probes import HOLD, POSES, REST, RISE, WINDOW, RampedForces
 from baselines.bench.resting import RestingRigs
 from baselines.identification.experiment import propose
@@ -19,7 +20,7 @@ from birthsim_env.physics.compiled.lanes import Rig, parameter_column
 from birthsim_env.physics.inverse_kinematics import pistons_at
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_env.simulation import Part
-from studies.recovery.tasks import CONTROLLER, SENSORS, drawn_rig
+from studies.recovery.tasks import SENSORS, drawn_rig
 from studies.strangers.model import Strangeness, Stranger
 
 STRANGERS: dict[str, tuple[dict[str, float], dict[str, object], dict[str, float]]] = {
@@ -116,7 +117,7 @@ def meet(stranger: str, seed: int, duration: float, controllers: list[str]) -> R
     owner = owner.replace({name: factor * value_of(owner, name) for name, factor in wrong.items()})
     carry = strange(rig, Strangeness(**odd))
     plan = propose(owner, duration, seed)
-    trial = run_plan(plan, [rig], make_controller(CONTROLLER, owner), SENSORS, seed, carry=carry)[0]
+    trial = run_plan(plan, [rig], BacksteppingController(owner), SENSORS, seed, carry=carry)[0]
     found = identify(trial, owner, seed)
     beliefs: dict[str, Parameters] = {"owner": owner, "identified": found.rig}
     return {

@@ -9,8 +9,8 @@ import numpy as np
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import number, penalize_lost, summarize
 from baselines.work.tasks import Result
-from studies.comparison.tables import markdown
 from studies.sweeps.plan import Point
+from studies.tables import markdown
 
 SHOWN_POINTS = 100
 """Rows of the table; the Parquet file has all."""

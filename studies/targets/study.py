@@ -19,9 +19,9 @@ from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.comparison.tables import markdown
 from studies.results import Content
 from studies.study import Study
+from studies.tables import markdown
 from studies.targets.reference import (
     CHAMBERS,
     PERIODS,

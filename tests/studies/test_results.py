@@ -28,8 +28,15 @@ def test_a_result_says_what_made_it_and_is_stale_by_the_file_that_differs(tmp_pa
     assert len(result["commit"]) == 40
     assert set(result["versions"]) == {"python", "numpy", "numba", "scipy", "gymnasium"}
     assert changed(result, (MODULE,)) == []
-    result["sources"] |= {"baselines/registry.py": "0", "gone.py": "0"}
-    assert changed(result, (MODULE,)) == ["baselines/registry.py", "gone.py"]
+    result["sources"]["baselines/registry.py"] = "0"
+    del result["sources"]["baselines/staged.py"]
+    assert changed(result, (MODULE,)) == ["baselines/registry.py", "baselines/staged.py"]
+
+
+def test_a_package_that_a_result_depends_on_names_none_of_a_later_one_for_it():
+    """``birthsim_env.learned`` names ``agents.residual.env``, which counts for what imports ``agents`` alone."""
+    assert not any(path.startswith("agents/") for path in hashes("birthsim_env.learned"))
+    assert "agents/residual/env.py" in hashes("agents.residual.env", "birthsim_env.learned")
 
 
 def test_what_is_no_number_is_no_result():

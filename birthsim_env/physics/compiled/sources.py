@@ -60,9 +60,14 @@ def source(path: Path) -> Source:
 
 @cache
 def imports(path: Path, named: bool = False) -> frozenset[Path]:
-    """The files that a source file imports anywhere in it, and those of modules that its strings name."""
-    found = source(path)
-    groups = [*found.imported, *([one] for one in found.named)] if named else found.imported
+    """The files that a source file imports anywhere in it, and those of modules that its strings name.
+
+    A string that names a module of a later package counts for nothing: what uses it there imports it.
+    """
+    found, own = source(path), path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else ""
+    known = PACKAGES[: PACKAGES.index(own) + 1] if own in PACKAGES else PACKAGES
+    by_name = ([one] for one in found.named if one.partition(".")[0] in known)
+    groups = [*found.imported, *by_name] if named else found.imported
     return frozenset(file for group in groups if (file := next(filter(None, map(file_of, group)), None)))
 
 
