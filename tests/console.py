@@ -12,20 +12,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 STUDIES = {
-    "comparison",
-    "stiffness",
-    "stability",
-    "speed",
-    "accuracy",
-    "haptics",
-    "sweep",
-    "scores",
-    "beside-law",
-    "own-motion",
-    "worst",
-    "pools",
-    "air",
-    "responses",
+    *("comparison", "stiffness", "stability", "speed", "accuracy", "haptics", "sweep"),
+    *("scores", "beside-law", "own-motion", "worst", "pools", "air", "responses"),
 }
 """Studies of ``birthsim study``, which tests run."""
 PATIENCE = 600.0  # s; only a state that never comes takes so long

@@ -2,56 +2,61 @@
 
 import os
 import signal
+import socket
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from multiprocessing import resource_tracker
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
-T = TypeVar("T")
-
-LOOKING = 0.5
-"""s between two looks of a worker at whether its parent is still there."""
+Work = Callable[..., Any]
+Pieces = Sequence[tuple[Any, ...]]
+Outcomes = Generator[tuple[int, Any], None, None]
 
 _PARENTS = (signal.SIGINT, signal.SIGHUP)
 """Signals that reach a whole process group, and that the parent answers for its workers."""
 
+CONNECTING = 10.0
+"""s until an address is taken for one where nobody answers, assumed."""
 
-def side_by_side(
-    work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], jobs: int, take: Callable[[int, T], None],
-    cluster: str | None = None,
-) -> None:  # fmt: skip
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMBA", "NUMEXPR")
+}
+"""Environment variables of a process that works beside others."""
+
+
+def side_by_side(work: Work, pieces: Pieces, jobs: int, take: Callable[[int, Any], None], cluster: str | None = None) -> None:
     """Call ``take(k, work(*pieces[k]))`` for every piece, in the order in which they end.
 
     ``jobs`` processes work side by side, each with one thread; with one job, this process works itself. With a ``cluster``,
-    "ray" or "ray:ADDRESS", Ray's workers do, as many as have a processor. What is raised, by a piece, by ``take`` or by Ctrl-C,
-    ends all processes at once and is raised here; ``OSError`` where a process dies.
+    "ray" for this machine's own or "ray:ADDRESS", Ray's workers do, as many as have a processor; each host needs the same
+    version of this package, and what a piece names by path, such as a controller's file. What is raised, by a piece, by
+    ``take`` or by Ctrl-C, ends all processes at once and is raised here; ``OSError`` where a process dies.
     """
     if cluster is not None:
-        from baselines.work.cluster import on_cluster
-
-        outcomes: Iterator[tuple[int, T]] = on_cluster(_numbered, work, pieces, cluster)
+        outcomes = _on_cluster(work, pieces, cluster)
     elif min(jobs, len(pieces)) <= 1:
         outcomes = (_numbered(work, k, piece) for k, piece in enumerate(pieces))
     else:
         outcomes = _in_processes(work, pieces, jobs)
-    with closing(outcomes):  # type: ignore[type-var]  # all three are generators
+    with closing(outcomes):
         for number, result in outcomes:
             take(number, result)
 
 
-def _numbered(work: Callable[..., T], number: int, piece: tuple[Any, ...]) -> tuple[int, T]:
+def _numbered(work: Work, number: int, piece: tuple[Any, ...]) -> tuple[int, Any]:
     return number, work(*piece)
 
 
-def _in_processes(work: Callable[..., T], pieces: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[tuple[int, T]]:
+def _in_processes(work: Work, pieces: Pieces, jobs: int) -> Outcomes:
     calls = (delayed(_numbered)(work, k, piece) for k, piece in enumerate(pieces))
     own = {"initializer": _begin_worker, "initargs": (os.getpid(),)}
     with ExitStack() as stack:
@@ -104,7 +109,43 @@ def _begin_worker(parent: int) -> None:
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(LOOKING)
+            time.sleep(0.5)
         os._exit(1)
 
     threading.Thread(target=watch, name="parent watch", daemon=True).start()
+
+
+def _on_cluster(work: Work, pieces: Pieces, cluster: str) -> Outcomes:
+    if any("RAY_AUTH_TOKEN" in name for name in os.environ) or (Path.home() / ".ray" / "auth_token").exists():
+        # Ray's own command starts clusters with this token, and its library shows it only when told so.
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
+    try:
+        import ray
+    except ImportError as error:
+        raise ValueError(f"{error}; --cluster needs the extra: pip install 'birthsim[cluster]'") from error
+    address = cluster.partition(":")[2]
+    host, _, port = address.rpartition(":")
+    try:
+        if address:  # Ray itself would try for minutes
+            socket.create_connection((host, int(port)), CONNECTING).close()
+        ray.init(
+            address=address or "local", log_to_driver=False, include_dashboard=None if address else False,
+            runtime_env={"env_vars": ONE_THREAD}, configure_logging=False,
+        )  # fmt: skip
+    except (OSError, ValueError) as error:
+        said = f"--cluster {cluster!r}: no cluster answers there ({error}); allowed: ray, or ray:HOST:PORT of one"
+        raise ValueError(said) from error
+    remote, waiting = ray.remote(num_cpus=1)(_numbered), list[Any]()
+    try:
+        waiting = [remote.remote(work, k, piece) for k, piece in enumerate(pieces)]
+        while waiting:
+            ready, waiting = ray.wait(waiting, timeout=0.5)  # s, since a signal waits no longer
+            yield from map(ray.get, ready)
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from None
+    except ray.exceptions.RayError as error:
+        raise OSError(f"a worker of the cluster has died ({type(error).__name__}); what is complete is kept") from error
+    finally:
+        for one in waiting:
+            ray.cancel(one, force=True)
+        ray.shutdown()

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from tqdm import tqdm
 
 from baselines.commands.settings import MANY, Configured, Seed, whole
-from baselines.work.cluster import ONE_THREAD
+from baselines.work.side_by_side import ONE_THREAD
 from studies.alone import only_under
 from studies.fuzz.harness import Case, Figures, fuzz, generator
 from studies.fuzz.kinds import KINDS

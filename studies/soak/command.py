@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from baselines.commands.settings import Configured, Seed, whole
-from baselines.work.cluster import ONE_THREAD
+from baselines.work.side_by_side import ONE_THREAD
 from baselines.work.tasks import code_stamp
 from birthsim_env.files import make_folder, write_json, write_text
 from studies.alone import only_under

@@ -13,7 +13,7 @@ from baselines.commands.animate import SAMPLE, take
 from baselines.registry import make_controller
 from baselines.staged import driving
 from birthsim_env.drawing.rendering import PairRenderer, Scene
-from tests.console import assert_says, call
+from tests.console import call
 
 RIG = birthsim_env.Parameters()
 
@@ -138,28 +138,6 @@ def test_what_is_not_finite_is_left_out(values, pair):
     assert pair.frame(
         (scene(**values), scene()), np.array([0.0, 1.0]), (np.array([0.0, np.inf]), np.array([np.nan, 0.1]))
     ).any()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--out", "pull.png"], "--out 'pull.png'; allowed: a file that ends in .webp or .gif"),
-        (["--end", "99", "--out", "a.gif"], "allowed: from 0 to 15 s"),
-        (["--begin", "2", "--end", "2.5", "--out", "a.gif"], "allowed: from 0 to 15 s, a second apart"),
-        (["--begin", "nan", "--out", "a.gif"], "--begin: 'nan'; allowed: a finite number"),
-        (["--controller", "backstepping", "nobody", "--out", "a.gif"], "controller = 'nobody'; allowed: backstepping, "),
-        (["--out", "a.gif", "--controller", "backstepping"], ("--controller", "2")),
-        (["--env", "BirthSIM/Moon-v1", "--out", "a.gif"], "--env 'BirthSIM/Moon-v1'; allowed: BirthSIM/Circle-v1"),
-        (["--rate", "30", "--out", "a.gif"], ("--rate", "30", "10, 20, 25, 50")),
-        (["--parameters", "nowhere.toml", "--out", "a.gif"], "parameters = 'nowhere.toml' cannot be read"),
-    ],
-)
-def test_bad_input_is_one_plain_line(arguments, complaint, monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    status, _, complained = call("animate", monkeypatch, capsys, *arguments)
-    assert status == 2
-    assert_says(complaint, complained)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_interrupt_ends_without_a_file(monkeypatch, capsys, tmp_path):

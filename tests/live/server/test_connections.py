@@ -14,7 +14,6 @@ from websockets.sync.client import ClientConnection, connect
 
 from birthsim_live.server.addresses import listen
 from birthsim_live.server.connections import LARGEST, configured
-from tests.console import call
 from tests.live.server.test_controller import numbers
 from tests.work.test_side_by_side import waited_for
 
@@ -89,12 +88,3 @@ def test_a_message_that_is_too_large_closes_its_window(port: int) -> None:
         with contextlib.suppress(ConnectionClosedError):
             ws.recv()
         assert ws.close_code == 1009
-
-
-@pytest.mark.parametrize("text", ["0", "-1", "nan", "1e9", "soon"])
-def test_the_time_for_a_request_is_a_number_of_seconds(
-    text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, complained = call("live", monkeypatch, capsys, "--request-time", text)
-    assert status == 2
-    assert f"{text!r}; allowed: a finite number > 0 and <= 3600" in complained
