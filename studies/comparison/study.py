@@ -187,6 +187,6 @@ LIMITED = comparison(
 )  # fmt: skip
 ACCELERATION = comparison(
     "acceleration", partial(_table_of, by_sensors, "acceleration"), env=(CIRCLE, PROBE), sensors=("lab", "honest"),
-    plant=("randomised", "described-sensors"), controller=("admittance-adaptive",), episodes=128, seed=70000,
-    parameters="examples/acceleration_sensor_rig.toml",
+    plant=("randomised", "described-sensors"), controller=("admittance-adaptive", "admittance-sensorless"), episodes=128,
+    seed=70000, parameters="examples/acceleration_sensor_rig.toml",
 )  # fmt: skip

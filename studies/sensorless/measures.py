@@ -6,9 +6,11 @@ import numpy as np
 
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import NORMAL_DENSITY
+from baselines.bench.statistics import penalize_lost
 from baselines.impedance import declared_by
 from baselines.work.tasks import Result
 from birthsim_env.loop.signals import Reference
+from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 from studies.haptics.impedance import noticeable_differences
@@ -40,7 +42,7 @@ REST, RATE, FULL, LET_GO, AFTER = 1.0, 95.0, 1.5, 0.010, 2.0
 def measure(
     controller: str, source: str, rig: dict[str, Any], sensors: str, force_sensor: bool, seed: int, lanes: int
 ) -> Result:  # fmt: skip
-    """Of worlds with the seeds ``seed`` on, lists over them by the names of ``COLUMNS``; ``rig`` is as believed."""
+    """Of worlds with the seeds ``seed`` on, lists over them by names of ``COLUMNS`` and scenarios; ``rig`` is as believed."""
     condition = Condition(controller, Parameters.from_dict(rig), sensors, seed, lanes, force_sensor)
     found = {**_episodes(condition, lanes), **_clamped(condition), **_shaken(condition)}
     pulled = [_pulled(condition, pull) for pull in PULLS]
@@ -50,16 +52,20 @@ def measure(
 
 
 def _episodes(condition: Condition, lanes: int) -> dict[str, Any]:
-    """Of a push in ``Probe-v2`` and of ``Circle-v1``, both of which draw what they ask for."""
+    """Of all scenarios, each of which draws what it asks for: settled errors, and what the push of ``probe`` tells."""
     worlds = {"sensors": condition.sensors, "randomize": True, "parameters": condition.rig}
-    probe, circle = (
-        evaluate(f"BirthSIM/{name}", condition.law(), condition.controller, lanes, condition.seed, progress=False, **worlds)
-        for name in ("Probe-v2", "Circle-v1")
-    )
-    hunting = np.fmax(probe.metrics["hunting_x"], probe.metrics["hunting_y"])
+    episodes = {
+        name: evaluate(
+            environment_id(name), condition.law(), condition.controller, lanes, condition.seed, progress=False, **worlds
+        )
+        for name in SCENARIOS
+    }  # fmt: skip
+    probe = episodes["probe"].metrics
     return {
-        "stiffness_error": np.abs(probe.metrics["stiffness_error"]), "hunting": hunting, "air": probe.metrics["air"],
-        "circle": circle.metrics["settled_rms"], "lost": [*probe.lost, *circle.lost],
+        "stiffness_error": np.abs(probe["stiffness_error"]), "air": probe["air"],
+        "hunting": np.fmax(probe["hunting_x"], probe["hunting_y"]),
+        **{name: penalize_lost(one.metrics["settled_rms"], one.lost) for name, one in episodes.items()},
+        "lost": np.concatenate([one.lost for one in episodes.values()]),
     }  # fmt: skip
 
 

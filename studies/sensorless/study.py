@@ -8,6 +8,7 @@ import numpy as np
 from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, number, quantile
 from baselines.work.tasks import Task
+from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.results import Content
@@ -28,7 +29,7 @@ LANES = {"nominal": 64, "randomised": 64, "known": 16}
 
 COLUMNS = {
     "stiffness_error": "stiffness error, %", "hunting": "hunting, mm", "clamped_mm": "held by a clamp, mm", "clamped_N": "N",
-    "noticed": "JND at 1 Hz", "overshoot": "overshoot after 190 and 241 N, mm", "circle": "circle, mm",
+    "noticed": "JND at 1 Hz", "overshoot": "overshoot after 190 and 241 N, mm",
     "air": "air of a push, l/min", "clamped_air": "held, l/min", "turns": "valve turns, 1/s",
 }  # fmt: skip
 
@@ -52,25 +53,27 @@ def _kept(options: Options, found: Found) -> Any:
     rows = []
     for rig, plant in product(RIGS, options.plant):
         pieces = [result for key, result in found.items() if key[:2] == (rig, plant)]
-        values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, "lost")}
-        figures = {name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in COLUMNS}
+        values = {name: np.concatenate([piece[name] for piece in pieces]) for name in (*COLUMNS, *SCENARIOS, "lost")}
+        figures = {name: [quantile(values[name], share) for share in (0.5, 0.95, 1.0)] for name in (*COLUMNS, *SCENARIOS)}
         lost = int(values["lost"].sum())
         rows.append({"rig": rig, "plant": plant, "lost": lost, "of": len(values["lost"]), "figures": figures})
     return jsonable(rows)
 
 
 def _shown(content: Content) -> dict[str, str]:
-    words = {"known": f"known to {100 * OFF:g} %"}
-    rows = [["force or acceleration sensor", "rig", *COLUMNS.values(), "lost"]]
-    for row in content["figures"]:
-        cells = [", ".join(number(value) for value in row["figures"][name][:2]) for name in COLUMNS]
-        rows.append([row["rig"], words.get(row["plant"], row["plant"]), *cells, f"{row['lost']} of {row['of']}"])
-    return {"sensorless.md": markdown(rows) + "\n"}
+    words, tables = {"known": f"known to {100 * OFF:g} %"}, []
+    for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
+        rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
+        for row in content["figures"]:
+            cells = [", ".join(number(value) for value in row["figures"][name][:2]) for name in names]
+            rows.append([row["rig"], words.get(row["plant"], row["plant"]), *cells, f"{row['lost']} of {row['of']}"])
+        tables.append(markdown(rows))
+    return {"sensorless.md": "\n\n".join(tables) + "\n"}
 
 
 STUDY = Study(
     ("studies.sensorless.measures",), {"plant": PLANTS, "episodes": 128, "seed": 330000}, _tasks, _kept,
-    {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm", "circle": "mm",
-     "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
+    {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm",
+     **dict.fromkeys(SCENARIOS, "mm"),     "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
     _shown, allowed={"plant": PLANTS}, words={"plant": "what the controller knows of the rig"},
 )  # fmt: skip
