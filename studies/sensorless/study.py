@@ -74,6 +74,6 @@ def _shown(content: Content) -> dict[str, str]:
 STUDY = Study(
     ("studies.sensorless.measures",), {"plant": PLANTS, "episodes": 128, "seed": 330000}, _tasks, _kept,
     {"stiffness_error": "%", "hunting": "mm", "clamped_mm": "mm", "clamped_N": "N", "overshoot": "mm",
-     **dict.fromkeys(SCENARIOS, "mm"),     "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
+     **dict.fromkeys(SCENARIOS, "mm"), "air": "l/min", "clamped_air": "l/min", "turns": "1/s"},
     _shown, allowed={"plant": PLANTS}, words={"plant": "what the controller knows of the rig"},
 )  # fmt: skip
