@@ -90,7 +90,8 @@ def test_every_step_returns_arrays_that_later_steps_leave_alone():
     kept = [(observation, observation.copy())] + [(value, value.copy()) for value in infos.values()]
     for action in random_actions(9, 3):
         observation, rewards, _, _, infos = env.step(action)
-        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *REWARD_TERMS)), env.measurement.pressures)
+        loop = env.simulation.motion, env.simulation.time, env.simulation.force, env.simulation.reference.rows
+        values = (observation, rewards, *(infos[name] for name in (*FIELDS, *REWARD_TERMS)), env.measurement.pressures, *loop)
         kept += [(value, value.copy()) for value in values]
     for value, copy in kept:
         np.testing.assert_array_equal(value, copy)

@@ -57,6 +57,13 @@ def test_inverse_model_measures_both_distances(rig: Parameters) -> None:
     np.testing.assert_allclose(geometry.inverse_geometry(point, rig), expected, rtol=0, atol=1e-12)
 
 
+@each_rig
+def test_models_are_inverse_over_the_workspace(rig: Parameters) -> None:
+    piston = grid(rig, 101)
+    back = geometry.inverse_geometry(geometry.end_effector(piston, rig), rig)
+    np.testing.assert_allclose(back, piston, rtol=0, atol=1e-12)
+
+
 @given(rig=rigs(), fraction1=st.floats(-1, 1), fraction2=st.floats(-1, 1))
 def test_models_are_inverse_for_any_rig(rig: Parameters, fraction1: float, fraction2: float) -> None:
     piston = np.array([fraction1 * rig.cylinder1.stroke / 2, fraction2 * rig.cylinder2.stroke / 2])
