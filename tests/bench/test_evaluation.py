@@ -58,28 +58,6 @@ class Slam:
         return openings
 
 
-@pytest.fixture
-def worlds(monkeypatch):
-    """The plant parameters (rows, N) of every environment that an evaluation made, as its first episode found them."""
-    made = []
-    make_vec = gymnasium.make_vec
-
-    def spied(*args, **kwargs):
-        env = make_vec(*args, **kwargs)
-        reset = env.reset
-
-        def recorded(**options):
-            result = reset(**options)
-            made.append(env.simulation.plant.lane_parameters.copy())
-            return result
-
-        env.reset = recorded
-        return env
-
-    monkeypatch.setattr(evaluation.gymnasium, "make_vec", spied)
-    return made
-
-
 def run(controller, name="it", episodes=3, seed=5, env=PROBE, **arguments) -> Evaluation:
     arguments = {"duration": 0.8, "randomize": True, **arguments}
     return evaluate(env, controller, name, episodes, seed, progress=False, **arguments)
@@ -104,19 +82,6 @@ def test_the_same_seeds_give_the_same_figures_with_one_controller_or_two(sensors
     assert first.seeds == [5, 6, 7]
     assert other.seeds == [50, 51, 52]
     assert not set(first.metrics["error_rms_x"]) & set(other.metrics["error_rms_x"])
-
-
-def test_two_controllers_meet_the_same_worlds(worlds):
-    law, weight = Spy(), Spy(BacksteppingController(weight_compensation=True))
-    run(law, duration=3.4), run(weight, duration=3.4)
-    np.testing.assert_array_equal(worlds[0], worlds[1])
-    np.testing.assert_array_equal(law.references, weight.references)
-    np.testing.assert_array_equal(law.forces, weight.forces)
-    # They are worlds that differ from each other, and the controllers did different things in them.
-    assert len({column.tobytes() for column in worlds[0].T}) == 3
-    assert len({lane.tobytes() for lane in np.moveaxis(law.forces, 2, 0)}) == 3
-    assert np.abs(law.forces).max() > 1
-    assert not np.array_equal(law.commands[100], weight.commands[100])
 
 
 def test_a_seed_means_the_same_world_however_many_episodes_run_beside_it(monkeypatch):

@@ -1,8 +1,5 @@
 """What happens to a lane that ends, in every mode that Gymnasium knows, and Gymnasium's own wrappers around it."""
 
-import copy
-import pickle
-
 import gymnasium
 import numpy as np
 import pytest
@@ -65,16 +62,3 @@ def test_rounding_in_single_precision_is_no_error_and_the_frame_rate_is_whole():
         env.step(np.array([1.0001, 0, 0, 0]))
     assert env.metadata["render_fps"] == 33
     assert isinstance(env.metadata["render_fps"], int)
-
-
-@pytest.mark.parametrize("twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_an_environment_that_has_drawn_can_be_copied(twin):
-    env = gymnasium.make(PROBE, render_mode="rgb_array", sensors="lab", randomize=True).unwrapped
-    env.reset(seed=1)
-    env.render()
-    other = twin(env)
-    for _ in range(5):
-        action = np.full(4, 0.2, np.float32)
-        np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
-    np.testing.assert_array_equal(env.render(), other.render())
-    env.close(), other.close()

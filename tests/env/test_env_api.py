@@ -162,10 +162,10 @@ def test_a_commanded_flow_is_what_the_chambers_get(valves):
 
 def test_frames_are_pictures_and_a_window_shows_nothing_else(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = make(render_mode="rgb_array")
+    env = make(render_mode="rgb_array", picture_size=(1280, 960))
     env.reset(seed=0)
     first = env.render()
-    assert (first.shape, first.dtype) == ((480, 640, 3), np.uint8)
+    assert (first.shape, first.dtype) == ((960, 1280, 3), np.uint8)
     for _ in range(60):
         env.step((0.0, 0.0, 0.1, -0.1))
     assert not np.array_equal(env.render(), first)

@@ -12,6 +12,7 @@ import pytest
 
 from birthsim_env.drawing.rendering import Renderer, Scene
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.oracles.linkage_by_points import pose_from_lengths
 
 RIG = Parameters()
 NOWHERE = (math.nan, math.nan)
@@ -34,14 +35,9 @@ def changed(**values):
 
 
 def linkage(piston, rig=RIG):
-    """End effector, joint and pivot of cylinder 1 by intersecting circles: shares no formula with the package."""
-    g = rig.geometry
-    pivot = complex(g.d3 * math.cos(g.gamma3), g.d3 * math.sin(g.gamma3))
-    r4, r2 = piston[0] + g.k1, piston[1] + g.k2
-    # Law of cosines: angle at O1 between the line to the pivot and cylinder 2, which lies clockwise of it.
-    angle = math.acos((g.d3**2 + g.d6**2 - r4**2) / (2 * g.d3 * g.d6))
-    direction = pivot / abs(pivot) * complex(math.cos(angle), -math.sin(angle))
-    return r2 * direction, g.d6 * direction, pivot
+    """End effector, joint and pivot of cylinder 1, as complex numbers, of the linkage made of points."""
+    pose = pose_from_lengths(piston[0] + rig.geometry.k1, piston[1] + rig.geometry.k2, rig.geometry)
+    return tuple(complex(*point) for point in (pose.end_effector, pose.attachment, pose.pivot))
 
 
 def near(picture, colour, tolerance=8):

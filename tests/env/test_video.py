@@ -1,7 +1,6 @@
 """Frames as videos: Gymnasium's recorders take them, and what they write shows what was drawn."""
 
 import math
-import sys
 
 import gymnasium
 import numpy as np
@@ -81,22 +80,6 @@ def test_the_window_shows_real_time_and_no_more_than_50_frames_a_second(monkeypa
         for _ in range(round(0.04 / period)):
             env.step(np.zeros(4, dtype=np.float32))
         assert shown == [pytest.approx((time, rate)) for time in times]
-
-
-def test_frames_come_in_the_size_asked_for():
-    env = gymnasium.make("BirthSIM/Probe-v2", render_mode="rgb_array", picture_size=(1280, 960))
-    env.reset(seed=0)
-    assert env.render().shape == (960, 1280, 3)
-    envs = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=2, render_mode="rgb_array", picture_size=(400, 300))
-    envs.reset(seed=0)
-    assert [frame.shape for frame in envs.render()] == 2 * [(300, 400, 3)]
-
-
-def test_without_moviepy_gymnasium_says_so_before_anything_runs(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "moviepy", None)
-    env = gymnasium.make("BirthSIM/Circle-v1", render_mode="rgb_array")
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"(?i)moviepy is not installed"):
-        RecordVideo(env, str(tmp_path / "videos"))
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 487)])

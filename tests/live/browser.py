@@ -28,16 +28,11 @@ PLACES = (
         for name in ("Google/Chrome", "Chromium", "Microsoft/Edge", "BraveSoftware/Brave-Browser")
     ),
 )
-OF_PLAYWRIGHT = (
-    "chromium-*/chrome-linux*/chrome",
-    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
-    "chromium-*/chrome-win*/chrome.exe",
-    "chromium_headless_shell-*/chrome-*/headless_shell",
-    "chromium_headless_shell-*/chrome-*/headless_shell.exe",
-    "chromium_headless_shell-*/chrome-*/chrome-headless-shell",
-    "chromium_headless_shell-*/chrome-*/chrome-headless-shell.exe",
-)
-"""Where ``playwright install chromium`` puts programs below its folder, by system and version."""
+OF_PLAYWRIGHT = """
+from playwright.sync_api import sync_playwright
+with sync_playwright() as playwright:
+    print(playwright.chromium.executable_path)
+"""
 INSTALLATION = "apt-get install chromium-headless-shell, or .venv/bin/playwright install chromium"
 FONT = "Liberation Sans"
 ARGUMENTS = [
@@ -67,28 +62,9 @@ def find_chromium():
 
 
 def _of_playwright():
-    """The newest Chromium that Playwright has downloaded, or None."""
-    found = [path for folder in _playwright_folders() for pattern in OF_PLAYWRIGHT for path in folder.glob(pattern)]
-    programs = [path for path in found if shutil.which(path)]
-    return str(max(programs, key=_revision)) if programs else None
-
-
-def _playwright_folders():
-    """Where Playwright keeps browsers: the folder that its own variable names, or the caches of Linux, macOS and Windows."""
-    if chosen := os.environ.get("PLAYWRIGHT_BROWSERS_PATH"):
-        return [Path(chosen)]
-    home = Path.home()
-    caches = (
-        os.environ.get("XDG_CACHE_HOME") or home / ".cache",
-        home / "Library" / "Caches",
-        os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local",
-    )
-    return [Path(cache) / "ms-playwright" for cache in caches]
-
-
-def _revision(path):
-    """1228 of ``.../chromium-1228/chrome-linux64/chrome``."""
-    return max(int(number) for number in re.findall(r"chromium(?:_headless_shell)?-(\d+)", str(path)))
+    """The Chromium that Playwright downloads, or None without one; a process says where, for Playwright may run in this one."""
+    said = subprocess.run([sys.executable, "-c", OF_PLAYWRIGHT], capture_output=True, text=True).stdout.strip()
+    return shutil.which(said) if said else None
 
 
 def has_font():

@@ -13,18 +13,7 @@ from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
 from birthsim_env.parts.drawn.seeding import STREAMS, draw, lane_seeds, stream
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_column
-
-DESIGN = {
-    "mechanics.mass": (2.0, 5.0),
-    "chambers.dead_volume": (5e-6, 25e-6),
-    "chambers.wall_heat_transfer": (20.0, 100.0),
-    "valves.time_constant": (1.5e-3, 8e-3),
-    "cylinder1.coulomb_friction": (6.0, 25.0),
-    "cylinder2.coulomb_friction": (6.0, 25.0),
-    "cylinder1.viscous_friction": (10.0, 60.0),
-    "cylinder2.viscous_friction": (10.0, 60.0),
-}
-"""Assumed: docs/reference/rig.md has them."""
+from tests.physics.rig.test_parameters import DESIGN_RANGES
 
 COLUMNS = {
     "mechanics.mass": "mass",
@@ -102,20 +91,16 @@ def test_without_randomization_every_seed_gives_the_same_fixed_experiment(name):
         assert np.ptp(a, axis=-1).max() == 0.0
 
 
-def test_the_documented_ranges_are_those_of_the_design():
-    assert documented_ranges(Parameters()) == {name: pytest.approx(bounds) for name, bounds in DESIGN.items()}
-
-
 def test_draws_stay_inside_their_ranges_and_fill_them_independently():
     drawn = rigs(randomize="plant")
-    for name, (low, high) in DESIGN.items():
+    for name, (low, high) in DESIGN_RANGES.items():
         values = (drawn[COLUMNS[name]] - low) / (high - low)
         assert 0 <= values.min() < 0.01, name
         assert 0.99 < values.max() <= 1, name
         # Uniform: no decile is off by more than 4.5 standard deviations.
         counts = np.histogram(values, 10, (0, 1))[0]
         assert np.abs(counts - 150).max() < 4.5 * np.sqrt(150 * 0.9), name
-    for one, other in itertools.combinations(DESIGN, 2):
+    for one, other in itertools.combinations(DESIGN_RANGES, 2):
         correlation = np.corrcoef(drawn[COLUMNS[one]], drawn[COLUMNS[other]])[0, 1]
         assert abs(correlation) < 4.5 / np.sqrt(1500), (one, other)
     nominal = dict(zip(PARAMETER_NAMES, parameter_column(Parameters()), strict=True))

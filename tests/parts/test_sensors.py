@@ -1,12 +1,9 @@
 """Sensor models: when the laboratory's samples are taken and arrive, how noisy they are, and that ideal ones are exact."""
 
-import math
-
 import gymnasium
 import numpy as np
 import pytest
 
-from birthsim_env import Parameters
 from birthsim_env.parts.sensors.sensors import IdealSensors, LabSensors
 from tests.parts.test_honest_sensors import board, swing, watch
 
@@ -139,12 +136,3 @@ def test_the_laboratory_hides_the_truth_from_policy_and_controller_but_not_from_
         errors.append(np.abs(seen.velocity - info["velocity"]).max())
         assert np.abs(seen.pressures - info["pressure"]).max() < 5 * 500
     assert np.median(errors) > 1e-3
-
-
-def test_a_laboratorys_own_figures_are_used():
-    rig = Parameters().replace({"electronics.pressure_noise": 0.0, "electronics.position_noise": 0.01})
-    env = gymnasium.make_vec(CIRCLE, num_envs=400, sensors="lab", parameters=rig)
-    infos = env.reset(seed=0)[1]
-    seen = env.unwrapped.measurement
-    np.testing.assert_array_equal(seen.pressures, infos["pressure"].T)
-    assert (seen.position.T - infos["position"]).std() == pytest.approx(0.01, rel=4.5 / math.sqrt(1600))

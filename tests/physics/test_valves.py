@@ -99,14 +99,6 @@ def test_flow_is_choked_below_b_and_reverses_with_roles_exchanged() -> None:
     assert abs(flow(4e5, hot, 4e5, cold)) <= 60 * np.spacing(1.0) * 4e5 * RHO0 * math.sqrt(cold)
 
 
-def test_closed_spool_leaks_half_a_percent_both_ways() -> None:
-    supplied, exhausted = plant_flows(np.array([2.0e5, 4.0e5]), np.full(2, T0), np.zeros(2))
-    assert supplied[0] == pytest.approx(0.005 * C * RHO0 * SUPPLY, rel=1e-12)
-    assert exhausted[1] == pytest.approx(0.005 * C * RHO0 * 4.0e5, rel=1e-12)
-    tight = plant_flows(np.array([2.0e5, 4.0e5]), np.full(2, T0), np.zeros(2), {"valves.leakage_ratio": 0.0})
-    assert np.all(tight == 0)
-
-
 @pytest.mark.parametrize("tau", [0.0015, 0.004, 0.008])
 def test_spool_is_a_first_order_lag(tau: float) -> None:
     plant = Plant(Parameters().replace({"valves.time_constant": tau}))

@@ -46,8 +46,3 @@ def test_a_foreign_package_is_named(script, content, tmp_path):
     if script == COMMAND:
         assert len(done.stderr.strip().splitlines()) == 1
         assert done.returncode == 2
-
-
-def test_the_command_is_chosen_by_its_name(tmp_path):
-    done = run(COMMAND.replace("train", "explain"), tmp_path)
-    assert done.stdout.startswith("Usage: birthsim explain")

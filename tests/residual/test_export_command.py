@@ -1,7 +1,6 @@
 """``birthsim export``: where it writes, what it says, and what it refuses in one line."""
 
 import re
-import subprocess
 import sys
 
 import pytest
@@ -10,7 +9,7 @@ import agents
 from agents.policy.controller import ResidualController
 from agents.policy.files import WEIGHTS, save_policy
 from tests.console import call
-from tests.residual.test_onnx_export import ROOT, policy
+from tests.residual.test_onnx_export import policy
 
 
 @pytest.fixture
@@ -63,11 +62,3 @@ def test_a_missing_extra_is_named(folder, monkeypatch, capsys, missing):
     complaint = refused(monkeypatch, capsys, folder)
     assert missing in complaint
     assert "extras agents and onnx: pip install 'birthsim[agents,onnx]'" in complaint
-
-
-def test_help_names_every_option():
-    line = [sys.executable, "-W", "error", "-m", "birthsim", "export", "--to", "onnx", "--help"]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("Usage: birthsim export")
-    assert all(word in done.stdout for word in ("POLICY", "--to", "--out"))

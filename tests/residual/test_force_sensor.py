@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import agents
-from agents.policy.controller import ResidualController
 from agents.residual.law import observation_names
 from agents.residual.settings import FORCE_LAWS, LAWS, NO_LAW, ResidualSettings
 from baselines.registry import SHORT_NAMES
@@ -81,28 +80,6 @@ def test_the_force_that_is_shown_is_zero_from_the_first_observation_on():
         assert not env.measurement.user_force.any()
         *_, info = env.step(np.zeros(4))
     assert np.abs(info["user_force"]).max() > 5
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "honest"])
-@pytest.mark.parametrize("law", ["backstepping-force-first", "admittance-sensorless"])
-def test_the_controller_hides_the_force_by_itself(law, sensors):
-    """It is handed measurements with a force, and does what the environment does inside."""
-    settings = ResidualSettings(law, authority=40.0, force_sensor=False)
-
-    def policy(seen):
-        return np.tanh(seen[:, [0, 6]] - 0.3 * seen[:, [14, 15]]).astype(np.float32)
-
-    arguments = {"sensors": sensors, "randomize": True, "num_envs": LANES}
-    inside = gymnasium.make_vec(CIRCLE, **arguments, **settings.to_dict())
-    outside = gymnasium.make_vec("BirthSIM/Circle-v1", policy_period=1e-3, **arguments)
-    observation, _ = inside.reset(seed=11)
-    outside.reset(seed=11)
-    controller = ResidualController(policy=policy, settings=settings)
-    for _ in range(STEPS):
-        observation, *_ = inside.step(policy(observation))
-        for _ in range(10):
-            outside.step(controller.command(outside.measurement, outside.reference).T)
-        np.testing.assert_array_equal(outside.simulation.plant.state, inside.simulation.plant.state)
 
 
 @pytest.mark.parametrize("law", ["backstepping-force-first", "admittance-sensorless"])

@@ -220,20 +220,6 @@ def test_a_file_that_is_not_the_policy_is_not_written(tmp_path, monkeypatch, nam
     assert path.read_bytes() == before
 
 
-def test_a_write_that_is_cut_off_leaves_the_old_file(tmp_path, monkeypatch):
-    path = tmp_path / "policy.onnx"
-    export_onnx(policy(), path)
-    before = path.read_bytes()
-
-    def cut(self, target):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Path, "replace", cut)
-    with pytest.raises(KeyboardInterrupt):
-        export_onnx(policy(seed=1), path)
-    assert path.read_bytes() == before
-
-
 def test_a_network_of_other_settings_is_refused(tmp_path):
     fixed = ResidualSettings(impedance="fixed")
     with pytest.raises(ValueError, match="policy maps 36 to 4 numbers; allowed: 32 to 2"):

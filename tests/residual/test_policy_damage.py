@@ -112,7 +112,7 @@ def test_another_format_is_called_foreign(folder, form):
         {"settings": {**SETTINGS.to_dict(), "impedance": 3}},
         {"settings": {**SETTINGS.to_dict(), "law": "none", "impedance": "variable"}},
         {"settings": {"authority": 40.0, "smoothing": 0.3, "policy_period": 0.01, "weight_compensation": False}},
-        {"squashed": None},
+        *({"squashed": wrong} for wrong in (None, "false", 3, [])),
         {"settings": {**SETTINGS.to_dict(), "unknown": 1}},
         {"settings": [1, 2]},
         {"settings": 3},
@@ -123,12 +123,6 @@ def test_another_format_is_called_foreign(folder, form):
 def test_a_configuration_with_a_wrong_or_missing_entry_is_refused(folder, changes):
     rewrite(folder, **changes)
     assert_refused(folder, r"is damaged \(.+\); allowed: a folder that birthsim train wrote")
-
-
-@pytest.mark.parametrize("squashed", ["false", 3, []])
-def test_a_squashing_that_is_neither_true_nor_false_is_refused(folder, squashed):
-    rewrite(folder, squashed=squashed)
-    assert_refused(folder, "is damaged")
 
 
 def shape(*sizes, fill=0.1, dtype=np.float32):

@@ -35,6 +35,7 @@ SETTINGS = {
     "variable_kp": ResidualSettings("backstepping-frozen", "variable_kp", policy_period=0.02),
     "variable": ResidualSettings("backstepping-weight", "variable", time_constant=0.01),
     "no law": ResidualSettings("none"),
+    "without a force sensor": ResidualSettings("admittance-sensorless", authority=40.0, force_sensor=False),
     "with a memory": ResidualSettings("backstepping-force-first", force_sensor=False),
 }
 
@@ -44,7 +45,7 @@ SETTINGS = {
 def test_the_controller_does_bit_for_bit_what_the_environment_does_inside(tmp_path, settings, sensors):
     # Valves that a policy drives at random soon slam the pistons into their stops: gently, then.
     reach = 0.05 if settings.law == "none" else 0.5
-    squashed, cells = settings.impedance == "variable", 0 if settings.force_sensor else 7
+    squashed, cells = settings.impedance == "variable", 7 if settings.law == "backstepping-force-first" else 0
     network = random_network(len(observation_names(settings)), settings.size, reach, squashed, cells)
     save_policy(Policy(network, CIRCLE, settings, {}), tmp_path)
     controller, steps, lanes = ResidualController(policy=tmp_path), 60, 5

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -42,16 +41,3 @@ def test_without_the_extra_it_says_how_to_get_it_before_anything_is_compiled(
         status, _, complained = call(command, monkeypatch, capsys, *arguments)
         assert status == 2
         assert "pip install 'birthsim[live]'" in complained
-
-
-def test_a_port_that_is_taken_is_refused_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        status, _, complained = call("live", monkeypatch, capsys, "--port", port)
-    assert status == 2
-    assert complained.startswith(f"birthsim live: error: port = {port} of 127.0.0.1 cannot be served")
-    assert complained.count("\n") == 1
