@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import DATA, data, merged
-from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, gathered
-from baselines.work.tasks import Task
+from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
+from baselines.bench.statistics import jsonable, number
+from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
+from studies.learned import felt
 from studies.results import Content
 from studies.study import Found, Options, Study
 from studies.tables import markdown
@@ -55,26 +59,35 @@ RUNS = {
 """Policy -> its run; seeds were never used for training or design."""
 
 COMPARED = {
-    "settled_rms": ("settled error, mm", 3), "stiffness_error": ("static stiffness error, %", 2),
+    "settled_rms": ("settled error, mm", 3),
     "pneumatic_rms_1": ("error of pneumatic stiffness 1, %", 2), "pneumatic_rms_2": ("of 2, %", 2), "air": ("air, l/min", 2),
 }  # fmt: skip
 """Metric -> its column beside classical controllers, and how much a cell has of median, 95th percentile and worst."""
 
 
 def _pieces(policy: str) -> dict[str, list[Task]]:
-    """Controller or seed -> its pieces."""
+    """Controller or seed -> its pieces, of which the last is what a hand feels."""
     run = RUNS[policy]
     rig = load_parameters(ROOT / run.rig if run.rig else None)
     world, span = {"sensors": run.sensors, "randomize": True}, (run.episodes, run.seed)
-    found = {
-        name: evaluation_tasks(f"{policy}-{name}", controller_settings(name, rig), run.environment, world, *span)
-        for name in run.controllers
-    }  # fmt: skip
+    found = {}
+    for name in run.controllers:
+        own = controller_settings(name, rig)
+        found[name] = evaluation_tasks(f"{policy}-{name}", own, run.environment, world, *span)
+        found[name].append(Task(f"felt/{file_stem(name)}-{run.sensors}", name, felt.measure, {**own, "sensors": run.sensors}))
     for place in policy_folders(policy):
         network = file_hash(str(place / WEIGHTS))
         own = {"controller": "residual", "source": network, "rig": rig.to_dict(), "policy": str(place)}
         found[place.name] = evaluation_tasks(f"{policy}-{place.name}", own, run.environment, world, *span, evaluate_learned)
+        found[place.name].append(
+            Task(f"felt/{policy}-{place.name}", place.name, felt_by_learned, {**own, "sensors": run.sensors})
+        )
     return found
+
+
+def felt_by_learned(**settings: Any) -> Result:
+    """What a hand feels of a policy, whose code this module imports, so that it counts."""
+    return felt.measure(**settings)
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
@@ -86,23 +99,23 @@ def _kept(options: Options, found: Found) -> Any:
     kept = {}
     for policy in options.policy:
         names = dict.fromkeys(who for one, who, _ in found if one == policy)
-        every = {
-            who: gathered(who, [result for (one, own, _), result in found.items() if (one, own) == (policy, who)])
-            for who in names
-        }  # fmt: skip
+        pieces = {who: [result for (one, own, _), result in found.items() if (one, own) == (policy, who)] for who in names}
+        every = {who: gathered(who, own[:-1]) for who, own in pieces.items()}
         controllers, seeds = (
             [one for who, one in every.items() if (who in RUNS[policy].controllers) == classical] for classical in (True, False)
         )
         together = [*controllers, merged(seeds, f"residual, {len(seeds)} seeds")]
+        felt_of = [[pieces[one.controller][-1]] for one in controllers] + [[pieces[one.controller][-1] for one in seeds]]
         kept[policy] = {
             "beside": {one.controller: seed_figures(one, seeds) for one in controllers},
+            "felt": {one.controller: felt.figures_of(own) for one, own in zip(together, felt_of, strict=True)},
             "metrics": {"columns": list(DATA), "rows": list(csv.reader(io.StringIO(data(together))))[1:]},
         }
-    return kept
+    return jsonable(kept)
 
 
 def _shown(content: Content) -> dict[str, str]:
-    parts, rows = [], [["policy", *DATA]]
+    parts, rows = [_beside(content["figures"])], [["policy", *DATA]]
     for policy, found in content["figures"].items():
         run = RUNS[policy]
         world = f"{run.environment}, {run.episodes} episodes from seed {run.seed}, {run.sensors} sensors, randomised rigs."
@@ -128,20 +141,32 @@ def _summary(figures: dict[str, Any]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
-def _by_gradients(content: Content) -> dict[str, str]:
-    """Policies by gradients beside classical controllers."""
-    rows = [["world", "controller", *(name for name, _ in COMPARED.values()), "lost"]]
-    for policy, found in content["figures"].items():
-        every = found["metrics"]["rows"]
+def _beside(figures: dict[str, Any]) -> str:
+    """Policies beside classical controllers."""
+    settled, *others = [name for name, _ in COMPARED.values()]
+    rows = [["world, sensors", "controller", settled, *felt.COLUMNS.values(), *others, "lost"]]
+    for policy, found in figures.items():
+        every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
         for controller in dict.fromkeys(row[2] for row in every):
             own = {row[0]: row[1:] for row in every if row[2] == controller}
             cells = [
                 " / ".join(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()
             ]
+            # "-" in a result from before this was measured.
+            touched = found.get("felt", {}).get(controller, dict.fromkeys(felt.COLUMNS, (np.nan,)))
+            touch = [" / ".join(map(_number, touched[name][:2])) for name in felt.COLUMNS]
             name = controller.replace("residual", policy) if controller.startswith("residual") else controller
             of, _, lost, *_ = own["lost episodes"]
-            rows.append([policy.partition("_")[0], name, *cells, f"{lost} {of}"])
-    return {"gradients_policies.md": markdown(rows) + "\n"}
+            rows.append([world, name, cells[0], *touch, *cells[1:], f"{lost} {of}"])
+    return markdown(rows) + "\n"
+
+
+def _number(value: Any) -> str:
+    return value if isinstance(value, str) else number(value)
+
+
+def _by_gradients(content: Content) -> dict[str, str]:
+    return {"gradients_policies.md": _beside(content["figures"])}
 
 
 def _row(found: dict[str, Any], statistic: str) -> Sequence[Any]:
@@ -167,7 +192,7 @@ def _side_by_side(content: Content, folder: Path) -> list[Path]:
 
 
 SOURCES = ("agents.policy.controller", "agents.commands.evaluate", "studies.learned.study")
-UNITS = {"settled_rms": "mm", "stiffness_error": "%", "air": "l/min", "saturation": "%"}
+UNITS = {"settled_rms": "mm", "stiffness_error": "%", "noticed": "1", "energy": "mJ", "air": "l/min", "saturation": "%"}
 GRADIENTS = tuple(name for name in RUNS if name.endswith("_apg"))
 WORDS = {"policy": "shipped policies, each in its own worlds"}
 

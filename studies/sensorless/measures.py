@@ -7,30 +7,22 @@ import numpy as np
 from baselines.bench.evaluation import evaluate
 from baselines.bench.metrics import NORMAL_DENSITY
 from baselines.bench.statistics import penalize_lost
-from baselines.impedance import declared_by
 from baselines.work.tasks import Result
 from birthsim_env.loop.signals import Reference
 from birthsim_env.parts.scenarios import SCENARIOS, environment_id
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
-from studies.haptics.impedance import noticeable_differences
-from studies.haptics.multisine import FREQUENCIES, SECONDS, impedance_felt, multisine_hand
 from studies.haptics.recording import record
 from studies.haptics.release import flight
-from studies.haptics.worlds import DIRECTIONS, POSES, Condition, lost_lanes, resting
+from studies.haptics.worlds import POSES, Condition, lost_lanes
+from studies.shaken import STIFFNESS, at_rest, shaken
 from studies.stability.rig_port import Hand, RigPort
 
 CLAMP, DAMPING = 20000.0, 60.0
 """N/m and N s/m of a hand that holds the head where it starts; assumed, the stiffest hand of ``studies.haptics.coupled``."""
 
-STIFFNESS = 2000.0
-"""N/m, while a hand holds or shakes the head."""
-
 HELD, JUDGED = 5.0, 2.0
 """s that the clamp holds, and of these the last that are judged."""
-
-PEAK, PHASES = 10.0, 11
-"""N, of the multisine, and the seed of its phases."""
 
 PULLS, PULLED_AT = (190.0, 241.0), 4000.0
 """N along x, and the stiffness setpoint, N/m: the strongest forceps pull asked for, and almost all that cylinder 2 can hold."""
@@ -44,7 +36,8 @@ def measure(
 ) -> Result:  # fmt: skip
     """Of worlds with the seeds ``seed`` on, lists over them by names of ``COLUMNS`` and scenarios; ``rig`` is as believed."""
     condition = Condition(controller, Parameters.from_dict(rig), sensors, seed, lanes, force_sensor)
-    found = {**_episodes(condition, lanes), **_clamped(condition), **_shaken(condition)}
+    found = {**_episodes(condition, lanes), **_clamped(condition)}
+    found["noticed"] = shaken(condition.law(), condition.drawn(), sensors, seed, force_sensor)["noticed"]
     pulled = [_pulled(condition, pull) for pull in PULLS]
     found["overshoot"] = np.concatenate([one["overshoot"] for one in pulled])
     found["lost"] = np.concatenate([found["lost"], *(one["lost"] for one in pulled)])
@@ -71,7 +64,7 @@ def _episodes(condition: Condition, lanes: int) -> dict[str, Any]:
 
 def _port(condition: Condition, places: Any, stiffness: float) -> tuple[RigPort, list[Parameters], Reference]:
     rigs = condition.drawn()
-    reference = resting([places[k % len(places)] for k in range(len(rigs))], [stiffness] * len(rigs))
+    reference = at_rest(len(rigs), places, stiffness)
     return condition.port(condition.law(), rigs, reference), rigs, reference
 
 
@@ -95,17 +88,6 @@ def _clamped(condition: Condition) -> dict[str, Any]:
         "clamped_mm": 1e3 * np.ptp(motion, axis=0).max(axis=0), "clamped_N": np.ptp(force, axis=0).max(axis=0),
         "clamped_air": 60e3 * port.air / NORMAL_DENSITY / HELD, "turns": turned.mean(axis=0) / JUDGED,
     }  # fmt: skip
-
-
-def _shaken(condition: Condition) -> dict[str, Any]:
-    port, rigs, reference = _port(condition, POSES, STIFFNESS)
-    declared = declared_by(condition.law(), reference)
-    if declared is None:
-        return {"noticed": np.full(len(rigs), np.nan)}
-    direction = np.transpose([DIRECTIONS[k // len(POSES) % 2] for k in range(len(rigs))])
-    recording = record(port, multisine_hand(direction, np.full(len(rigs), PEAK), PHASES), SECONDS)
-    felt = noticeable_differences(impedance_felt(recording, direction), declared.along(FREQUENCIES, direction))
-    return {"noticed": felt[int(np.argmin(np.abs(FREQUENCIES - 1.0)))]}
 
 
 def _pulled(condition: Condition, size: float) -> dict[str, Any]:

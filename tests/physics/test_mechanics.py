@@ -183,6 +183,14 @@ def test_collision_is_reported_with_its_speed(speed: float) -> None:
     assert np.all(plant.impacts == 0), "only the last advance counts"
 
 
+def test_leaving_a_stop_is_no_collision() -> None:
+    plant = free_flight(0.3)
+    plant.state[Y2], plant.state[V2] = 0.2001, -0.3
+    plant.advance(np.zeros((4, 1)), np.zeros((2, 1)), 0.005)
+    assert plant.state[Y2, 0] < 0.2
+    assert np.all(plant.impacts == 0)
+
+
 def test_piston_held_against_the_stop_rests_on_its_spring() -> None:
     rig = Parameters().replace({"mechanics.gravity": 0.0})
     plant = Plant(rig, 1)

@@ -1,0 +1,54 @@
+"""What a hand that shakes rigs feels, of ports whose answer is known."""
+
+import numpy as np
+import pytest
+
+from baselines.impedance import Impedance
+from birthsim_env.physics.rig.parameters import Parameters
+from studies import shaken
+
+LANES = 2
+
+
+class Spring:
+    """A port without mass and damping, some times ``softer`` than what is asked for; it has given 3 mJ for a while."""
+
+    lanes, period, now = LANES, 1e-3, 0.0
+    impacts = np.array([0.0, 10.0])
+
+    def __init__(self, softer):
+        self.stiffness = shaken.STIFFNESS / softer
+        self.offset, self.force = np.zeros((2, 2, LANES))
+
+    @property
+    def energy(self):
+        return np.full(LANES, 3e-3 if 6.0 < self.now < 7.0 else 1e-3)
+
+    def motion(self):
+        return np.concatenate([self.offset, 0.0 * self.offset])
+
+    def advance(self, hand):
+        self.force = hand(self.now, self.offset, 0.0 * self.offset)
+        self.now += self.period
+        self.offset = self.force / self.stiffness
+
+
+class Declares:
+    """A controller that declares a spring 1.3 times softer than what is asked for."""
+
+    def declared_impedance(self, reference):
+        nothing, each = np.zeros((2, 2, LANES)), np.repeat(np.eye(2)[:, :, None], LANES, axis=2)
+        return Impedance(nothing, nothing, shaken.STIFFNESS / 1.3 * each)
+
+
+@pytest.mark.parametrize(
+    ("softer", "law", "noticed"),
+    [(1.0, object(), 0.0), (1.15, object(), 1.0), (1.3, Declares(), 0.0), (1.0, Declares(), 0.3 / 1.3 / 0.15)],
+)
+def test_differences_are_those_of_the_compliance_from_what_is_declared_or_asked_for(softer, law, noticed, monkeypatch):
+    """15 % of compliance is one just noticeable difference."""
+    monkeypatch.setattr(shaken, "RigPort", lambda *_, **__: Spring(softer))
+    found = shaken.shaken(law, [Parameters()] * LANES, "ideal", 0)
+    np.testing.assert_allclose(found["noticed"], noticed, atol=1e-9)
+    np.testing.assert_array_equal(found["energy"], 3e-3)
+    np.testing.assert_array_equal(found["lost"], [0, 1])
