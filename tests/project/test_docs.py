@@ -93,7 +93,6 @@ def test_every_part_has_its_page(parts):
     assert included == set(parts)
 
 
-@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
 def test_a_table_sorts_by_numbers_and_words(page_of):
     cells = {"b": "12 [9, 15]", "c": "lost", "a": "0.5; 3", "d": ""}
     rows = "".join(f"<tr><td>{law}</td><td>{error}</td></tr>" for law, error in cells.items())
@@ -120,7 +119,6 @@ probe,nominal,a,mm,7
 </script><script>{}{}</script>"""
 
 
-@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
 def test_a_data_file_is_chosen_from_and_sorted(page_of):
     page = page_of(DATA.format(*((DOCS / "_static" / name).read_text(encoding="utf-8") for name in ("tables.js", "data.js"))))
 
@@ -196,7 +194,6 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
 
 @pytest.mark.slow
 @axe.NEEDED
-@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_on_the_site(site, page_of, theme):
     page = page_of("")
@@ -209,7 +206,6 @@ def test_axe_finds_nothing_on_the_site(site, page_of, theme):
 
 @pytest.mark.slow
 @axe.NEEDED
-@pytest.mark.skipif(bool(browser.missing()) and os.environ.get("CI") != "true", reason=browser.missing())
 def test_equations_are_drawn_from_a_file_of_the_site(site, page_of):
     page, drawn = page_of(""), "mjx-container:not(:has([data-mml-node=merror]))"
     with browser.Folder(site) as address:

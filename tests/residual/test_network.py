@@ -80,23 +80,6 @@ def test_a_memory_is_pytorchs_gated_recurrent_unit(squashed):
     assert np.ptp(memories, axis=0).max() > 0.5
 
 
-def test_a_memory_is_cho_s_equations():
-    """Cho et al. 2014, with PyTorch's biases: exp instead of the kernel's tanh, one lane, written out."""
-    made = network(4, 1, (3,), 2, cells=2)
-    seen = observations(25, 1, 4)
-    actions, memories = ran(made, seen)
-    (first, bias), (last, offset) = made.layers
-    (w, b), (v, c) = made.memory
-    h = np.zeros(2)
-    for rows, action, memory in zip(seen, actions, memories, strict=True):
-        x = np.tanh(first @ np.clip((rows[0] - made.mean) / np.sqrt(made.variance + 1e-8), -10, 10) + bias)
-        r, z = (1 / (1 + np.exp(-(w[k : k + 2] @ x + b[k : k + 2] + v[k : k + 2] @ h + c[k : k + 2]))) for k in (0, 2))
-        n = np.tanh(w[4:] @ x + b[4:] + r * (v[4:] @ h + c[4:]))
-        h = (1 - z) * n + z * h
-        np.testing.assert_allclose(memory[0], h, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(action[0], np.clip(last @ np.concatenate([x, h]) + offset, -1, 1), rtol=0, atol=6e-8)
-
-
 @pytest.mark.parametrize("cells", [0, 32])
 def test_a_lane_has_the_same_bits_alone_and_among_many(cells):
     made = network(INPUTS, 2, (32,), 3, cells=cells)

@@ -1,6 +1,5 @@
 """The live page for everybody: keys, screen readers, high contrast, night, small windows; and frames without numbers."""
 
-import os
 import sys
 from urllib.request import urlopen
 
@@ -8,12 +7,8 @@ import numpy as np
 import pytest
 
 from birthsim_live.logs.recording import SLICES
-from tests.live import browser
 from tests.live.browser import Server, Window
 from tests.live.recordings.made import example, write_recording
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 DRAWN = """[...document.querySelectorAll('.plot canvas')].some((canvas) =>
     canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0))"""

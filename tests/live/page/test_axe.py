@@ -1,16 +1,13 @@
 """axe-core finds nothing on the page, whatever it shows, by day and by night."""
 
-import os
-
 import pytest
 
-from tests.live import axe, browser
+from tests.live import axe
 from tests.live.axe import violations
 from tests.live.browser import NARROW, WIDE, Server, Window
 from tests.live.recordings.made import example, write_recording
 
-LACK = browser.missing()
-pytestmark = [pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK), axe.NEEDED]
+pytestmark = axe.NEEDED
 
 
 def test_a_picture_without_a_name_is_found(chromium):

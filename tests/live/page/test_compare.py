@@ -1,16 +1,10 @@
 """Two rigs under one hand in headless Chromium: chosen, dragged, pushed by keys, recorded, on small screens, by command."""
 
-import os
-
 import numpy as np
 import pytest
 
 from birthsim_live.logs.recording import SLICES, load_recording
-from tests.live import browser
 from tests.live.browser import Server, Window, displacement, rendered
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 FIRST, SECOND = "admittance-backstepping", "backstepping"
 BESIDE = "birthsim.frame !== null && birthsim.frame.second !== null && document.body.dataset.rigs === '2'"

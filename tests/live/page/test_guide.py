@@ -1,15 +1,10 @@
 """What the page teaches: it opens with a problem that can be seen, leads through five lessons, and is a link."""
 
 import json
-import os
 
 import pytest
 
-from tests.live import browser
 from tests.live.browser import Window
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 FELT = "document.querySelector('[data-figure=\"the hand feels\"] dd').textContent"
 MARKED = "document.querySelectorAll('.look').length"

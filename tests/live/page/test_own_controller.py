@@ -1,16 +1,11 @@
 """A controller of one's own under the page: Python commands, the browser's rig waits, and what goes wrong is shown."""
 
-import os
 from pathlib import Path
 
 import pytest
 
-from tests.live import browser
 from tests.live.browser import Server, Window
 from tests.live.server.test_controller import OWN
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 LOST = "document.querySelector('#lost').textContent"
 

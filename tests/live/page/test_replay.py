@@ -1,7 +1,6 @@
 """A recording that is opened on the page: dropped or chosen, played, searched, and refused in a line where it is none."""
 
 import base64
-import os
 import struct
 
 import numpy as np
@@ -10,12 +9,8 @@ import pytest
 from birthsim_env.physics.geometry import end_effector
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import FIELDS, SLICES, load_recording
-from tests.live import browser
 from tests.live.browser import Server, Window
 from tests.live.recordings.made import example, write_recording
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 DROP = """([bytes, name]) => {
     const data = new DataTransfer();

@@ -1,6 +1,5 @@
 """The page as a folder of files: any server shows it below any address, and it records and replays by itself."""
 
-import os
 import shutil
 
 import numpy as np
@@ -11,12 +10,10 @@ from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.logs.recording import COLUMNS, load_recording
 from birthsim_live.rig.folder import packed_page, write_page
 from tests.console import run as command
-from tests.live import browser
 from tests.live.browser import CALM, NARROW, Folder, Window
 from tests.live.rig.worker import run
 
-LACK = browser.missing()
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)]
+pytestmark = pytest.mark.slow
 
 LARGEST = 1.5e6  # bytes
 SOONEST = 2.0  # s from the address to a rig that moves

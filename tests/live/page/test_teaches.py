@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import os
 import struct
 
 import pytest
@@ -11,11 +10,7 @@ import pytest
 from birthsim_env.physics.mechanics import piston_force
 from birthsim_env.physics.rig.parameters import Parameters
 from birthsim_live.rig.words import FIGURES, PAPER
-from tests.live import browser
 from tests.live.browser import displacement
-
-LACK = browser.missing()
-pytestmark = pytest.mark.skipif(bool(LACK) and os.environ.get("CI") != "true", reason=LACK)
 
 TIMES = "Number(document.querySelector('#magnification').textContent.match(/\\d+/)[0])"
 
