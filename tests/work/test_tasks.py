@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import signal
 from pathlib import Path
 
@@ -30,10 +29,6 @@ def fail(log, number):
     if number == 3:
         raise RuntimeError("three is not for me")
     return square(log, number)
-
-
-def die(log, number):
-    os._exit(1)
 
 
 @pytest.fixture
@@ -137,11 +132,6 @@ def test_ctrl_c_right_after_a_piece_is_written_counts_it(log, tmp_path, monkeypa
         run_tasks(made(log, square, range(3)), tmp_path / "out", 1, "work")
     assert len(list(tmp_path.rglob("*.json"))) == 1
     assert "work: 1 of 3 are complete and kept; the same command goes on" in capsys.readouterr().out
-
-
-def test_a_process_that_dies_is_reported(log, tmp_path):
-    with pytest.raises(OSError, match="a process that computed has died"):
-        run_tasks(made(log, die, [0, 1]), tmp_path / "out", 2, "work")
 
 
 def test_the_stamp_follows_what_a_piece_imports_and_nothing_else():
