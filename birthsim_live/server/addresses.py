@@ -11,24 +11,18 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 def listen(host: str, port: int) -> socket.socket:
     """A socket bound to the address; ``ValueError`` where it is taken, unknown or all addresses at once."""
     try:
-        family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except (OSError, UnicodeError) as error:
         raise ValueError(f"host = {host!r} is unknown ({error}); allowed: an address or name of this machine") from error
     if ipaddress.ip_address(address[0]).is_unspecified:
         raise ValueError(f"host = {host!r} means every address; allowed: one address or name, by which pages are opened")
-    listening = socket.socket(family, kind, number)
-    # Without it a port stays taken for a minute after its server has ended.
-    if os.name == "posix":
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listening.bind(address)
-        listening.listen()
+        return socket.create_server(address, family=family)
     except OSError as error:
-        listening.close()
+        why = os.strerror(error.errno or 0)  # without the address, which its own words repeat
         raise ValueError(
-            f"port = {port} of {host} cannot be served ({error.strerror}); allowed: a free port, --port 0 finds one"
+            f"port = {port} of {host} cannot be served ({why}); allowed: a free port, --port 0 finds one"
         ) from error
-    return listening
 
 
 def is_loopback(host: str) -> bool:
