@@ -75,9 +75,10 @@ def _know(world: int, seen: Seen, memory: int, about: About, tables: int, lane: 
             told.owed[axis, i] = motion.position[axis, i] - target.position[axis, i] - given[axis]
             told.velocity[axis, i] = motion.velocity[axis, i] - target.velocity[axis, i]
             told.acceleration[axis, i] = motion.acceleration[axis, i] - target.acceleration[axis, i]
+        mass = own.inertia.mass[i]
         for k in range(2):
             found.joints.position[k, i], found.joints.speed[k, i] = own.joints.position[k, i], own.joints.speed[k, i]
-            found.disturbance[k, i] = known.unexplained[k, i] / (p.mass * kappa * kappa if k == 0 else p.mass)
+            found.disturbance[k, i] = known.unexplained[k, i] / (mass * kappa * kappa if k == 0 else mass)
             told.unseen[k, i], told.friction[k, i] = known.unseen[k, i], known.drag[k, i]
         for k in range(Insight.size):
             told.rows[k, i] /= about.scales[k]

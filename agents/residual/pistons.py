@@ -36,7 +36,7 @@ def _given(force: Array, about: Belief, given: Given, n: int) -> None:
     for i in range(n):
         for k in range(2):
             given.force[k, i], given.believed[k, i] = force[k, i], 0.0
-        given.moving[i], given.noise[i] = 1.0, about.noise
+        given.moving[i], given.noise[i], given.inverse_mass[i] = 1.0, about.noise, about.rig.inverse_mass
 
 
 @helper

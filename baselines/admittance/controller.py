@@ -60,8 +60,9 @@ class AdmittanceController(StagedController):
         parameters: what the controller believes of the rig: a ``Parameters``, a TOML file's path, or None for the defaults.
         force_sensor: whether the hand's force is measured.
         learn: whether it learns the tracker's noise and, with a force sensor, that sensor's bias and the friction of sliding
-            pistons, which nothing else separates from the hand, and yields faster to large oscillations. Only then does it read
-            an acceleration sensor, where positions are samples and the rig as believed has one.
+            pistons, which nothing else separates from the hand, and yields faster to large oscillations. From samples and a
+            force it also learns that the rig is lighter than believed (``inertia``). Only then does it read an acceleration
+            sensor, where positions are samples and the rig as believed has one; such a loop needs no mass.
         gains: those of ``TUNABLE``, SI units. Where one is not given, ``TUNED`` has its value for the sensors in use.
             gain: c, 1/s, while the reference moves. rest_gain: c, 1/s, once it rests.
             rest_push: by how much the position error of a resting piston is multiplied.
@@ -120,6 +121,7 @@ class AdmittanceController(StagedController):
     def law_stages(self, sampled: bool) -> list[LawStage]:
         rig, noisy = self.parameters, sampled
         board, learns_force = rig.electronics, self._learn and self._force_sensor
+        fixed = self._force_sensor and not self._learn
         inert = sampled and self._learn and board.acceleration_bandwidth > 0
         sampled = sampled and not inert
         kind = "inertial" if inert else "ideal" if not sampled else "lab, learning" if self._learn else "lab"
@@ -130,8 +132,8 @@ class AdmittanceController(StagedController):
         about = knowledge.beliefs(
             rig, sampled, noisy, g, force_sensor=self._force_sensor, learns_noise=sampled and self._learn,
             place=HANDED if inert else POSITION, friction_rate=g["friction_rate"] if learns_force else 0.0,
-            weighed=inert and not self._force_sensor,
-            believed_limit=knowledge.BELIEVED_LIMIT if self._force_sensor or inert else knowledge.BELIEVED_HAND,
+            learns_mass=sampled and learns_force, weighed=inert and not self._force_sensor,
+            believed_limit=knowledge.BELIEVED_LIMIT if inert or fixed else knowledge.BELIEVED_HAND,
             most_bias=MOST_BIAS * board.force_bias if noisy and learns_force else 0.0,
         )  # fmt: skip
         constants = Constants.numbers(**about, gains=Gains.numbers(**{name: follow[name] for name in Gains.groups}))

@@ -19,6 +19,7 @@ from baselines.estimation import (
     force_bias,
     force_observer,
     friction_level,
+    inertia,
     inertial_force,
     observers,
     reference_friction,
@@ -26,6 +27,7 @@ from baselines.estimation import (
     tracker_noise,
 )
 from baselines.estimation.friction_level import Friction
+from baselines.estimation.inertia import Inertia
 from baselines.estimation.inertial import Moving
 from birthsim_env.loop.rows import POSITION, Seen
 from birthsim_env.loop.signals import Point
@@ -36,16 +38,17 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 BELIEVED_LIMIT, BELIEVED_HAND = 120.0, 400.0
-"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below the first,
-and with the strongest hand, which acts unseen without a force sensor, below the second."""
+"""N; assumed: no more than this is believed to act unseen on a piston: 2 kg of mass and 25 N of friction are below the first.
+Below the second are 7 kg on a small bore and, unseen without a force sensor, the strongest hand."""
 
 
 @helper
 def sense(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
     """The hand's force and the noise of a sample. What no force sensor measures of the hand, the observers find."""
     noise, hand, lanes = known.given.noise, known.hand, memory.fresh.shape[0]
+    inverse_mass = known.given.inverse_mass
     for i in range(lanes):
-        noise[i] = about.belief.noise
+        noise[i], inverse_mass[i] = about.belief.noise, 1.0 / memory.inertia.mass[i]
         for k in range(2):
             hand[k, i] = seen.user_force[k, i] if about.force_sensor > 0.0 else memory.hand.force[k, i]
     if about.learns_noise > 0.0:
@@ -86,14 +89,18 @@ def correct(seen: Seen, memory: Memory, known: Known, about: Beliefs) -> None:
         point = Point(seen.rows[place : place + Point.size])
         disturbance_observer.observe(pistons, point, memory.chambers.pressure, given, belief, joints, lanes)
     for i in range(lanes):
-        _, _, _, _, _, kappa, _, _ = geometry.pose(
+        _, _, _, _, _, kappa, sine, cosine = geometry.pose(
             joints.position[0, i], joints.position[1, i], p.k1, p.k2, p.d_squares, p.d_product,
             p.sin_gamma3, p.cos_gamma3,
         )  # fmt: skip
+        mass = memory.inertia.mass[i]
         for k in range(2):
-            found = (p.mass * kappa * kappa if k == 0 else p.mass) * pistons.disturbance[k, i]
+            found = (mass * kappa * kappa if k == 0 else mass) * pistons.disturbance[k, i]
             known.unexplained[k, i] = given.believed[k, i] + found
             known.unseen[k, i] = given.believed[k, i] + max(-about.believed_limit, min(about.believed_limit, found))
+        if about.learns_mass > 0.0:
+            pose, pressures = (kappa, sine, cosine), memory.chambers.pressure
+            inertia.learn(memory.inertia, i, pose, pistons, pressures, given, belief, memory.fresh)
 
 
 @helper
@@ -131,7 +138,8 @@ def fresh_memory(rig: Parameters, sampled: bool) -> Array:
     """``Memory`` of a lane that starts."""
     whole, pistons = Watch.lane(fraction=1.0), observers.fresh_memory(rig, sampled)
     follower = Follower.lane(across=whole, along=whole)
-    return Memory.lane(fresh=1.0, friction=Friction.lane(level=1.0), follower=follower, pistons=pistons)
+    mass, friction = Inertia.lane(mass=rig.mechanics.mass), Friction.lane(level=1.0)
+    return Memory.lane(fresh=1.0, friction=friction, inertia=mass, follower=follower, pistons=pistons)
 
 
 def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, float], **others: float) -> dict[str, Any]:
@@ -145,5 +153,5 @@ def beliefs(rig: Parameters, sampled: bool, noisy: bool, gains: Mapping[str, flo
         **{"sampled": sampled, "force_sensor": True, "learns_noise": False, "rows_of_memory": len(fresh_memory(rig, sampled))},
         **{"trust": 1.0 - exact.number("exp", -width * rig.electronics.control_period)},
         **{"friction_fraction": gains["friction_fraction"], "friction_rate": 0.0, "most_bias": 0.0, "weighed": False},
-        **{"believed_limit": BELIEVED_LIMIT, **others},
+        **{"learns_mass": False, "believed_limit": BELIEVED_LIMIT, **others},
     }

@@ -100,7 +100,8 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         v1, v2 = joints.speed[0, i], joints.speed[1, i]
         pp1, pn1 = pressure[0, i], pressure[1, i]
         pp2, pn2 = pressure[2, i], pressure[3, i]
-        m, gravity, atmosphere = p.mass, p.gravity, p.atmosphere
+        inverse_mass = known.given.inverse_mass[i]
+        m, gravity, atmosphere = memory.inertia.mass[i], p.gravity, p.atmosphere
         r4, r2, w, s2, root, kappa, sine, cosine = geometry.pose(
             y1, y2, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3
         )
@@ -133,9 +134,9 @@ def command(seen: Seen, memory: Memory, known: Known, gains: Gains, about: Belie
         jerk_n = along(jx, jy, sine, cosine) - jerk_for(an_, dn, en, fraction_n * c)
         rate1, rate2 = load_rates(load1, load2, growth, turn, kappa, m * jerk_t, m * jerk_n)
         rate1 += p.fv1 * mechanics.acceleration1(
-            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, gravity
+            load1 - kappa * push_t, v1, v2, r2, r4, w, s2, kappa, sine, inverse_mass, gravity
         )  # fmt: skip
-        rate2 += p.fv2 * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, p.inverse_mass, gravity)
+        rate2 += p.fv2 * mechanics.acceleration2(load2 + push_n, v1, r2, r4, s2, cosine, inverse_mass, gravity)
         rate1, rate2 = rate1 - feedforward.rate[0, i], rate2 - feedforward.rate[1, i]
         stiffness, stiffness_rate = asked.pneumatic_stiffness, asked.pneumatic_stiffness_rate
         first, second = air_at(0, pp1, pn1, y1, v1, p), air_at(1, pp2, pn2, y2, v2, p)

@@ -5,6 +5,7 @@ from baselines.estimation.chamber_observer import Chambers
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
 from baselines.estimation.held_force import Hold
+from baselines.estimation.inertia import Inertia
 from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.signals import Joints, Motion, Point
@@ -44,6 +45,7 @@ class Memory(Rows):
     tracker = part(Tracker, "noise of the tracker")
     bias = rows("bias_x bias_y", "N", "bias of the force sensor")
     friction = part(Friction, "level of friction")
+    inertia = part(Inertia, "mass")
     hand = part(Hand, "force of the hand without a sensor")
     hold = part(Hold, "whether the head rests, without a force sensor")
     follower = part(Follower, "loop")
@@ -75,6 +77,7 @@ class Beliefs(Numbers):
     rows_of_memory = number("1", "rows of the memory")
     trust = number("1", "trust in a pressure cell, 0 to 1")
     friction_fraction = number("1", "fraction of the believed friction that is fed forward")
+    learns_mass = number("1", "1 where the mass is learned")
     friction_rate = number("1/s", "rate at which the level of friction is learned; 0 learns nothing")
     most_bias = number("N", "largest bias of the force sensor that is taken off; 0 takes nothing")
 

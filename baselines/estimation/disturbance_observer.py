@@ -35,8 +35,9 @@ def accelerations(joints: Joints, i: int, pressures: Array, given: Given, p: Rig
         + mechanics.user_force2(force[0, i], force[1, i], sine, cosine)
         + believed[1, i]
     )
-    a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, p.inverse_mass, p.gravity)
-    return a1, mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, p.inverse_mass, p.gravity), kappa
+    inverse_mass = given.inverse_mass[i]
+    a1 = mechanics.acceleration1(load1, v1, v2, r2, r4, w, s2, kappa, sine, inverse_mass, p.gravity)
+    return a1, mechanics.acceleration2(load2, v1, r2, r4, s2, cosine, inverse_mass, p.gravity), kappa
 
 
 @helper

@@ -23,6 +23,7 @@ class Given(Rows):
 
     force = rows("Fx Fy", "N", "force of the hand, as far as it is known")
     believed = rows("F1 F2", "N", "other forces that are believed to act along the pistons")
+    inverse_mass = row("1/kg", "1/mass of what the pistons move")
     moving = row("1", "1 where no piston may rest")
     noise = row("m", "standard deviation of a position sample")
 

@@ -75,6 +75,7 @@ def _locate(world: int, seen: Seen, memory: int, about: Location, tables: int, l
         for k in range(2):
             given.force[k, i], given.believed[k, i] = s.user_force[k, i] if informed else 0.0, 0.0
         given.moving[i], given.noise[i] = estimate.moving[i] if informed else 1.0, belief.noise
+        given.inverse_mass[i] = belief.rig.inverse_mass
     observe(pistons, s, s.pressure, given, belief)
     for i in range(n):
         for k in range(2):

@@ -56,6 +56,7 @@ class Law:
         lanes = motion.shape[1]
         seen, known = Seen(np.zeros((Seen.size, lanes))), Known(np.zeros((Known.size, lanes)))
         memory = remembered(lanes) if memory is None else memory
+        memory.inertia.mass[:], known.given.inverse_mass[:] = self.rig.mechanics.mass, 1.0 / self.rig.mechanics.mass
         seen.asked.rows[10:14] = np.concatenate([now.stiffness, 0 * now.stiffness]) if pneumatic is None else pneumatic
         seen.feedforward.rows[:] = 0.0 if told is None else told
         memory.joints.position[:], memory.joints.speed[:], memory.chambers.pressure[:] = now.piston, now.speed, now.pressures

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from baselines.estimation import force_bias, force_observer, friction_level, observers, tracker_noise
+from baselines.estimation import force_bias, force_observer, friction_level, inertia, observers, tracker_noise
 from baselines.estimation.force_observer import Hand
 from baselines.estimation.friction_level import Friction
-from baselines.estimation.rows import Belief
+from baselines.estimation.inertia import Inertia
+from baselines.estimation.rows import Belief, Given, Pistons
 from baselines.estimation.tracker_noise import Tracker
 from birthsim_env.loop.rows import Signals
 from birthsim_env.loop.signals import Joints
@@ -77,6 +78,47 @@ def test_a_law_that_starts_later_tares_nothing():
     memory, force = np.zeros((2, 1)), np.empty((2, 1))
     force_bias.tare(memory, np.array([3.0]), np.ones((2, 1)), 2.0, PERIOD, force)
     np.testing.assert_array_equal(force, 1.0)
+
+
+SWING, PUSH, SECONDS = 2.0 * np.pi * 7.0, np.array([9.0, 14.0]), 3.0
+"""1/s, N and s: a hand that swings the head of ``swung``."""
+
+
+def swung(mass, held=0.0):
+    """The mass that is found of a head of ``mass`` on empty chambers that a hand swings. Friction holds a part of the push.
+
+    A constant force, like a weight or a bias, is unknown as well. The observer's d is Newton's law, low-passed three times.
+    """
+    belief, p = Belief(observers.belief(Parameters(), 110.0)), Rig(parameter_column(Parameters()))
+    kappa, sine, cosine = geometry.pose(0.02, -0.01, p.k1, p.k2, p.d_squares, p.d_product, p.sin_gamma3, p.cos_gamma3)[5:]
+    found, fresh = Inertia(Inertia.lane(mass=p.mass)[:, None]), np.ones(1)
+    pistons, given = Pistons(np.zeros((Pistons.size, 1))), Given(np.zeros((Given.size, 1)))
+    lag, kept, pressures = np.zeros((3, 2)), np.exp(-110.0 * PERIOD), np.full((4, 1), p.atmosphere)
+    for k in range(int(SECONDS / PERIOD)):
+        push = PUSH * np.sin(SWING * k * PERIOD)
+        given.force[:, 0] = cosine * push[0] + sine * push[1], sine * push[0] - cosine * push[1]
+        truth = ((1.0 - held) * push + 20.0) / mass
+        pistons.disturbance[:, 0] = lag[2] / [-kappa, 1.0]
+        inertia.learn(found, 0, (kappa, sine, cosine), pistons, pressures, given, belief, fresh)
+        fresh[:], into = 0.0, truth - push / found.mass[0]
+        for stage in lag:
+            stage += (1.0 - kept) * (into - stage)
+            into = stage
+    return found.mass[0]
+
+
+@pytest.mark.parametrize(("mass", "held"), [(1.0, 0.0), (1.0, 0.3), (1.8, 0.0)])
+def test_the_mass_is_that_of_newtons_law_as_far_as_the_swing_outweighs_the_belief(mass, held):
+    believed = Parameters().mechanics.mass
+    passed = (1.0 + (SWING / 110.0) ** 2) ** -3 / (1.0 + (inertia.CHANGE / SWING) ** 2)
+    squares = SECONDS * passed * np.sum(PUSH**2) / 2.0
+    expected = (inertia.PRIOR + squares) / (inertia.PRIOR / believed + squares * (1.0 - held) / mass)
+    # The constant force begins as a step in d alone, which ends after 0.1 s; a period is 0.04 of a swing's radian.
+    assert swung(mass, held) == pytest.approx(expected, rel=0.03)
+
+
+def test_what_is_stuck_or_heavier_than_believed_changes_nothing():
+    assert swung(1.0, held=1.0) == swung(6.0) == Parameters().mechanics.mass
 
 
 @pytest.mark.parametrize("slides", [0.0, 0.02])

@@ -10,10 +10,11 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import Parameters
 
 
-def given(lanes: int, force: Array | None, believed: Array | None, moving: Array | None, noise: float) -> Given:
+def given(lanes: int, force: Array | None, believed: Array | None, moving: Array | None, about: Belief) -> Given:
     """Nothing but what is given; where ``moving`` is not, no piston may rest."""
     record = Given(np.zeros((Given.size, lanes)))
-    record.moving[:], record.noise[:] = 1.0 if moving is None else moving, noise
+    record.moving[:], record.noise[:] = 1.0 if moving is None else moving, about.noise
+    record.inverse_mass[:] = about.rig.inverse_mass
     record.force[:], record.believed[:] = 0.0 if force is None else force, 0.0 if believed is None else believed
     return record
 
@@ -37,7 +38,7 @@ class Sampled:
             self._lanes, self.pistons = lanes, Pistons(np.repeat(self._fresh[:, None], lanes, axis=1))
         signals = Signals(np.zeros((Signals.size, lanes)))
         fill_measurement(signals.rows, seen)
-        known = given(lanes, force, believed, moving, float(self._belief.noise))
+        known = given(lanes, force, believed, moving, self._belief)
         observers.observe(self.pistons, signals, signals.pressure, known, self._belief)
         return self.pistons.rows[: Joints.size]
 
@@ -52,7 +53,7 @@ class Measured:
     def update(self, seen: Measurement, force: Array, believed: Array) -> Array:
         point, lanes = Point(np.concatenate([seen.position, seen.velocity])), seen.position.shape[1]
         joints = Joints(np.empty((Joints.size, lanes)))
-        known = given(lanes, force, believed, None, 0.0)
+        known = given(lanes, force, believed, None, self._belief)
         air = np.ascontiguousarray(seen.pressures)
         disturbance_observer.observe(self.pistons, point, air, known, self._belief, joints, lanes)
         return joints.rows
