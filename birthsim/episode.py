@@ -36,7 +36,7 @@ def run(settings: "Settings") -> None:
     print(described(rig, RANDOMIZE[settings.randomize], settings.sensors))
     episode, lost = record(env, settings.seed)
     # pyplot takes half a second to load.
-    from baselines.figures.episode import episode_figure
+    from baselines.figures.runs import episode_figure
 
     title = f"{settings.env}, {name}, seed {settings.seed}, {settings.sensors} sensors"
     with whole_results(folder) as place:

@@ -123,6 +123,25 @@ def _coordinates(axes: Axes, record: dict[str, Array]) -> None:
     _letter(axes, "d", "Coordinates")
 
 
+def episode_figure(episode: dict[str, Array], title: str, folder: Path) -> list[Path]:
+    """``episode.png`` and ``.svg`` from rows of time (s), positions and errors (m) and the hand's force (N), each (T, 2)."""
+    time, millimetres = episode["time"], 1e3
+    with plt.rc_context(STYLE):
+        figure, (path, error, force) = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
+        for name, colour, style in (("compliant_target", MIDDLE, "--"), ("position", DARK, "-")):
+            path.plot(*(millimetres * episode[name].T), color=colour, ls=style, lw=1.2, label=name.replace("_", " "))
+        path.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+        figure.suptitle(title, fontsize=9)
+        path.legend()
+        error.plot(time, millimetres * np.linalg.norm(episode["tracking_error"], axis=1), color=DARK, lw=1)
+        error.set(xlabel="time (s)", ylabel="tracking error (mm)")
+        for k, (axis, style) in enumerate((("x", "-"), ("y", "--"))):
+            force.plot(time, episode["user_force"][:, k], color=(DARK, MIDDLE)[k], ls=style, lw=1, label=axis)
+        force.set(xlabel="time (s)", ylabel="force of the hand (N)")
+        force.legend()
+        return save(figure, folder, "episode")
+
+
 def error_over_time(evaluations: Sequence[Evaluation], title: str, folder: Path) -> list[Path]:
     """Size of the tracking error over time: median and 5-95 % band over the episodes, one line per controller."""
     with plt.rc_context(STYLE):

@@ -16,6 +16,8 @@ from birthsim_env import Circle, ForceProfile, Hold, Parameters, Path, Plant, St
 from birthsim_env.drawing.rendering import Renderer
 from birthsim_env.loop.loop import Loop
 from birthsim_env.loop.stage import Stage
+from birthsim_env.parts.drawn.seeding import draw
+from birthsim_env.parts.drawn.streams import Streams
 from birthsim_env.physics.compiled.records import Rows, row, rows
 from studies.labour.model import Labour
 from studies.verification.strict_feedback import strict_feedback_rates
@@ -94,6 +96,10 @@ def duration(seconds):
     return lambda: propose(RIG, seconds)
 
 
+def streams():
+    return Streams(np.array([1, 2], dtype=np.uint64), np.zeros(2, dtype=np.int64), "reference")
+
+
 def shifted(discount):
     return lambda: ShiftedReward(None, 1.0, discount)
 
@@ -114,6 +120,14 @@ TABLE = {
     ("controller = 'limited:none'", ""): [lambda: make_controller("limited:none", RIG)],
     ("duration = ", ">= 4 and <= 600 (s)"): [duration(value) for value in (0.0, 3.9, 601.0, NAN)],
     ("discount = ", "0 or more and less than 1"): [shifted(value) for value in (-0.1, 1.0, 2.0, NAN)],
+    ("informed = 'yes'", "True, False"): [residual(informed="yes")],
+    ("range ", "a finite number or (low, high) of such"): [
+        lambda bad=bad: draw(bad, np.random.default_rng(0)) for bad in ((2.0, 1.0), (1.0, 2.0, 3.0), (0.0, NAN), ("a", "b"))
+    ],
+    **{
+        (f"low = {low}, high = {high}", ""): [lambda low=low, high=high: streams().integers(low, high)]
+        for low, high in ((5, 5), (5, 4), (0, 2**33))
+    },
     ("", "float64"): [
         lambda wrong=wrong: Loop(4, [(wrong, 0)], [], [])
         for wrong in (np.zeros((2, 3)), np.zeros((2, 4), dtype=np.float32), np.zeros((4, 2)).T, np.zeros(4))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from birthsim_env import Parameters
 from birthsim_env.parts.drawn.randomization import documented_ranges, draw_parameters
-from birthsim_env.parts.drawn.seeding import STREAMS, draw, lane_seeds, stream
+from birthsim_env.parts.drawn.seeding import STREAMS, lane_seeds, stream
 from birthsim_env.physics.compiled.lanes import PARAMETER_NAMES, parameter_column
 from tests.physics.rig.test_parameters import DESIGN_RANGES
 
@@ -171,11 +171,3 @@ def test_lane_seeds_count_up_or_are_as_given():
     missing = lane_seeds([4, None, None], 3, rng)
     assert missing[0] == 4
     assert len({*missing, *lane_seeds(None, 3, rng)}) == 6
-
-
-@pytest.mark.parametrize("bad", [(2.0, 1.0), (1.0, 2.0, 3.0), (0.0, float("nan")), ("a", "b")])
-def test_a_drawn_number_needs_an_ordered_pair(bad):
-    with pytest.raises(ValueError, match=r"range .* allowed: a finite number or \(low, high\) of such"):
-        draw(bad, np.random.default_rng(0))
-    assert draw(3, np.random.default_rng(0)) == 3.0
-    assert 1.0 <= draw((1.0, 2.0), np.random.default_rng(0)) <= 2.0

@@ -6,7 +6,6 @@ import pytest
 
 import agents
 from agents.residual.insight import SCALES, Insight
-from agents.residual.settings import ResidualSettings
 from birthsim_env.loop.signals import Reference
 from birthsim_env.observation import LIMIT
 
@@ -46,8 +45,3 @@ def test_knowing_moves_nothing():
             env.step(np.zeros((LANES, 2), np.float32))
         states.append(env.simulation.plant.state.copy())
     np.testing.assert_array_equal(*states)
-
-
-def test_informed_is_true_or_false():
-    with pytest.raises(ValueError, match=r"informed = 'yes'; allowed: True, False"):
-        ResidualSettings(informed="yes")

@@ -5,7 +5,6 @@ fraction of its volume, or torn open. Pressures far beyond supply and atmosphere
 equations' own.
 """
 
-import dataclasses
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -17,13 +16,8 @@ from birthsim_env.physics import dynamics
 from birthsim_env.physics.compiled.lanes import BRISTLE_S0, FS1, FS2, LUGRE, SPOOLS, Z1, Z2, Array
 from birthsim_env.physics.plant import Plant
 from birthsim_env.physics.rig.parameters import Parameters
+from tests.physics.plant.test_plant_properties import RANGES
 
-RANGES: dict[str, tuple[float, float]] = {
-    f"{section.name}.{field.name}": field.metadata["randomized"]
-    for section in dataclasses.fields(Parameters)[:-1]
-    for field in dataclasses.fields(type(section.default))
-    if field.metadata["randomized"] and section.name != "electronics"
-}
 BORE, RING = math.pi * 0.025**2 / 4, math.pi * (0.025**2 - 0.010**2) / 4
 POLICY_PERIOD = 0.01
 
