@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from baselines.impedance import Impedance
+from baselines.registry import make_controller
 from birthsim_env.physics.rig.parameters import Parameters
 from studies import shaken
+from studies.haptics.worlds import Condition
 
 LANES = 2
 
@@ -52,3 +54,14 @@ def test_differences_are_those_of_the_compliance_from_what_is_declared_or_asked_
     np.testing.assert_allclose(found["noticed"], noticed, atol=1e-9)
     np.testing.assert_array_equal(found["energy"], 3e-3)
     np.testing.assert_array_equal(found["lost"], [0, 1])
+
+
+@pytest.mark.slow
+def test_a_policy_from_scratch_that_renders_stiffness_does_so_when_it_is_shaken():
+    """Policies that had met slow pushes alone were tens of just noticeable differences off, and gave joules."""
+    rig = Parameters()
+    rigs = Condition("residual", rig, "ideal", 86_000, 12, True).drawn()
+    found = shaken.shaken(make_controller("residual", rig, policy="probe_apg"), rigs, "ideal", 0)
+    assert np.median(found["noticed"]) < 1.0
+    assert np.median(found["energy"]) < 1e-3
+    assert found["lost"].sum() == 0
