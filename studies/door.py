@@ -54,6 +54,7 @@ STUDIES = {
     "sweep": Entry("sweeps.study", "STUDY", "grids, random draws and searches, from a TOML file"),
     "targets": Entry("targets.study", "STUDY", "built code of every target, against Python"),
     "verification": Entry("verification.command", "", "balances, coverage, mutation, for docs/verification.md"),
+    "wide-rigs": Entry("honest.wide_rigs", "STUDY", "controllers on rigs of 1 to 10 kg that they do not know"),
     "worst": Entry("honest.worst", "STUDY", "the worst worlds, and what each owes to its figures"),
 }
 

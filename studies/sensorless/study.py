@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from baselines.bench.pieces import controller_settings
-from baselines.bench.statistics import jsonable, number, quantile
+from baselines.bench.statistics import jsonable, quantile
 from baselines.work.tasks import Task
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.physics.compiled.sources import ROOT
@@ -15,7 +15,7 @@ from studies.results import Content
 from studies.sensorless.measures import measure
 from studies.sensorless.rigs import OFF, PLANTS, believed
 from studies.study import Found, Options, Study
-from studies.tables import markdown
+from studies.tables import cells, markdown
 
 RIGS = {
     "acceleration, no force": ("admittance-sensorless", "examples/acceleration_sensor_rig.toml"),
@@ -65,8 +65,8 @@ def _shown(content: Content) -> dict[str, str]:
     for names, titles in ((COLUMNS, list(COLUMNS.values())), (SCENARIOS, [f"{name}: settled error, mm" for name in SCENARIOS])):
         rows = [["force or acceleration sensor", "rig", *titles, "lost"]]
         for row in content["figures"]:
-            cells = [", ".join(number(value) for value in row["figures"][name][:2]) for name in names]
-            rows.append([row["rig"], words.get(row["plant"], row["plant"]), *cells, f"{row['lost']} of {row['of']}"])
+            shown = [cells(row["figures"][name][:2]) for name in names]
+            rows.append([row["rig"], words.get(row["plant"], row["plant"]), *shown, f"{row['lost']} of {row['of']}"])
         tables.append(markdown(rows))
     return {"sensorless.md": "\n\n".join(tables) + "\n"}
 
