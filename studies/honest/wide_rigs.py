@@ -73,12 +73,9 @@ def _shown(content: Content) -> dict[str, str]:
     titles = [f"{scenario}: {metric.split('_')[0]}, mm; beyond {most:g} mm" for scenario, (metric, most) in METRICS.items()]
     rows = [["controller", *titles, "stiffness error, %"]]
     for name, figures in content["figures"].items():
-        cells = [
-            ", ".join(number(figures[key][share]) for share in ("median", "q95", "worst"))
-            for key in (*METRICS, "stiffness_error")
-        ]
-        beyond = [f"{figures[key]['beyond']} of {figures[key]['of']}" for key in METRICS]
-        rows.append([f"`{name}`", *(f"{cell}; {count}" for cell, count in zip(cells, beyond, strict=False)), cells[-1]])
+        shown = {key: cells([own[share] for share in ("median", "q95", "worst")]) for key, own in figures.items()}
+        beyond = [f"{shown[key]}; {figures[key]['beyond']} of {figures[key]['of']}" for key in METRICS]
+        rows.append([f"`{name}`", *beyond, shown["stiffness_error"]])
     return {"wide_rigs.md": markdown(rows) + "\n"}
 
 
