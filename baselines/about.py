@@ -11,7 +11,7 @@ CONTROLLERS = {
     "backstepping-force-first": "The paper's law; where a valve saturates, pneumatic stiffness gives way to force.",
     "backstepping-cartesian": "The paper's law in Cartesian coordinates: stiffness along x and y may be coupled.",
     "admittance-backstepping": "Measures the hand's force, and moves the rig to where the spring would be.",
-    "admittance-adaptive": "The admittance law, which also learns friction, light masses, noise and the bias of its force sensor.",
+    "admittance-adaptive": "The admittance law, which also learns friction, light masses, noise and its force sensor's bias.",
     "admittance-sensorless": "The admittance law, with the hand's force estimated from pressures and motion.",
     "pid": "A position controller on the motion that the spring would make: what most would try first.",
     "lqr": "A linear regulator on the motion that the spring would make; its gains weigh error against effort.",

@@ -16,7 +16,8 @@ LIBRARIES = ("numpy", "numba", "scipy", "gymnasium")
 
 ENGINE = (
     "baselines/work/", "baselines/commands/", "baselines/about.py", "birthsim_env/files.py",
-    "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "studies/study.py", "studies/results.py",
+    "birthsim_env/physics/compiled/sources.py", "birthsim_env/physics/compiled/kept.py", "studies/study.py",
+    "studies/results.py",
 )  # fmt: skip
 """What reads options, keeps pieces and describes controllers, and decides no figure: a change of it makes no result stale."""
 
