@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 
 from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS
@@ -152,9 +151,7 @@ def _beside(figures: dict[str, Any]) -> str:
             cells = [
                 " / ".join(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()
             ]
-            # "-" in a result from before this was measured.
-            touched = found.get("felt", {}).get(controller, dict.fromkeys(felt.COLUMNS, (np.nan,)))
-            touch = [" / ".join(map(_number, touched[name][:2])) for name in felt.COLUMNS]
+            touch = [" / ".join(map(_number, found["felt"][controller][name][:2])) for name in felt.COLUMNS]
             name = controller.replace("residual", policy) if controller.startswith("residual") else controller
             of, _, lost, *_ = own["lost episodes"]
             rows.append([world, name, cells[0], *touch, *cells[1:], f"{lost} {of}"])
