@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-
 from agents.commands.evaluate import evaluate_learned
 from agents.policy.files import WEIGHTS
 from agents.policy.seeds import as_table, policy_folders, seed_figures
