@@ -19,6 +19,8 @@ MEANINGS = {
     "pneumatic_rms": "root mean square error of the pneumatic stiffness of cylinder {}, relative to its setpoint",
     "air": "normal litres of air drawn from the supply",
     "saturation": "time in which at least one valve is asked to open fully",
+    "valve_turns": "how often the command of a valve turns back, mean of the valves",
+    "valve_travel": "full openings that the command of a valve moves, mean of the valves: their wear, and what is heard",
 }
 """Metric, or what it begins with -> meaning; ``{}`` is the axis or the cylinder."""
 
