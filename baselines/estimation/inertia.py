@@ -18,10 +18,10 @@ from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.records import Rows, row, rows
 
 LEAST = 0.25
-"""assumed: no rig has less of the mass believed."""
+"""assumed: every rig has at least this fraction of the believed mass."""
 
 PRIOR = 20.0
-"""P, N2 s: weight of the believed mass; found by trial. A head that swings by 20 N outweighs it in 0.2 s, noise in 30 s."""
+"""P, N2 s: weight of the believed mass; found by trial. A head that swings by 20 N outweighs it in 0.1 s."""
 
 CHANGE = 30.0
 """1/s, of the high-pass; found by trial. Rigs that are too light swing at 40 to 60 1/s."""

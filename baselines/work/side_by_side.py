@@ -109,7 +109,7 @@ def _begin_worker(parent: int) -> None:
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(0.5)
+            time.sleep(0.5)  # s between two looks at whether the parent is still there
         os._exit(1)
 
     threading.Thread(target=watch, name="parent watch", daemon=True).start()

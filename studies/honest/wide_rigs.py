@@ -26,7 +26,7 @@ STRENGTH = 0.9
 """Worlds that ask for a larger fraction of their rig's strength are left out; assumed."""
 
 METRICS = {"circle": ("settled_rms", 5.0), "probe": ("hunting", 2.0)}
-"""Scenario -> its metric, mm, and what is too much of it: by issue 32, point 4."""
+"""Scenario -> its metric, mm, and what is too much of it; assumed."""
 
 
 def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], episodes: int, seed: int) -> Result:
