@@ -20,7 +20,7 @@ STUDIES = {
     "acceleration-feel": Entry("haptics.study", "ACCELERATION", "a pull let go with an acceleration sensor"),
     "accuracy": Entry("accuracy.study", "STUDY", "the error of the plant's integrator, against a second model"),
     "air": Entry("least_air.study", "STUDY", "how much air the schedule of least air saves"),
-    "bandwidth": Entry("haptics.bandwidth", "STUDY", "up to which frequency a hand feels what is declared"),
+    "bandwidth": Entry("bandwidth.study", "STUDY", "up to which frequency a hand feels what is declared"),
     "beside-law": Entry("residual.beside_law", "STUDY", "policies of several seeds beside their controller"),
     "bound": Entry("comparison.study", "BOUNDED", "how far controllers are from a planner that looks ahead"),
     "by-gradients": Entry("learned.study", "BY_GRADIENTS", "policies by gradients beside classical controllers"),

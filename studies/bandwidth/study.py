@@ -7,7 +7,7 @@ import numpy as np
 from baselines.bench.pieces import controller_settings, file_stem
 from baselines.bench.probes import board_limit
 from baselines.bench.resting import RestingRigs
-from baselines.bench.statistics import crossed_interval, jsonable, number, quantile
+from baselines.bench.statistics import crossed_interval, number, quantile
 from baselines.estimation.admittance import DAMPING_RATIO
 from baselines.impedance import Complex, declared_by, mass_spring_damper
 from baselines.work.tasks import Result, Task
@@ -15,8 +15,8 @@ from birthsim_env.loop.signals import Mask, Reference
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import Parameters, load_parameters
+from studies.bandwidth.valves import commanded_openings
 from studies.haptics.impedance import bandwidth, last_before, unnoticed_up_to
-from studies.haptics.limits_of_air import commanded_openings
 from studies.haptics.multisine import FADE, sines, unit_multisine
 from studies.haptics.worlds import DIRECTIONS, POSES, Condition, condition_of, resting
 from studies.results import Content
@@ -44,6 +44,12 @@ MEASURED = (
     ("admittance-adaptive", "honest, acceleration"), ("admittance-sensorless", "honest, acceleration"),
 )  # fmt: skip
 """Controllers, and the sensors of ``RIGS`` that they have."""
+
+COLUMNS = [
+    *("controller", "sensors", "push", "axis"),
+    *(f"{name}{part}" for name in ("bandwidth", "unnoticed", "allowed") for part in ("", "_low", "_high", "_worst")), "lost",
+]  # fmt: skip
+"""Of the figures; those of frequencies in Hz."""
 
 
 def lines(low: float, high: float, period: float) -> Array:
@@ -156,27 +162,28 @@ def _summary(values: Any) -> list[float]:
 
 
 def _kept(options: Options, found: Found) -> Any:
-    return jsonable([
-        {
-            "controller": controller, "sensors": sensors, "peak": peak, "axis": axis,
-            "lost": found[controller, sensors, peak]["lost"],
-            **{name: _summary(found[controller, sensors, peak][name][way]) for name in ("bandwidth", "unnoticed")},
-            "allowed": _summary(found[peak]["allowed"][way]),
-        }
+    rows = [
+        [
+            controller, sensors, f"{peak:g} N", axis,
+            *_summary(found[controller, sensors, peak]["bandwidth"][way]),
+            *_summary(found[controller, sensors, peak]["unnoticed"][way]),
+            *_summary(found[peak]["allowed"][way]), found[controller, sensors, peak]["lost"],
+        ]
         for controller, sensors in MEASURED for peak in options.peak for way, axis in enumerate("xy")
-    ])  # fmt: skip
+    ]  # fmt: skip
+    return {"columns": COLUMNS, "rows": rows}
 
 
 def _shown(content: Content) -> dict[str, str]:
-    rows = [["controller", "sensors", "push, N", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]]
-    for row in content["figures"]:
-        cells = ["{} [{}, {}]; {}".format(*map(number, row[name])) for name in ("bandwidth", "unnoticed", "allowed")]
-        rows.append([row["controller"], row["sensors"], f"{row['peak']:g}", row["axis"], *cells, str(row["lost"])])
+    rows = [["controller", "sensors", "push", "axis", "bandwidth, Hz", "1 JND up to, Hz", "valves allow, Hz", "lost"]]
+    for row in content["figures"]["rows"]:
+        cells = ["{} [{}, {}]; {}".format(*map(number, row[first : first + 4])) for first in (4, 8, 12)]
+        rows.append([*row[:4], *cells, str(row[-1])])
     return {"bandwidth.md": markdown(rows) + "\n"}
 
 
 STUDY = Study(
-    ("studies.haptics.bandwidth",), {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000}, _tasks, _kept,
-    {"bandwidth": "Hz", "unnoticed": "Hz", "allowed": "Hz", "peak": "N"}, _shown,
+    (__name__,), {"peak": (2.0, 10.0, 20.0), "rigs": 36, "seed": 7_300_000}, _tasks, _kept,
+    {"bandwidth": "Hz", "unnoticed": "Hz", "allowed": "Hz"}, _shown,
     words={"peak": "N, of the hand's force", "rigs": "randomised ones"},
 )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Up to which frequency a hand feels the impedance declared."""
