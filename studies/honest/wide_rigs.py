@@ -1,5 +1,7 @@
-"""Controllers that believe the default rig, on rigs far from it: light and heavy, other friction, supply and bores at once."""
+"""Controllers on rigs far from the default one, which they believe or know to within 5 %: light and heavy, other friction,
+supply and bores at once."""
 
+from itertools import count, product
 from typing import Any
 
 import numpy as np
@@ -9,9 +11,13 @@ from baselines.bench.pieces import controller_settings
 from baselines.bench.statistics import jsonable, penalize_lost, quantile
 from baselines.registry import make_controller
 from baselines.work.tasks import Result, Task
+from birthsim_env.parts.drawn.randomization import draw_parameters
+from birthsim_env.parts.drawn.seeding import stream
 from birthsim_env.parts.scenarios import environment_id
 from birthsim_env.physics.rig.parameters import Parameters
+from birthsim_env.physics.strength import carried
 from studies.results import Content
+from studies.sensorless.rigs import OFF, around
 from studies.study import Found, Options, Study
 from studies.tables import cells, markdown
 
@@ -25,15 +31,35 @@ RANGES = {
 STRENGTH = 0.9
 """Worlds that ask for a larger fraction of their rig's strength are left out; assumed."""
 
+TARGETS = np.array([[0.4, 0.6, 0.5, 0.5], [0.0, 0.0, -0.1, 0.1]])
+"""m (2, places): where the widest circles reach to; known rigs carry their own weight there."""
+
+KNOWS = "admittance-adaptive"
+"""The controller that is also told its rig."""
+
+LANES = {False: 256, True: 16}
+"""Worlds of a piece, by whether the rig is known: those of one piece share what the controller believes."""
+
 METRICS = {"circle": ("settled_rms", 5.0), "probe": ("hunting", 2.0)}
 """Scenario -> its metric, mm, and what is too much of it; assumed."""
 
 
-def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], episodes: int, seed: int) -> Result:
-    """Of worlds within their rigs' strength: the metric of ``METRICS``, mm, or "lost", and stiffness errors, %."""
+def known(rig: Parameters, seed: int) -> Parameters:
+    """A rig drawn from ``RANGES`` that can carry its own weight at the scenarios' targets."""
+    drawn = (draw_parameters(rig, RANGES, stream(seed, again, "parameters")) for again in count())
+    return next(one for one in drawn if carried(TARGETS, one).max() <= 1.0)
+
+
+def measure(
+    scenario: str, controller: str, source: str, rig: dict[str, Any], ranges: dict[str, Any], episodes: int, seed: int
+) -> Result:
+    """Of worlds within their rigs' strength: the metric of ``METRICS``, mm, or "lost", and stiffness errors, %.
+
+    The controller believes ``rig``; the true ones are drawn from ``ranges``.
+    """
     believed = Parameters.from_dict(rig)
     law = make_controller(controller, believed)
-    worlds = {"randomize": RANGES, "sensors": "honest", "parameters": believed}
+    worlds = {"randomize": {name: tuple(pair) for name, pair in ranges.items()}, "sensors": "honest", "parameters": believed}
     found = evaluate(environment_id(scenario), law, controller, episodes, seed, progress=False, **worlds)
     within = np.asarray(found.required_strength_ratio) <= STRENGTH
     values = {name: np.asarray(values) for name, values in found.metrics.items()}
@@ -43,14 +69,24 @@ def measure(scenario: str, controller: str, source: str, rig: dict[str, Any], ep
 
 
 def _tasks(options: Options) -> dict[Any, Task]:
-    rig = Parameters()
-    return {
-        (scenario, name): Task(
-            f"{scenario}-{name}", name, measure,
-            {"scenario": scenario, **controller_settings(name, rig), "episodes": options.episodes, "seed": options.seed},
-        )
-        for scenario in METRICS for name in options.controller
-    }  # fmt: skip
+    found = {}
+    for scenario, (name, told) in product(METRICS, _rows(options)):
+        for first in range(options.seed, options.seed + options.episodes, LANES[told]):
+            rig, ranges = Parameters(), RANGES
+            if told:
+                rig = known(rig, first)
+                ranges = {figure: around(rig, figure, OFF) for figure in RANGES}
+            worlds = {"ranges": ranges, "episodes": min(LANES[told], options.seed + options.episodes - first), "seed": first}
+            found[scenario, name, told, first] = Task(
+                f"{scenario}-{name}/{'known' if told else 'default'}-{first}", name, measure,
+                {"scenario": scenario, **controller_settings(name, rig), **worlds},
+            )  # fmt: skip
+    return found
+
+
+def _rows(options: Options) -> list[tuple[str, bool]]:
+    """The table's rows: a controller, and whether it knows its rig."""
+    return [(name, False) for name in options.controller] + [(KNOWS, True)]
 
 
 def _figures(values: list[Any], most: float) -> dict[str, Any]:
@@ -60,22 +96,24 @@ def _figures(values: list[Any], most: float) -> dict[str, Any]:
 
 
 def _kept(options: Options, found: Found) -> Any:
-    return jsonable({
-        name: {
-            **{scenario: _figures(found[scenario, name]["error"], most) for scenario, (_, most) in METRICS.items()},
-            "stiffness_error": _figures(found["probe", name]["stiffness_error"], np.inf),
-        }
-        for name in options.controller
-    })  # fmt: skip
+    rows = []
+    for name, told in _rows(options):
+        of = {one: [own for key, own in found.items() if key[:3] == (one, name, told)] for one in METRICS}
+        sizes = {one: [value for own in of[one] for value in own["error"]] for one in METRICS}
+        stiffness = [value for own in of["probe"] for value in own["stiffness_error"]]
+        figures = {one: _figures(sizes[one], most) for one, (_, most) in METRICS.items()}
+        rows.append({"controller": name, "known": told, **figures, "stiffness_error": _figures(stiffness, np.inf)})
+    return jsonable(rows)
 
 
 def _shown(content: Content) -> dict[str, str]:
     titles = [f"{scenario}: {metric.split('_')[0]}, mm; beyond {most:g} mm" for scenario, (metric, most) in METRICS.items()]
-    rows = [["controller", *titles, "stiffness error, %"]]
-    for name, figures in content["figures"].items():
-        shown = {key: cells([own[share] for share in ("median", "q95", "worst")]) for key, own in figures.items()}
-        beyond = [f"{shown[key]}; {figures[key]['beyond']} of {figures[key]['of']}" for key in METRICS]
-        rows.append([f"`{name}`", *beyond, shown["stiffness_error"]])
+    rows = [["controller", "believes", *titles, "stiffness error, %"]]
+    for own in content["figures"]:
+        shown = {key: cells([own[key][share] for share in ("median", "q95", "worst")]) for key in (*METRICS, "stiffness_error")}
+        beyond = [f"{shown[key]}; {own[key]['beyond']} of {own[key]['of']}" for key in METRICS]
+        believes = f"its rig to {100 * OFF:g} %" if own["known"] else "the default rig"
+        rows.append([f"`{own['controller']}`", believes, *beyond, shown["stiffness_error"]])
     return {"wide_rigs.md": markdown(rows) + "\n"}
 
 

@@ -22,11 +22,12 @@ def believed(rig: Parameters, plant: str, seed: int) -> Parameters:
         return described
     centre = draw_parameters(described, ranges, stream(seed, 0, "parameters")) if plant == "known" else described
     off = OFF if plant == "known" else 0.0
-    around = {name: _around(centre, name, off) for name in ranges}
-    return _with(centre, {**{name: (low, high) for name, low, high in described.ranges}, **around})
+    near = {name: around(centre, name, off) for name in ranges}
+    return _with(centre, {**{name: (low, high) for name, low, high in described.ranges}, **near})
 
 
-def _around(rig: Parameters, name: str, off: float) -> tuple[float, float]:
+def around(rig: Parameters, name: str, off: float) -> tuple[float, float]:
+    """The range of the figure ``name`` within a fraction ``off`` of the rig's, in what is allowed of it."""
     section, _, own = name.partition(".")
     value, limits = getattr(getattr(rig, section), own), field_of(name).metadata
     return max(limits["least"], (1 - off) * value), min(limits["most"], (1 + off) * value)

@@ -112,3 +112,27 @@ def test_large_swings_lower_the_gain_at_once_only_with_sampled_positions_and_a_f
             told[name, sampled] = [gains.least_fraction, gains.most_falls]
     assert told.pop(("admittance-adaptive", True)) == [0.5, 3.0]
     assert set(map(tuple, told.values())) == {(0.35, 1.0)}
+
+
+@pytest.mark.parametrize(("mass", "rest_gain"), [(1.0, 45.0), (5.0, 45.0), (7.2, 37.5), (9.8, 45.0 / 1.4)])
+def test_a_head_heavier_than_five_kilograms_rests_with_less_gain(mass, rest_gain):
+    rig = RIG.replace({"mechanics.mass": mass})
+    told = {
+        gains: Constants(make_controller("admittance-adaptive", rig, **dict(gains)).law_stages(True)[0].constants).gains
+        for gains in ((), (("rest_gain", 50.0),))
+    }
+    assert told[()].rest_gain == pytest.approx(rest_gain, rel=1e-12)
+    assert told[(("rest_gain", 50.0),)].rest_gain == 50.0, "a gain that is asked for is what it has"
+    exact, forceless = make_controller("admittance-adaptive", rig), make_controller("admittance-sensorless", rig)
+    assert Constants(exact.law_stages(False)[0].constants).gains.rest_gain == 90.0
+    assert Constants(forceless.law_stages(True)[0].constants).gains.rest_gain == 45.0
+
+
+def test_a_known_heavy_head_hunts_less_with_the_gain_that_follows_its_mass():
+    rig = RIG.replace({"mechanics.mass": 9.0, "air.supply_pressure": 9e5})
+    hunting = {}
+    for name, gains in (("heavy", {}), ("light", {"rest_gain": 45.0})):
+        law = make_controller("admittance-adaptive", rig, **gains)
+        found = evaluate("BirthSIM/Probe-v2", law, name, 8, 60, progress=False, sensors="honest", parameters=rig).metrics
+        hunting[name] = np.median(np.fmax(found["hunting_x"], found["hunting_y"]))
+    assert hunting["heavy"] < 0.7 * hunting["light"], hunting
