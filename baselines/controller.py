@@ -1,6 +1,7 @@
 """What every controller looks like."""
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -24,6 +25,35 @@ class Controller(Protocol):
     def command(self, measurement: Measurement, reference: Reference) -> Array: ...
 
     def reset(self, lanes: Mask | None = None) -> None: ...
+
+
+Law = Callable[[Measurement, Reference], Array]
+"""A function as a control law: openings as ``Controller.command`` returns them."""
+
+
+class PlainLaw:
+    """A user's function of measurement and reference as a controller, which remembers nothing."""
+
+    def __init__(self, function: Law) -> None:
+        self.command = function
+
+    def reset(self, lanes: Mask | None = None) -> None:
+        """There is nothing to forget."""
+
+
+def controller_of(part: Any) -> Controller:
+    """A controller as it is, or a function of measurement and reference as one; ``ValueError`` for anything else."""
+    if inspect.isclass(part):
+        raise ValueError(f"controller = {part.__name__}, a class; allowed: an object of it, {part.__name__}(...)")
+    if callable(getattr(part, "command", None)) and callable(getattr(part, "reset", None)):
+        made: Controller = part
+        return made
+    if callable(part):
+        return PlainLaw(part)
+    raise ValueError(
+        f"controller = {shown(part)}; allowed: an object with command(measurement, reference) and reset(), or a function of "
+        "measurement and reference"
+    )
 
 
 def checked_command(name: str, command: Any, lanes: int) -> Array:

@@ -13,7 +13,7 @@ from baselines.about import RESIDUAL
 from baselines.admittance.controller import AdmittanceController
 from baselines.backstepping.cartesian_controller import CartesianBackstepping
 from baselines.backstepping.controller import BacksteppingController
-from baselines.controller import Controller, check_flags
+from baselines.controller import Controller, PlainLaw, check_flags
 from baselines.limiter.controller import PortLimiter
 from baselines.rivals import LinearQuadratic, NonlinearMPC, PositionPID, SlidingMode
 from baselines.uncontrolled import RandomValves, ShutValves, SlammedValves
@@ -156,7 +156,12 @@ def make_controller(name: str, parameters: Parameters, **options: Any) -> Contro
 
 def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Controller:
     """A controller of a user's own class; raises ``ValueError`` naming what it lacks, in one line."""
-    expected = "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset()"
+    expected = (
+        "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset(), or a "
+        "function of measurement and reference"
+    )
+    if inspect.isfunction(factory) and list(inspect.signature(factory).parameters)[:2] == ["measurement", "reference"]:
+        return PlainLaw(factory)
     try:
         own = factory(parameters, **options)
     except KeyboardInterrupt:

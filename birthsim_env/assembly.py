@@ -26,7 +26,7 @@ from birthsim_env.simulation import Simulation
 Randomize = bool | str | Mapping[str, tuple[float, float]]
 RENDER_MODES = ("human", "rgb_array")
 
-LONGEST, LONGEST_PERIOD = 3600.0, 10.0
+LONGEST, LONGEST_PERIOD = 3600.0, 1.0
 """s: the longest episode, and the longest time for which an action is held."""
 
 MOST_THREADS = 1024
@@ -52,7 +52,7 @@ def policy_periods(policy_period: float, parameters: Parameters) -> int:
     periods = round(policy_period / control) if is_within(policy_period, above=0.0, most=LONGEST_PERIOD) else 0
     if periods < 1 or abs(periods * control - policy_period) > 1e-9:
         raise ValueError(
-            f"policy_period = {shown(policy_period)}; allowed: a multiple of the control period {control:g} s up to "
+            f"policy_period = {shown(policy_period)} s; allowed: a multiple of the control period {control:g} s up to "
             f"{LONGEST_PERIOD:g} s"
         )
     return periods
@@ -66,6 +66,7 @@ class Setup:
     actuation: Actuation
     duration: float
     policy_period: float
+    clip_actions: bool
     title: str
     picture_size: tuple[int, int]
     single_observation_space: spaces.Box
@@ -93,13 +94,14 @@ def assemble(
     reference: Any = None,
     user_force: Any = None,
     stiffness: Any = None,
-    parameters: Parameters | str | Path | None = None,
+    parameters: Parameters | Mapping[str, Any] | str | Path | None = None,
     policy_period: float = 0.01,
     duration: float | None = None,
     actuation: Actuation | None = None,
     picture_size: tuple[int, int] = (640, 480),
     num_threads: int | None = None,
     force_sensor: bool = True,
+    clip_actions: bool = False,
     **unknown: Any,
 ) -> Setup:
     """See ``BirthSIMEnv`` for the arguments; raises ``ValueError`` naming the argument, its value and what is allowed, and
@@ -110,6 +112,7 @@ def assemble(
     one_of("valves", valves, VALVE_LAYOUTS)
     one_of("sensors", sensors, tuple(SENSORS))
     one_of("force_sensor", force_sensor, (True, False))
+    one_of("clip_actions", clip_actions, (True, False))
     if actuation is not None and not all(hasattr(actuation, name) for name in PROTOCOL):
         raise ValueError(f"actuation = {shown(actuation)}; allowed: None or an object with {', '.join(PROTOCOL)}")
     chosen = actuation or ACTUATIONS[one_of("action_mode", action_mode, tuple(ACTUATIONS))](valves)
@@ -151,6 +154,7 @@ def assemble(
         chosen,
         float(duration or table.duration),
         float(policy_period),
+        clip_actions,
         table.title,
         checked_size("picture_size", picture_size),
         spaces.Box(-limit, limit, (size,), np.float32),
@@ -179,8 +183,11 @@ def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Seque
         raise TypeError(f"got an unexpected keyword argument {', '.join(map(repr, wrong))}; allowed: {', '.join(known)}")
 
 
-def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong."""
+def checked_actions(actions: Any, num_envs: int, size: int, clip: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong.
+
+    Finite numbers beyond [-1, 1] are clipped where ``clip`` says so.
+    """
     try:
         array = np.asarray(actions, dtype=np.float64)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
@@ -194,7 +201,8 @@ def checked_actions(actions: Any, num_envs: int, size: int) -> np.ndarray[Any, n
     extreme = np.abs(columns).max(initial=0.0)
     if extreme <= 1.0:
         return columns
-    if not extreme <= 1.0 + ROUNDING:
+    if not (extreme <= 1.0 + ROUNDING or (clip and np.isfinite(extreme))):
         lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0 + ROUNDING))[0])
-        raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1")
+        clips = "" if clip else ", or any with clip_actions=True or gymnasium.wrappers.ClipAction"
+        raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1{clips}")
     return np.clip(columns, -1.0, 1.0)

@@ -8,9 +8,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.assembly import RENDER_MODES, assemble, one_of
 from birthsim_env.drawing.scene import Scene
 from birthsim_env.episodes import Episodes
+from birthsim_env.face import Face
 from birthsim_env.info import single_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.reward import REWARD_TERMS
@@ -19,7 +20,7 @@ from birthsim_env.state import State
 _ONE = np.ones(1, dtype=np.bool_)
 
 
-class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
+class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     """The haptic part of BirthSIM: two pneumatic cylinders move the end effector, the fetal head, in a vertical plane.
 
     ## Description
@@ -84,9 +85,10 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     scenario's end.
 
     ## Info
-    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`. The reward terms, which are
-    zero after `reset`. `is_success`: whether the settled error has been below 1 mm so far and the episode has not terminated.
-    The settled error is the root mean square distance from the compliant target, from 0.5 s after a jump on.
+    The true state in SI units, whatever the sensors: the fields of `birthsim_env.info.FIELDS`, as NumPy numbers and arrays. The
+    reward terms, which are zero after `reset`. `is_success`: whether the settled error has been below 1 mm so far and the
+    episode has not terminated. The settled error is the root mean square distance from the compliant target, from 0.5 s after
+    a jump on.
 
     ## Arguments
     - `action_mode`, `valves`: see above.
@@ -104,9 +106,12 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
       that returns (Fx, Fy) in N; a CSV file of time, Fx, Fy; or `"file.py:Name"`. Or the name of a hand of the package:
       `"steps"`, or one that never stops moving: `"sine"`, `"noise"` and `"guided"`. The guided hand has mass, damper and
       spring, and holds the end effector.
-    - `stiffness`: a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which `reference` takes too.
-    - `parameters`: a `Parameters`, or the path of a TOML file that describes your rig.
-    - `policy_period` in s, a multiple of the control period of 1 ms; `duration` in s, rounded to whole policy steps.
+    - `stiffness`: a number (N/m), a `StiffnessSchedule` of your own, or a CSV file of time, x, y, stiffness (N/m), which
+      `reference` takes too. A CSV file's heading names its columns; `"file.csv:t,a,b"` says how others are called.
+    - `parameters`: a `Parameters`, the path of a TOML file that describes your rig, or what such a file holds:
+      `{"mechanics": {"mass": 4.0}}`.
+    - `policy_period` in s, a multiple of the control period of 1 ms up to 1 s; `duration` in s, rounded to whole policy steps.
+    - `clip_actions`: `True` clips actions beyond [-1, 1] instead of refusing them.
     - `num_threads`: how many threads share the lanes of a vector environment. The number changes no bit. Default: one in a
       single environment, else all processors, at most `OMP_NUM_THREADS`.
     - `actuation`: an object of your own between action and valves (`birthsim_env.parts.actuation.Actuation`) instead of a mode.
@@ -138,7 +143,7 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self.simulation = setup.simulation
         # A recorder takes a frame per step.
         self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
-        self._steps = setup.steps
+        self._setup, self.steps = setup, setup.steps
         self._episodes = Episodes(setup)
 
     @property
@@ -170,21 +175,24 @@ class BirthSIMEnv(gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(_ONE, options)
         self._render_human()
-        info = {**single_info(self._episodes.describe()), **dict.fromkeys(REWARD_TERMS, 0.0), "is_success": False}
+        info = {
+            **single_info(self._episodes.describe()),
+            **dict.fromkeys(REWARD_TERMS, np.float64(0.0)),
+            "is_success": np.bool_(False),
+        }
         return self._episodes.observation()[0], info
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""
         episodes = self._episodes
-        paid, failed = episodes.step(checked_actions([action], 1, episodes.action_size))
+        paid, failed = episodes.step(self._checked([action], 1))
         terminated = bool(failed[0])
-        truncated = not terminated and bool(episodes.elapsed[0] >= self._steps)
+        truncated = not terminated and bool(episodes.elapsed[0] >= self.steps)
         info: dict[str, Any] = single_info(episodes.describe())
-        *terms, reward = paid[:, 0].tolist()
-        info.update(zip(REWARD_TERMS, terms, strict=True))
-        info["is_success"] = bool(episodes.success[0])
+        info.update(zip(REWARD_TERMS, paid[:-1, 0], strict=True))
+        info["is_success"] = episodes.success[0]
         self._render_human()
-        return episodes.observation()[0], reward, terminated, truncated, info
+        return episodes.observation()[0], float(paid[-1, 0]), terminated, truncated, info
 
     def get_state(self) -> State:
         """All that the future depends on, as arrays by name: see ``BirthSIMVectorEnv.get_state``."""

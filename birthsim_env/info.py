@@ -1,5 +1,7 @@
 """The ``info`` of the environments: the true state of the rig and its task in SI units."""
 
+import numpy as np
+
 from birthsim_env.loop.rows import Signals, World
 from birthsim_env.loop.signals import compliance
 from birthsim_env.physics import control_model, dynamics
@@ -84,8 +86,7 @@ def vector_info(rows: Array) -> dict[str, Array]:
     return {name: rows[place].T for name, place in _PLACES.items()}
 
 
-def single_info(rows: Array) -> dict[str, float | Array]:
-    """Name -> number or array (size,) of the first lane."""
+def single_info(rows: Array) -> dict[str, np.float64 | Array]:
+    """Name -> NumPy number or array (size,) of the first lane."""
     column = rows[:, 0]
-    values = column.tolist()
-    return {name: values[place] if isinstance(place, int) else column[place] for name, place in _PLACES.items()}
+    return {name: column[place] for name, place in _PLACES.items()}

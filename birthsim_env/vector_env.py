@@ -7,8 +7,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import RENDER_MODES, assemble, checked_actions, one_of
+from birthsim_env.assembly import RENDER_MODES, assemble, one_of
 from birthsim_env.episodes import Episodes
+from birthsim_env.face import Face
 from birthsim_env.info import vector_info
 from birthsim_env.loop.signals import Measurement, Reference
 from birthsim_env.physics.compiled.lanes import Array
@@ -20,7 +21,7 @@ from birthsim_env.state import State
 Observations = NDArray[np.float32]
 
 
-class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
+class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
     """``num_envs`` lanes of a scenario, made by ``gymnasium.make_vec(id, num_envs=N)``.
 
     A lane is one rig. Actions, observations, rewards, arguments and episode ends are those of ``BirthSIMEnv``, per lane; arrays
@@ -66,8 +67,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_names = setup.observation_names
         self.simulation = setup.simulation
-        self.steps = min(setup.steps, max_episode_steps or setup.steps)
-        """Policy steps of an episode that nothing ends early."""
+        self._setup, self.steps = setup, min(setup.steps, max_episode_steps or setup.steps)
         self._episodes = Episodes(setup)
         self._ended: NDArray[np.bool_] = np.zeros(self.num_envs, dtype=np.bool_)
 
@@ -120,7 +120,7 @@ class BirthSIMVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             raise ValueError(
                 f"lanes {np.flatnonzero(self._ended).tolist()} have ended; allowed: reset(options={{'reset_mask': ...}})"
             )
-        paid, terminated = episodes.step(checked_actions(actions, self.num_envs, episodes.action_size))
+        paid, terminated = episodes.step(self._checked(actions, self.num_envs))
         if self._ended.any():
             # They have begun when they ended, so that nothing that is lost is integrated further; their first step is undone.
             episodes.begin(self._ended, again=True)

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ from birthsim_env.physics.rig.parameters import Parameters, load_parameters
 
 def run(settings: Settings) -> None:
     """Train every seed and report."""
+    missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
+    if missing:
+        raise ValueError(f"no {' and no '.join(missing)}; training needs the extra: pip install 'birthsim[agents]'")
     training, residual = _settings(settings)
     rig = load_parameters(settings.parameters)
     for name, hand in training.worlds():
@@ -60,11 +64,8 @@ def _settings(settings: Settings) -> tuple[TrainingSettings, ResidualSettings]:
 def _one(
     settings: TrainingSettings, residual: ResidualSettings, folder: Path, rig: Parameters, position: int
 ) -> dict[str, Any]:
-    try:
-        # Stable-Baselines3 and torch take three seconds to load and come with the extra "agents" only.
-        from agents.training.trainer import train
-    except ImportError as error:
-        raise ValueError(f"{error}; training needs the extra: pip install 'birthsim[agents]'") from error
+    from agents.training.trainer import train  # Stable-Baselines3 and torch take three seconds to load
+
     with own_folder(folder):
         reached = train(settings, residual, folder, rig, position)
         write_json(folder / "training.json", reached)

@@ -12,6 +12,7 @@ from baselines.bench.evaluation import Evaluation
 from baselines.bench.metrics import UNITS
 from baselines.bench.statistics import LOST_ERROR, crossed_interval, interquartile_mean, jsonable, penalize_lost, quantile
 from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.physics.rig.values import near
 
 SHIPPED = Path(__file__).resolve().parent.parent / "policies"
 """Trained policies that come with the package, a folder per configuration and in it one per seed."""
@@ -43,8 +44,8 @@ def policy_folders(path: str | Path) -> list[Path]:
     )
     if not found:
         raise ValueError(
-            f"policy = {str(path)!r} holds no policy; allowed: a folder that birthsim train wrote, "
-            f"or {', '.join(shipped_names())}"
+            f"policy = {str(path)!r} holds no policy{near(str(path), shipped_names())}; "
+            f"allowed: a folder that birthsim train wrote, or {', '.join(shipped_names())}"
         )
     return found
 

@@ -14,7 +14,7 @@ from baselines.bench.feasibility import required_strength_ratio
 from baselines.bench.measures import DISCOUNTS, Measures
 from baselines.bench.metrics import UNITS, figures_of
 from baselines.bench.statistics import jsonable, number, penalize_lost, summarize
-from baselines.controller import Controller
+from baselines.controller import Controller, Law, controller_of
 from baselines.staged import driving
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.rig.parameters import load_parameters
@@ -69,9 +69,10 @@ class Evaluation:
 
 
 def evaluate(
-    environment: str, controller: Controller, name: str, episodes: int, seed: int, progress: bool = True, **arguments: Any
+    environment: str, controller: Controller | Law, name: str, episodes: int, seed: int, progress: bool = True, **arguments: Any
 ) -> Evaluation:
-    """Run ``episodes`` episodes of a registered id under a controller, which commands at every control period.
+    """Run ``episodes`` episodes of a registered id under a controller, or a function of measurement and reference, which
+    commands at every control period.
 
     The episodes have the seeds seed, seed + 1, and so on. ``arguments`` go to the environment. An episode that terminates is
     lost: ``metrics`` holds its figures up to that moment, ``summary`` counts them as infinite. After an interrupt (Ctrl-C) the
@@ -83,17 +84,19 @@ def evaluate(
 
 
 def evaluate_worlds(
-    environment: str, controller: Controller, name: str, seeds: Sequence[int], rigs: Array | None, progress: bool = True,
+    environment: str, controller: Controller | Law, name: str, seeds: Sequence[int], rigs: Array | None, progress: bool = True,
     **arguments: Any,
 ) -> Evaluation:  # fmt: skip
     """``evaluate`` in the worlds of ``seeds``; ``rigs`` (PARAMETERS, len(seeds)) are theirs where ``randomize`` draws none."""
-    result = Evaluation(name)
+    result, law, first = Evaluation(name), controller_of(controller), 0
     spent: list[float] = []
     try:
-        for first in range(0, len(seeds), LANES):
-            own = slice(first, first + LANES)
+        while first < len(seeds):
+            # Of four lanes (4, N) openings could be (N, 4) ones, and nobody would see it.
+            own = slice(first, first + (3 if min(LANES, len(seeds) - first) == 4 else LANES))
             lanes = None if rigs is None else rigs[:, own]
-            _run_batch(environment, controller, list(seeds[own]), lanes, arguments, result, spent, progress)
+            _run_batch(environment, law, list(seeds[own]), lanes, arguments, result, spent, progress)
+            first = own.stop
     except KeyboardInterrupt:
         if not result.seeds:
             raise

@@ -123,8 +123,8 @@ class Parts(Configured):
         str | None,
         Parameter(
             group=WORLD, metavar="PART",
-            help="A CSV file of time, x, y (s, m, m), or path/to/file.py:Name of a birthsim_env.Trajectory or of a function of "
-            "time that returns (x, y).",
+            help="A CSV file of time, x, y (s, m, m), FILE:t,a,b where its heading calls them so, or path/to/file.py:Name of a "
+            "birthsim_env.Trajectory or of a function of time that returns (x, y).",
         ),
     ] = None  # fmt: skip
     stiffness: Annotated[str | None, Parameter(group=WORLD, metavar="FILE")] = None

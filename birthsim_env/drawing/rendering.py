@@ -10,6 +10,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +20,9 @@ from birthsim_env.physics.rig.values import shown
 
 if TYPE_CHECKING:
     import pygame
+
+UNSEEN = ("dummy", "offscreen")
+"""SDL's drivers that show nothing, which it takes where it finds no display."""
 
 __all__ = ["PairRenderer", "Renderer", "Scene"]
 
@@ -91,6 +95,8 @@ class Renderer:
         if self._window is None or self._clock is None:
             pygame.display.init()
             self._window = pygame.display.set_mode((self.width, self.height))
+            if "SDL_VIDEODRIVER" not in os.environ and pygame.display.get_driver() in UNSEEN:
+                gymnasium.logger.warn("render_mode = 'human', but there is no display; allowed without one: 'rgb_array'")
             pygame.display.set_caption("BirthSIM")
             self._clock = pygame.time.Clock()
         self._picture.draw(scene)

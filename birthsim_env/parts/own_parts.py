@@ -1,9 +1,7 @@
 """Parts of a user's own: classes and functions in Python files, plain functions of time, and CSV files."""
 
-import csv
 import importlib.util
 import inspect
-import io
 import math
 import sys
 from collections.abc import Callable
@@ -14,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from birthsim_env.loop.signals import Motion
+from birthsim_env.parts.columns import columns, csv_file
 from birthsim_env.parts.hands.moving_hands import HANDS
 from birthsim_env.parts.hands.user_forces import ForceProfile, UserForce
 from birthsim_env.parts.references import Trajectory
 from birthsim_env.parts.stiffness_schedules import StiffnessSchedule
 from birthsim_env.physics.compiled.compilation import kernel
 from birthsim_env.physics.compiled.lanes import Array
-from birthsim_env.physics.rig.reading import read
-from birthsim_env.physics.rig.values import problem, shown
+from birthsim_env.physics.rig.values import is_finite, problem, shown
 
-LARGEST_CSV = 64 * 2**20
-"""Bytes of a file of numbers; an hour at 1 kHz takes them."""
+COURSE = {"time": "s", "x": "m", "y": "m", "stiffness": "N/m"}
+FORCE = {"time": "s", "Fx": "N", "Fy": "N"}
+"""Columns of a user's CSV files, with their units."""
 
 GRID = 0.01
 """s between the instants at which a function of time is taken; a spline of degree 5 runs through them."""
@@ -58,35 +57,6 @@ def from_file(kind: str, text: str) -> Any:
             f"{kind} file {str(path)!r} has no {attribute!r}; allowed: a name that it defines: {', '.join(names)[:400]}"
         )
     return getattr(module, attribute)
-
-
-def _numbers(kind: str, path: Path, columns: str, widths: tuple[int, ...] = (3,)) -> Array:
-    """The lines (M, C) of a CSV file, less a heading; each has the first line's number of numbers, one of ``widths``."""
-    rows: list[list[float]] = []
-    expected = f"allowed: lines of {columns}, with increasing times"
-    try:
-        text = read(kind, path, LARGEST_CSV).decode("utf-8-sig")
-        for number, line in enumerate(csv.reader(io.StringIO(text, newline="")), start=1):
-            if not line or not "".join(line).strip() or line[0].lstrip().startswith("#"):
-                continue
-            try:
-                row = [float(value) for value in line]
-            except ValueError:
-                if not rows and number == 1:
-                    continue  # the heading
-                row = []
-            if (
-                len(row) not in (widths if not rows else (len(rows[0]),))
-                or not all(map(math.isfinite, row))
-                or (rows and row[0] <= rows[-1][0])
-            ):
-                raise ValueError(f"{kind} = {str(path)!r}, line {number}: {shown(','.join(line))}; {expected}")
-            rows.append(row)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{kind} = {str(path)!r} is no CSV ({problem(error)}); {expected}") from error
-    if len(rows) < 2:
-        raise ValueError(f"{kind} = {str(path)!r} has {len(rows)} lines of numbers; {expected}, at least 2")
-    return np.array(rows)
 
 
 @kernel
@@ -220,9 +190,9 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
     Raises ``ValueError`` in one line for what is none of the kinds that ``BirthSIMEnv`` lists.
     """
     expected = "a birthsim_env.Trajectory, a function of time (s) that returns (x, y) in m, file.csv or file.py:Name"
-    if isinstance(reference, (str, Path)) and Path(reference).suffix.lower() == ".csv":
-        rows = _numbers("reference", Path(reference), "time, x, y (s, m, m), with or without stiffness (N/m)", (3, 4))
-        return Through(rows[:, 0], rows[:, 1:3])
+    if file := csv_file(reference):
+        rows = columns("reference", file, COURSE, ("time", "x", "y"))
+        return Through(rows[:, 0], rows[:, 1:])
     reference = _made("reference", reference, Trajectory, expected)
     if isinstance(reference, Trajectory):
         return reference
@@ -234,15 +204,18 @@ def trajectory_of(reference: Any, duration: float) -> Trajectory:
 def stiffness_of(stiffness: Any) -> StiffnessSchedule:
     """What the environments' argument ``stiffness`` says, as a ``StiffnessSchedule``.
 
-    Raises ``ValueError`` in one line for what is neither such a schedule nor a CSV file of time, x, y, stiffness.
+    Raises ``ValueError`` in one line for what is none of these: such a schedule, a number (N/m, of both axes for all time), a
+    CSV file of time, x, y, stiffness.
     """
-    if isinstance(stiffness, (str, Path)) and Path(stiffness).suffix.lower() == ".csv":
-        rows = _numbers("stiffness", Path(stiffness), "time, x, y, stiffness (s, m, m, N/m)", (4,))
-        return stepped(rows[:, 0], rows[:, 3])
+    if file := csv_file(stiffness):
+        rows = columns("stiffness", file, COURSE, ("time", "stiffness"))
+        return stepped(rows[:, 0], rows[:, 1])
+    if is_finite(stiffness):
+        return StiffnessSchedule(closed_loop=(float(stiffness),))
     if not isinstance(stiffness, StiffnessSchedule):
         raise ValueError(
-            f"stiffness = {shown(stiffness)}; allowed: None or a birthsim_env.StiffnessSchedule, or file.csv of time, x, y, "
-            "stiffness"
+            f"stiffness = {shown(stiffness)}; allowed: None, a number (N/m), a birthsim_env.StiffnessSchedule, or file.csv of "
+            "time, x, y, stiffness"
         )
     return stiffness
 
@@ -256,8 +229,8 @@ def hand_of(user_force: Any, varied: bool) -> UserForce:
     expected = f"a birthsim_env.UserForce, {', '.join(map(repr, HANDS))}, {PlainHand.EXPECTED}, file.csv or file.py:Name"
     if isinstance(user_force, (str, Path)) and str(user_force) in HANDS:
         return HANDS[str(user_force)][varied]()
-    if isinstance(user_force, (str, Path)) and Path(user_force).suffix.lower() == ".csv":
-        rows = _numbers("user_force", Path(user_force), "time, Fx, Fy (s, N, N)")
+    if file := csv_file(user_force):
+        rows = columns("user_force", file, FORCE, tuple(FORCE))
         return ForceProfile([(float(t), float(x), float(y)) for t, x, y in rows])
     user_force = _made("user_force", user_force, UserForce, expected)
     return user_force if isinstance(user_force, UserForce) else PlainHand(user_force)

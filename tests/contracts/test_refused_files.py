@@ -86,8 +86,8 @@ TABLE = {
     ],
     ("reference", "own.csv"): [
         (None, "", "reference = '", "own.csv' cannot be read: ", "; allowed: a file"),
-        ("t,x,y\n0,0.5,0\n0,0.5,0\n", "", "own.csv', line 3: '0,0.5,0'; allowed: lines of time, x, y ", CSV),
-        ("t,x,y\na,b,c\n", "", "own.csv', line 2: 'a,b,c'; allowed"),
+        ("time,x,y\n0,0.5,0\n0,0.5,0\n", "", "own.csv', line 3: '0,0.5,0'; allowed: lines of time (s), x (m), y (m)", CSV),
+        ("t,x,y\n0,0.5,0\n", "", "own.csv', line 1: 't,x,y' names 'time' 0 times; allowed"),
         ("0,0.5,0\n", "", "own.csv' has 1 lines of numbers; allowed: ", "at least 2"),
     ],
     ("reference", "plain"): [(None, "", "reference = '", "plain'; allowed: a birthsim_env.Trajectory")],

@@ -1,6 +1,7 @@
 """The rig as data: a frozen, validated dataclass of sections, what they must fulfil together, and its TOML file."""
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -201,19 +202,24 @@ def field_of(dotted: str) -> dataclasses.Field[Any]:
     """The field behind a dotted name such as ``"mechanics.mass"``; ``ValueError`` names the alternatives."""
     section, _, name = dotted.partition(".")
     if section not in _SECTIONS:
-        raise ValueError(f"unknown parameter section {shown(section)}; allowed: {', '.join(_SECTIONS)}")
+        like = [f"{one}.{dotted}" for one, part in _SECTIONS.items() if hasattr(part, dotted)]
+        asked = f" (did you mean {' or '.join(map(repr, like))}?)" if like else ""
+        raise ValueError(f"unknown parameter section {shown(section)}{asked}; allowed: {', '.join(_SECTIONS)}")
     fields = {field.name: field for field in dataclasses.fields(_SECTIONS[section])}  # type: ignore[arg-type]
     if name not in fields:
         raise ValueError(f"unknown parameter {shown(dotted)}; allowed in {section}: {', '.join(fields)}")
     return fields[name]
 
 
-def load_parameters(parameters: Parameters | str | Path | None) -> Parameters:
-    """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters`` or the path of a TOML file."""
+def load_parameters(parameters: Parameters | Mapping[str, Any] | str | Path | None) -> Parameters:
+    """What ``parameters=`` accepts everywhere: nothing (defaults), a ``Parameters``, the path of a TOML file, or what such a
+    file holds as a mapping: ``{"mechanics": {"mass": 4.0}}``."""
     if parameters is None:
         return Parameters()
     if isinstance(parameters, Parameters):
         return parameters
     if isinstance(parameters, (str, Path)):
         return Parameters.from_toml(parameters)
-    raise ValueError(f"parameters = {shown(parameters)}; allowed: None, a Parameters or the path of a TOML file")
+    if isinstance(parameters, Mapping):
+        return Parameters.from_dict(dict(parameters))
+    raise ValueError(f"parameters = {shown(parameters)}; allowed: None, a Parameters, a mapping or the path of a TOML file")
