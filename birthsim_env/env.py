@@ -175,11 +175,8 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(_ONE, options)
         self._render_human()
-        info = {
-            **single_info(self._episodes.describe()),
-            **dict.fromkeys(REWARD_TERMS, np.float64(0.0)),
-            "is_success": np.bool_(False),
-        }
+        terms = dict.fromkeys(REWARD_TERMS, np.float64(0.0))
+        info = {**single_info(self._episodes.describe()), **terms, "is_success": False}
         return self._episodes.observation()[0], info
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -190,7 +187,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         truncated = not terminated and bool(episodes.elapsed[0] >= self.steps)
         info: dict[str, Any] = single_info(episodes.describe())
         info.update(zip(REWARD_TERMS, paid[:-1, 0], strict=True))
-        info["is_success"] = episodes.success[0]
+        info["is_success"] = bool(episodes.success[0])
         self._render_human()
         return episodes.observation()[0], float(paid[-1, 0]), terminated, truncated, info
 
