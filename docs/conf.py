@@ -13,6 +13,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE)]
 import _generate  # noqa: E402
 from _generate import notebooks  # noqa: E402
 from _generate.figure import figure_role  # noqa: E402
+from _generate.landing import install_role, rig_role  # noqa: E402
 
 import birthsim_env  # noqa: E402
 from birthsim_live.rig.folder import packed_page, write_page  # noqa: E402
@@ -48,6 +49,18 @@ mathjax_path = MATHJAX.name
 
 html_theme = "furo"
 html_title = "BirthSIM"
+html_favicon = html_logo = str(HERE.parent / "birthsim_live" / "page" / "icon.svg")
+REPOSITORY = notebooks.repository()
+html_baseurl = f"https://{REPOSITORY.replace(chr(47), '.github.io/')}/" if REPOSITORY else ""
+html_theme_options = (
+    {
+        "footer_icons": [
+            {"name": "Repository", "url": f"https://github.com/{REPOSITORY}", "html": "Repository on GitHub", "class": ""}
+        ]
+    }
+    if REPOSITORY
+    else {}
+)
 html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
 html_js_files = ["access.js", "tables.js", "data.js"]
@@ -74,19 +87,18 @@ def with_data(app, page, template, context, doctree):
             app.add_js_file(None, body=file.read_text(encoding="utf-8"), type="text/csv", title=file.name)
 
 
-RIG = """<h2>Pull the head</h2>
-<iframe class="rig" src="rig/index.html?controller=backstepping" title="The rig in the browser" loading="lazy"></iframe>
-<p>The rig runs here, in your browser. <a class="reference external" href="rig/index.html">Open it in a window of its own</a>.
-A page that is opened from a disk cannot run it; <code>python -m http.server --directory out/docs</code> serves the site.</p>
-"""
-FIRST = '<section id="three-ways-in">'
-
-
-def with_rig(app, page, template, context, doctree):
-    """The landing page shows the rig itself."""
-    if page == "index":
-        assert FIRST in context["body"], f"docs/index.md has no {FIRST}"
-        context["body"] = context["body"].replace(FIRST, RIG + FIRST)
+def with_card(app, page, template, context, doctree):
+    """Pictures load when they come into sight, and a page that is shared shows the rig."""
+    body = context.get("body", "")
+    context["body"] = body.replace("<img ", '<img loading="lazy" ')
+    address = html_baseurl or "../" * page.count("/")
+    context["metatags"] = (
+        context.get("metatags", "")
+        + f"""
+<meta property="og:title" content="{context.get("title", project)} · BirthSIM">
+<meta property="og:description" content="A fetal head on two air cylinders: pull it, and compare its controllers.">
+<meta property="og:image" content="{address}rig/card.png"><meta name="twitter:card" content="summary_large_image">"""
+    )
 
 
 def with_notebook(app, page, template, context, doctree):
@@ -111,10 +123,11 @@ def build_rig(app, exception):
 
 def setup(app):
     """Write the generated parts before any page is read."""
-    app.add_role("figure", figure_role)
+    for name, role in {"figure": figure_role, "install": install_role, "rig": rig_role}.items():
+        app.add_role(name, role)
     app.connect("source-read", seen_from_the_site)
     app.connect("html-page-context", with_data)
-    app.connect("html-page-context", with_rig)
+    app.connect("html-page-context", with_card)
     app.connect("html-page-context", with_notebook)
     app.connect("build-finished", build_rig)
     app.connect("build-finished", build_notebooks)

@@ -46,7 +46,10 @@ export class Drag {
     const { hand, enabled } = this.rig;
     if (event.button !== 0 || !hand.free() || !enabled()) return;
     const offset = this.reach(event, event.pointerType !== "mouse");
-    if (!offset) return;
+    if (!offset) {
+      this.rig.scene.cue = true; // who has missed the head is shown it
+      return;
+    }
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.classList.add("dragging");
     this.pointer = event.pointerId;

@@ -1,6 +1,7 @@
 // Files of what is shown: numbers, a picture, and recordings that are opened by choice or dropped on the page.
 
 import { SECOND, UNITS } from "./curves.js";
+import { filmOf } from "./film.js";
 import { pictureOf } from "./picture.js";
 
 const byId = (id) => document.getElementById(id);
@@ -23,8 +24,8 @@ function save(content, name) {
 }
 
 export class Files {
-  /** `plots` are those of the page, `open(file)` plays a recording. */
-  constructor({ plots, open }) {
+  /** `plots` are those of the page, `open(file)` plays a recording, `tell(words)` says what happened. */
+  constructor({ plots, open, tell }) {
     const menu = byId("files");
     const opener = document.querySelector("[popovertarget=files]");
     menu.addEventListener("toggle", ({ newState }) => {
@@ -34,10 +35,22 @@ export class Files {
       menu.style.top = `${bottom + 4}px`;
     });
     const act = (id, doing) =>
-      byId(id).addEventListener("click", () => {
+      byId(id).addEventListener("click", async () => {
         menu.hidePopover();
-        doing();
+        try {
+          await doing();
+        } catch ({ message }) {
+          tell(message);
+        }
       });
+    act("copy-link", async () => {
+      await navigator.clipboard.writeText(location.href);
+      tell(`Copied: ${location.href}`);
+    });
+    act("save-film", async () => {
+      tell("Filming for 5 s: pull the head.");
+      save(await filmOf(document.querySelector(".view")), "birthsim.webm");
+    });
     act("save-csv", () => save(new Blob([csvOf(plots.shown.history)], { type: "text/csv" }), "birthsim.csv"));
     act("save-png", async () => {
       plots.redraw();

@@ -1,38 +1,44 @@
-// Five things to try: settings, two sentences, and where to look.
+// Things to try, one after the other: settings, two sentences, and where to look.
 
 const LESSONS = [
   {
     name: "Feel the friction",
-    says: "Pull the head and hold it. This is the paper's law: dry friction keeps the dot short of the diamond, and the hand feels more stiffness than was asked for.",
+    says: "Compressed air carries the head of a childbirth simulator, and a controller should make it feel like a spring. Pull it and hold: friction makes it shake by millimetres.",
     settings: {},
-    look: ".felt",
+    look: ".lens",
+  },
+  {
+    name: "Take the friction away",
+    says: "Now the pistons slide freely, but the controller still pushes against the friction that it believes in: the head swings by a centimetre. Nobody knows friction exactly.",
+    settings: { friction: 0 },
+    look: "[data-figure=error]",
   },
   {
     name: "Halve the stiffness",
     says: "Pull as hard as before: the head gives way twice as far. The rendered stiffness settles near 1000 N/m.",
     settings: { Kclx: 1000, Kcly: 1000 },
-    look: "[data-plot='rendered stiffness']",
+    look: ".felt",
   },
   {
     name: "What the force sensor buys",
-    says: "The first law measures the hand's force and moves the rig to where the spring would be; the second is the paper's. Pull either head: only the first dot stays on its diamond.",
+    says: "The first controller measures the hand's force and moves the head to where the spring would be; the second is the paper's. Pull either head: only the first dot stays on its diamond.",
     settings: { controller: "admittance-backstepping", compare: "backstepping" },
     look: ".rigs",
   },
   {
     name: "What learning adds",
-    says: "Both rigs are heavier and rougher than their law believes. A trained policy corrects the first; the paper's law alone errs about four times as much.",
+    says: "Both rigs are heavier and rougher than their controllers believe. A trained policy corrects the first; the paper's controller alone errs about four times as much.",
     settings: { scenario: "circle", controller: "residual:circle", compare: "backstepping", scenario_force: true, mass: 4, friction: 1.5 },
-    look: "[data-plot='error']",
+    look: ".second figcaption",
   },
   {
     name: "Forceps pull",
-    says: "Pulls of 175 N act on the head, as in a forceps delivery. The law holds it with 4000 N/m; pull along and feel how far that gives way.",
+    says: "Pulls of 175 N act on the head, as in a forceps delivery. The controller holds it with 4000 N/m; pull along and feel how far that gives way.",
     settings: { scenario: "forceps", controller: "admittance-backstepping", scenario_force: true },
-    look: "[data-plot='user force']",
+    look: "[data-figure='user force']",
   },
 ];
-const OWN = { name: "Your own settings", says: "Pull the head: the difference between dot and diamond is the error.", look: ".felt" };
+const OWN = { name: "Your own settings", says: "Pull the head: the difference between dot and diamond is the error.", look: ".lens" };
 
 const BASE = ["scenario", "controller", "compare", "valves", "sensors", "scenario_force", "damping", "mass", "friction"];
 

@@ -2,11 +2,13 @@
 
 import { STIFFNESSES } from "./worker/settings.js";
 
+export const EMBED = "embed"; // what an address says of the page itself
 const GAP = 500; // ms between changes of the address; browsers allow a hundred in half a minute
 
 /** The settings that an address asks for; what is no setting, or cannot be read as one, is refused by the rig, by name. */
 export function settingsIn(search, defaults) {
-  return Object.fromEntries([...new URLSearchParams(search)].map(([name, text]) => [name, read(text, typeof defaults[name])]));
+  const asked = [...new URLSearchParams(search)].filter(([name]) => name !== EMBED);
+  return Object.fromEntries(asked.map(([name, text]) => [name, read(text, typeof defaults[name])]));
 }
 
 /** A value of a type; the text itself where it is none. */
@@ -20,8 +22,9 @@ function read(text, type) {
 function searchOf(settings, defaults) {
   const given = settings.stiffness_source === "scenario" ? STIFFNESSES : [];
   const names = Object.keys(defaults).filter((name) => settings[name] !== defaults[name] && !given.includes(name));
-  const search = new URLSearchParams(names.map((name) => [name, settings[name]]));
-  return names.length ? `?${search}` : "";
+  const kept = new URLSearchParams(location.search).has(EMBED) ? [[EMBED, "1"]] : [];
+  const all = [...kept, ...names.map((name) => [name, settings[name]])];
+  return all.length ? `?${new URLSearchParams(all)}` : "";
 }
 
 export class Link {
@@ -39,6 +42,6 @@ export class Link {
   write() {
     this.timer = null;
     const search = searchOf(this.settings, this.defaults);
-    if (search !== location.search) history.replaceState(null, "", location.pathname + search);
+    if (search !== location.search) history.replaceState(null, "", location.pathname + search + location.hash);
   }
 }

@@ -1,4 +1,4 @@
-// The error, large: the end effector seen from the compliant target, which stands in the middle (birthsim_env/drawing/panel.py).
+// The lens: the error, large. The end effector is seen from the compliant target, which stands in the middle.
 // Two rigs share the picture: each head is seen from its own compliant target, so that their errors can be compared.
 
 import * as pen from "./pen.js";
@@ -6,9 +6,10 @@ import { Axis, Pen, finite } from "./pen.js";
 import { Sheet } from "./sheet.js";
 import { Trail } from "./trail.js";
 
-const WINDOWS = [0.02, 0.04, 0.08, 0.16]; // widths the magnifier may show, m
+const WINDOWS = [0.01, 0.02, 0.04, 0.08, 0.16]; // widths the lens may show, m
 const EDGE = 0.42; // of the width: so far from the middle is the end effector still well inside
-const CALM = 0.3; // of the next smaller width: as near must it be for that to be shown
+const MOST = 0.8; // of the errors
+const RIM = 3; // px
 
 const rigsOf = (frame) => (frame.second ? [frame, frame.second] : [frame]);
 const errorOf = ({ position, compliant }) => [0, 1].map((k) => position[k] - compliant[k]);
@@ -21,7 +22,7 @@ export class Magnifier {
     this.times = "";
     this.window = WINDOWS[0];
     this.trails = [new Trail(), new Trail()];
-    this.sheet = new Sheet(canvas, { opaque: true });
+    this.sheet = new Sheet(canvas);
   }
 
   setPath(points) {
@@ -33,20 +34,35 @@ export class Magnifier {
     rigsOf(frame).forEach((one, k) => this.trails[k].push(frame.time, errorOf(one)));
   }
 
-  /** The window grows at once, and shrinks only where the errors fit well: else it would flap. */
+  /** The window holds most errors of as long as the trail lasts: a jump of the hand leaves it, and comes back. */
   fit(frame) {
-    const offset = Math.max(...rigsOf(frame).flatMap(errorOf).map(Math.abs).filter(Number.isFinite), 0);
-    const least = WINDOWS.find((window) => offset <= EDGE * window) ?? WINDOWS.at(-1);
-    const calm = WINDOWS.find((window) => offset <= CALM * window) ?? WINDOWS.at(-1);
-    this.window = Math.max(least, Math.min(this.window, calm));
+    const offset = Math.max(...rigsOf(frame).map((_, k) => this.trails[k].reach(MOST)));
+    this.window = WINDOWS.find((window) => offset <= EDGE * window) ?? WINDOWS.at(-1);
   }
 
-  /** `mainScale` is that of the main view, px/m. */
-  draw(frame, mainScale) {
+  /** `mainScale` is that of the main view, px/m; `means` are what is written of the rigs (means.js). */
+  draw(frame, mainScale, means) {
     this.sheet.check();
     this.fit(frame);
     const { width, height, context } = this.sheet;
     if (!width) return;
+    context.clearRect(0, 0, width, height);
+    context.save();
+    const round = () => {
+      context.beginPath();
+      context.arc(width / 2, height / 2, Math.min(width, height) / 2 - RIM / 2, 0, 2 * Math.PI);
+    };
+    round();
+    context.clip();
+    this.drawInside(frame, mainScale, means);
+    context.restore();
+    round();
+    Object.assign(context, { strokeStyle: pen.CAP, lineWidth: RIM });
+    context.stroke();
+  }
+
+  drawInside(frame, mainScale, means) {
+    const { width, height, context } = this.sheet;
     const { target, compliant, position, second } = frame;
     const { window } = this;
     const centre = [compliant, position, target].find(finite) ?? [0, 0];
@@ -71,11 +87,13 @@ export class Magnifier {
       this.pointOut(world, centre, place, colour);
     }
     this.drawScale(world, step);
-    rigsOf(frame).forEach(({ error_mm: error }, k) => {
+    rigsOf(frame).forEach((_, k) => {
+      const error = means[k]?.error_mm;
       if (!Number.isFinite(error)) return;
-      world.text(`error ${error.toFixed(1)} mm`, [width - 8, 14 + 16 * k], { align: "right", colour: [pen.FORCE, beside][k], weight: 700 });
+      const look = { colour: [pen.FORCE, beside][k], weight: 700, size: Math.max(12, 0.06 * width) };
+      world.text(`error ${error.toFixed(2)} mm`, [width / 2, 0.14 * height + 1.25 * look.size * k], look);
     });
-    this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
+    this.name(`${(scale / mainScale).toFixed(0)} times`);
   }
 
   drawDashed(world, points, colour) {
@@ -102,22 +120,22 @@ export class Magnifier {
 
   drawScale(world, step) {
     const { context } = world;
-    const [left, foot] = [10, this.sheet.height - 10];
+    const foot = 0.9 * this.sheet.height;
+    const left = (this.sheet.width - step * world.scale) / 2;
     const right = left + step * world.scale;
     context.beginPath();
     for (const [x, y] of [[left, foot - 4], [left, foot], [right, foot], [right, foot - 4]]) context.lineTo(x, y);
     context.strokeStyle = pen.INK;
     context.lineWidth = 1.5;
     context.stroke();
-    world.text(`${(1e3 * step).toFixed(0)} mm`, [right + 6, foot - 4], { align: "left", weight: 500 });
+    world.text(`${1e3 * step} mm`, [this.sheet.width / 2, foot - 9], { weight: 500 });
   }
 
   /** A triangle at the edge that points to what lies outside the window. */
   pointOut(world, centre, place, colour) {
     if (!finite(place)) return;
     const [dx, dy] = [place[0] - centre[0], place[1] - centre[1]];
-    const half = [this.sheet.width / 2 / world.scale, this.sheet.height / 2 / world.scale];
-    const far = Math.max(Math.abs(dx) / half[0], Math.abs(dy) / half[1]);
+    const far = (2 * Math.hypot(dx, dy) * world.scale) / Math.min(this.sheet.width, this.sheet.height);
     if (far <= 1) return;
     const angle = Math.atan2(-dy, dx);
     const corners = [0, 2.4, -2.4].map((turn) => [8 * Math.cos(angle + turn), 8 * Math.sin(angle + turn)]);

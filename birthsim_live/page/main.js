@@ -1,6 +1,7 @@
 // Puts the page together: what comes from the rig, what is drawn when, and what the keys do.
 
 import { About } from "./about.js";
+import { Challenge } from "./challenge.js";
 import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
 import { Files } from "./files.js";
 import { Gauges } from "./gauges.js";
@@ -10,6 +11,7 @@ import { History } from "./history.js";
 import { Keys, keyOfTheRig } from "./keys.js";
 import { Link, settingsIn } from "./link.js";
 import { Magnifier } from "./magnifier.js";
+import { Means } from "./means.js";
 import { Monitor } from "./monitor.js";
 import { Notices } from "./notices.js";
 import { Physics } from "./physics/panel.js";
@@ -17,9 +19,11 @@ import { Plots } from "./plots.js";
 import { Readouts } from "./readouts.js";
 import { Rigs } from "./rigs.js";
 import { Settings } from "./settings.js";
+import { Sound } from "./sound.js";
 import { Source } from "./source.js";
 import { explain } from "./terms.js";
 import { Transport } from "./transport.js";
+import { Views } from "./views.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -35,6 +39,7 @@ const rig = { frame: null, settings: null, state: null, hello: null, connected: 
 window.birthsim = rig;
 
 const magnifier = new Magnifier(byId("magnifier"), byId("magnification"));
+const means = new Means();
 const gauges = new Gauges(byId("gauges"));
 const names = Object.keys(UNITS);
 const recent = new History(names, 512, 0.025);
@@ -47,9 +52,16 @@ const notices = new Notices(byId("notices"));
 const change = (changes) => send({ type: "set", settings: changes });
 const settings = new Settings(byId("settings"), change);
 const guide = new Guide(change);
+const views = new Views(change, (paused) => send({ type: "pause", paused }));
+const challenge = new Challenge();
+const sound = new Sound(byId("sound"));
 const link = new Link();
 const about = new About();
-const transport = new Transport(send, (name) => source.address(name));
+const transport = new Transport(
+  send,
+  (name) => source.address(name),
+  (words) => notices.show(words),
+);
 const enabled = () => rig.connected && rig.hello.mode === "live";
 const hand = new Hand({
   send,
@@ -74,7 +86,9 @@ const source = new Source({
     rig.connected = true;
     rig.frame = null;
     recent.clear();
+    means.clear();
     plots.show(recent);
+    views.setUp(message);
     rigs.setUp(message);
     physics.setUp(message);
     explain(message.words.figures);
@@ -107,6 +121,9 @@ const source = new Source({
     rig.frame = frame;
     rig.monitor.received += 1;
     rigs.push(frame);
+    means.push(frame);
+    challenge.push(frame);
+    sound.push(rigs.rigOf(frame));
     if (rig.hello.mode === "live") recent.push(frame.time, rowOf(frame, rigs.rms));
     for (const part of [magnifier, physics]) part.push(frame);
     hand.stay();
@@ -126,7 +143,9 @@ function setUpSettings(message) {
 
 function showSettings(values) {
   if (!values) return;
+  const others = ["controller", "compare"].some((name) => values[name] !== rig.settings?.[name]);
   rig.settings = values;
+  if (others && rig.hello.mode === "live") forget();
   rigs.show(values);
   if (rig.hello.mode !== "live") {
     transport.showSettings(values);
@@ -134,7 +153,16 @@ function showSettings(values) {
   }
   settings.show(values);
   guide.show(values);
+  views.show(values);
   link.show(values);
+}
+
+/** What another controller did is no longer shown. */
+function forget() {
+  recent.clear();
+  means.clear();
+  rigs.clear();
+  challenge.clear();
 }
 
 function showState(values) {
@@ -165,22 +193,24 @@ function draw(now) {
   if (!frame || !state || !rigs.scenes[0].pen) return;
   if (frame !== drawn || !rig.connected) {
     drawn = frame;
-    magnifier.draw(frame, rigs.scenes[0].pen.scale);
-    rigs.draw(frame, magnifier.window);
+    magnifier.draw(frame, rigs.scenes[0].pen.scale, means.shown);
+    rigs.draw(frame, magnifier);
     rig.monitor.drew(frame);
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost.replace(/[.]?$/, ".")} Press R to reset.` : "");
   }
   transport.step(frame);
+  transport.keepUp(frame, now);
   const [one, k] = [rigs.rigOf(frame), rigs.chosen];
   gauges.step(one.pressures, now);
   physics.step(one, k, now);
   plots.step(frame.time, k, now);
   const running = rigs.rms.map(({ value }, i) => (rig.hello.mode === "live" ? value : whole.at(RMS[i], frame.time)));
-  rigs.step(frame, running, now);
-  if (rig.connected) readouts.step(one, running[k], frame, state, now);
+  rigs.step(means.shown, running);
+  const written = means.shown[frame.second ? k : 0];
+  if (rig.connected && written) readouts.step(written, running[k], frame, state, now);
 }
 
-new Files({ plots, open: (file) => source.open(file) });
+new Files({ plots, open: (file) => source.open(file), tell: (words) => notices.show(words) });
 byId("back").addEventListener("click", () => source.close());
 window.addEventListener("keydown", (event) => {
   const wish = rig.connected && keyOfTheRig(event);

@@ -1,7 +1,7 @@
 // The page's pictures, plots and figures as one picture: canvases are copied, words and marks are written where they stand.
 
-const LEFT_OUT = ".settings, .hint, .banner, .scrubber, .unseen, script, style";
-const PAINTED = ".beside, .readouts, .physics";
+const LEFT_OUT = ".settings, .under, .hint, .banner, .scrubber, .unseen, script, style";
+const PAINTED = ".readouts, .physics";
 
 /** A PNG of what can be seen of an element, as a Blob. */
 export function pictureOf(element) {
@@ -33,7 +33,7 @@ function paint(context, element) {
   context.fillRect(left, top, width, height);
 }
 
-function copy(context, canvas) {
+export function copy(context, canvas) {
   const { left, top, width, height } = canvas.getBoundingClientRect();
   if (width && height && canvas.width && canvas.height) context.drawImage(canvas, left, top, width, height);
 }

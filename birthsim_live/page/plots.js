@@ -7,7 +7,7 @@ import { formula } from "./symbols.js";
 import { term } from "./terms.js";
 
 const WINDOW = 8; // s
-const RATE = 15; // redraws of each plot per second, where the machine bears it
+const RATE = 12; // redraws per second, where the machine bears it: all plots at once, so that all end at one instant
 const LATE = 25; // ms between frames of the screen that show that it does not: the rig comes first
 const LEAST_SHARE = 0.25; // of RATE
 const HEADING_FONT = `11px ${FONT}`;
@@ -36,13 +36,13 @@ function niceStep(rough) {
   return decade * ([1, 2, 5].find((factor) => factor * decade >= rough) ?? 10);
 }
 
-/** Extremes of what is finite in several series. */
-function extremes(columns) {
+/** Extremes of what is finite in several series from the row `first` on. */
+function extremes(columns, first) {
   let [low, high] = [Infinity, -Infinity];
   for (const column of columns) {
-    for (const value of column) {
-      if (value < low) low = value;
-      if (value > high) high = value;
+    for (let k = first; k < column.length; k += 1) {
+      if (column[k] < low) low = column[k];
+      if (column[k] > high) high = column[k];
     }
   }
   return [low, high];
@@ -109,7 +109,8 @@ class Plot {
 
   valueRange() {
     const { curves, follow } = this.definition;
-    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.view(name)));
+    const first = Math.max(0, this.history.view("time").findIndex((time) => time >= this.timeRange()[0]));
+    const [low, high] = extremes((follow ?? curves.map(({ name }) => name)).map((name) => this.view(name)), first);
     return this.range(low, follow ? 1.5 * high : high);
   }
 
@@ -174,7 +175,6 @@ export class Plots {
   constructor(places, history) {
     this.shown = { history, rig: 0, duration: null, now: 0 };
     this.plots = places.flatMap(([definitions, parent]) => definitions.map((definition) => new Plot(definition, this.shown, parent)));
-    this.next = 0;
     this.due = 0;
     this.share = 1;
     this.last = performance.now();
@@ -190,17 +190,15 @@ export class Plots {
     for (const plot of this.plots) plot.redraw();
   }
 
-  /** Redraw the next plot if one is due; called with each frame so that the work is spread evenly. `time`, s, is the frame's. */
+  /** Redraw all that can be seen if that is due; called with each frame, whose time is `time`, s. */
   step(time, rig, now) {
     Object.assign(this.shown, { now: time, rig });
-    const visible = this.plots.filter((plot) => plot.visible);
     const gap = now - this.last;
     this.last = now;
     this.share = gap > LATE ? Math.max(0.8 * this.share, LEAST_SHARE) : Math.min(this.share + 0.01, 1);
-    this.due = Math.min(this.due + (visible.length * RATE * this.share * gap) / 1e3, 1);
-    if (this.due < 1 || visible.length === 0) return;
+    this.due = Math.min(this.due + (RATE * this.share * gap) / 1e3, 1);
+    if (this.due < 1) return;
     this.due = 0;
-    this.next = (this.next + 1) % visible.length;
-    visible[this.next].redraw();
+    for (const plot of this.plots) if (plot.visible) plot.redraw();
   }
 }

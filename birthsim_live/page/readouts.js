@@ -4,7 +4,6 @@ import { LEAST_FORCE, LEAST_GIVEN } from "./frame.js";
 import { formula } from "./symbols.js";
 import { term } from "./terms.js";
 
-const RATE = 8; // updates per second: faster, digits cannot be read
 const WRITTEN_GAP = 2000; // ms between changes of the status line
 const SPOKEN_GAP = 10000; // ms between words on how the machine keeps up: a busy one falls behind again and again
 const PACES = ["well", "slow"];
@@ -36,19 +35,19 @@ function felt(frame) {
 
 const FIGURES = [
   ["the hand feels", [], "", felt],
-  ["time", [["t"]], "s", (frame) => frame.time.toFixed(2)],
+  ["time", [["t"]], "s", ({ time }) => time.toFixed(2)],
   ["user force", [["F", "us,x"], ", ", ["F", "us,y"]], "N", (frame) => pair(frame.force, 1)],
   ["displacement", [["x", "c"], " − ", ["x", "t"], ", ", ["y", "c"], " − ", ["y", "t"]], "mm", (frame) => pair(difference(frame.position, frame.target), 1, 1e3)],
   ["force over stiffness", [["F", "us"], "/", ["K", "cl"]], "mm", (frame) => pair(difference(frame.compliant, frame.target), 1, 1e3)],
   ["error", [], "", (frame, rms) => [plain(frame.error_mm), ` mm, RMS ${plain(rms)}`]],
 ];
+const IN_LAB = ["time", "displacement", "force over stiffness"];
 
 export class Readouts {
   /** `status` is the line that is seen, `spoken` the one that screen readers speak. */
   constructor(list, status, spoken) {
     this.status = status;
     this.spoken = spoken;
-    this.last = 0;
     this.written = -Infinity;
     this.told = { kind: null, at: -Infinity };
     this.values = FIGURES.map(([title, symbol, unit], i) => {
@@ -62,22 +61,26 @@ export class Readouts {
       value.append(digits, inUnit);
       box.append(name, value);
       box.dataset.figure = title;
+      box.className = IN_LAB.includes(title) ? "lab-only" : "";
       if (i === 0) box.className = "felt";
       list.append(box);
       return [digits, inUnit];
     });
   }
 
-  /** `one` is the rig that is chosen in a frame, `rms` that of its error, mm. */
+  /** `one` is the mean (means.js) of the rig that is chosen, `rms` that of its error, mm. */
   step(one, rms, frame, state, now) {
-    if (now - this.last < 1e3 / RATE) return;
-    this.last = now;
+    if (one !== this.last) this.write(one, rms);
+    this.last = one;
+    this.say(...pace(frame, state), now);
+  }
+
+  write(one, rms) {
     FIGURES.forEach(([, , , words], i) => {
       [words(one, rms)].flat().forEach((text, k) => {
         if (this.values[i][k].textContent !== text) this.values[i][k].textContent = text;
       });
     });
-    this.say(...pace(frame, state), now);
   }
 
   /** Change the status line, at once where its kind changes, else seldom. Screen readers speak what kind it has become. */

@@ -74,9 +74,17 @@ function drawCylinder(pen, axis, barrel, y, colours) {
   for (const from of [barrel.rear, stop]) pen.polygon(axis.box(from, from + barrel.cap, 1.25 * barrel.half_bore), CAP, INK);
 }
 
+const placedAt = (axis, head) => (shape) => shape.map(([s, n]) => axis.at(head.radius * s, -head.radius * n));
+
+/** Only the outline of the head of another rig. */
+export function drawGhost(pen, pose, { head }, colour) {
+  const outline = placedAt(new Axis(pose.endEffector, pose.axes[1].along), head)(head.profile);
+  pen.line([...outline, outline[0]], colour, 2);
+}
+
 /** Fetal head in profile, crown first. */
 function drawHead(pen, axis, head) {
-  const placed = (shape) => shape.map(([s, n]) => axis.at(head.radius * s, -head.radius * n));
+  const placed = placedAt(axis, head);
   pen.polygon(placed(head.profile), SKIN, SKIN_EDGE, 1.5);
   for (const feature of head.features) pen.line(placed(feature), SKIN_EDGE, 1.2);
 }

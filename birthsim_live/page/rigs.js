@@ -6,7 +6,6 @@ import { RunningRms } from "./rms.js";
 import { Scene } from "./scene.js";
 import { formula } from "./symbols.js";
 
-const RATE = 8; // updates of the captions per second: faster, digits cannot be read
 const PLACES = ["rig", "second-rig"];
 const CURVES = ["error", "second_error"];
 const NOTHING = "nothing"; // to compare with
@@ -17,7 +16,7 @@ export class Rigs {
   /** `hand` is this window's; `frame()` is the newest frame, `enabled()` says whether there is a rig to hold. */
   constructor(hand, { frame, enabled }) {
     this.hand = hand;
-    this.last = 0;
+    this.last = null;
     this.chosen = 0;
     this.rms = PLACES.map(() => new RunningRms());
     const canvases = PLACES.map((place) => document.getElementById(place));
@@ -34,9 +33,9 @@ export class Rigs {
     this.choices.forEach((choice, k) => choice.addEventListener("change", () => this.choose(k)));
   }
 
-  setUp({ geometry, air, choices }) {
-    this.titles = Object.fromEntries(choices.controller.map(({ name, title }) => [name, title]));
-    for (const scene of this.scenes) scene.setUp(geometry, air);
+  setUp(hello) {
+    this.titles = Object.fromEntries(hello.choices.controller.map(({ name, title }) => [name, title]));
+    for (const scene of this.scenes) scene.setUp(hello);
     this.clear();
   }
 
@@ -50,7 +49,8 @@ export class Rigs {
   }
 
   /** The names of both, above the pictures and in the plot of the error. */
-  show({ controller = "", compare = NOTHING }) {
+  show({ controller = "", compare = NOTHING, Kclx = Infinity, Kcly = Infinity }) {
+    for (const scene of this.scenes) scene.setStiffness(Kclx, Kcly);
     const names = [controller, compare].map((name) => this.titles[name] ?? name);
     names.forEach((name, k) => this.write(k, 0, name));
     this.choose(compare === NOTHING ? 0 : this.chosen);
@@ -90,19 +90,20 @@ export class Rigs {
     for (const scene of this.scenes) scene.cue = false;
   }
 
-  /** `window` is the width of what the magnifier shows, m. */
-  draw(frame, window) {
+  /** `lens` is what the lens shows: its `window`, m, and its canvas. */
+  draw(frame, lens) {
     const two = frame.second ? "2" : "1";
     if (document.body.dataset.rigs !== two) document.body.dataset.rigs = two;
-    this.scenes[0].draw(frame, this.hand.held, window);
-    if (frame.second) this.scenes[1].draw(frame.second, this.hand.held, window);
+    const [first, second] = this.scenes;
+    first.draw(frame, this.hand.held, lens, second.hidden ? frame.second : null);
+    if (frame.second) second.draw(frame.second, this.hand.held, lens, null);
   }
 
-  /** Called with each frame of the screen: the captions of two, `rms` their running errors, mm. */
-  step(frame, rms, now) {
-    if (!frame.second || now - this.last < 1e3 / RATE) return;
-    this.last = now;
-    [frame, frame.second].forEach((one, k) => {
+  /** Called with each frame of the screen: the captions of two from their means (means.js); `rms` are running errors, mm. */
+  step(means, rms) {
+    if (!means[1] || means === this.last) return;
+    this.last = means;
+    means.forEach((one, k) => {
       this.write(k, 1, digits(one.error_mm, 2));
       this.write(k, 2, digits(rms[k], 2));
       const felt = stiffness(one);

@@ -2,7 +2,7 @@
 
 import * as pen from "./pen.js";
 import { Pen } from "./pen.js";
-import { chamberNames, drawGround, drawRig, extent, noteOf, poseOf } from "./rig.js";
+import { chamberNames, drawGhost, drawGround, drawRig, extent, noteOf, poseOf } from "./rig.js";
 import { Sheet } from "./sheet.js";
 import { Trail } from "./trail.js";
 
@@ -12,33 +12,75 @@ const CUE_TIME = 2200; // ms of the hint's motion, and px that it goes
 const CUE_LENGTH = 90;
 const STILL = matchMedia("(prefers-reduced-motion: reduce)");
 const LEAST_FORCE = 0.05; // N; below it an arrow would only flicker
+const REACH = 0.075; // m that a hand moves the head, unless the spring is soft
+const SOFT = 1400; // N/m
+const NARROW = 760; // px; narrower pictures have this room, m, for the arrow of a pull
+const ROOM = 0.06;
+const PHONE = 500; // px; narrower ones go without the far end of cylinder 2, m
+const CUT = 0.13;
+const LEAST_ARROW = 24; // px
+const MEASURED = 500; // ms between looks at where the lens is
 
 export class Scene {
   /** `cue`: until somebody has pulled, a hint shows what to do. */
   constructor(canvas, { cue }) {
     this.geometry = null;
     this.path = [];
+    this.soft = false;
+    this.escaped = false; // the head has left what is in sight
+    this.lens = { at: -Infinity };
     this.trail = new Trail();
     this.cue = cue;
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
     pen.onNightfall(() => this.layOut());
   }
 
-  setUp(geometry, air) {
-    this.geometry = geometry;
-    this.air = air;
+  setUp({ geometry, air, drag_limit: limit }) {
+    Object.assign(this, { geometry, air, limit });
     this.layOut();
   }
 
   setPath(points) {
     this.path = points;
+    this.layOut();
+  }
+
+  setStiffness(...stiffnesses) {
+    this.see(Math.min(...stiffnesses) < SOFT, this.escaped);
+  }
+
+  /** Show all that the head can reach, or only what is near its path, larger. */
+  see(soft, escaped) {
+    if (soft === this.soft && escaped === this.escaped) return;
+    Object.assign(this, { soft, escaped });
+    this.layOut();
+  }
+
+  /** It has no room: a small screen shows one picture of two. */
+  get hidden() {
+    return !this.sheet.width;
+  }
+
+  /** Lower left and upper right corner, m, of what is in sight: the linkage, and the head wherever it may go. */
+  bounds() {
+    const [low, high] = extent(this.geometry);
+    if (this.soft || this.escaped || !this.path.length) return [low, high];
+    const reach = REACH + this.geometry.head.radius;
+    const [xs, ys] = [0, 1].map((k) => this.path.map((point) => point[k]));
+    const { width } = this.sheet;
+    if (width < PHONE) low[0] += CUT;
+    if (width < NARROW) {
+      high[0] += ROOM;
+      xs.push(Math.max(...xs) + ROOM);
+    }
+    return [[low[0], Math.max(low[1], Math.min(...ys) - reach)], [Math.min(high[0], Math.max(...xs) + reach), high[1]]];
   }
 
   /** Scale and origin so that all poses fill the room, and all that does not move on a backdrop. */
   layOut() {
     if (!this.geometry || !this.sheet?.width) return;
     const { width, height } = this.sheet;
-    const [low, high] = extent(this.geometry);
+    const [low, high] = this.bounds();
     const room = [width - 2 * MARGIN, height - STRIP - 2 * MARGIN];
     const scale = Math.min(room[0] / (high[0] - low[0]), room[1] / (high[1] - low[1]));
     const origin = [
@@ -74,15 +116,21 @@ export class Scene {
 
   /** Take note of a frame: the trail holds the way of the end effector. */
   push({ time, position }) {
+    const { points } = this.trail;
+    const anew = time < points.at(-1)?.time;
     this.trail.push(time, position);
+    if (anew) this.see(this.soft, false);
+    if (!this.geometry || this.escaped || !pen.finite(position)) return;
+    const [low, high] = this.bounds();
+    if (position.some((value, k) => value < low[k] || value > high[k])) this.see(this.soft, true);
   }
 
   /**
-   * `held` is the offset, m, from end effector to the place where this window holds it, or null; `window` the width, m, of
-   * what the magnifier shows.
+   * `held` is the offset, m, from end effector to the place where this window holds it, or null; `lens` a magnifier;
+   * `ghost` a frame of another rig whose head is to be seen here, or null.
    */
-  draw(frame, held, window) {
-    if (!this.pen) return;
+  draw(frame, held, lens, ghost) {
+    if (!this.pen || this.hidden) return;
     this.sheet.check();
     const { pen: world, unit, geometry } = this;
     this.sheet.lay(this.backdrop);
@@ -95,11 +143,13 @@ export class Scene {
     }
     world.line(this.path, pen.PATH, 0.8 * unit); // once more, thin: the path goes on across head and rod
     this.trail.draw(world, pen.INK, 1.6 * unit);
-    this.drawWindow(frame.compliant, window / 2);
+    const other = ghost && poseOf(ghost, geometry);
+    if (other) drawGhost(world, other, geometry, pen.colour("beside"));
+    this.drawLeader(frame.compliant, lens);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);
-    const label = pose && this.drawForce(frame.force, pose, this.hand(frame, held ?? [0, 0]));
+    const label = pose && this.drawForce(frame, pose, this.hand(frame, held ?? [0, 0]));
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
     if (pose) this.drawNames(pose);
@@ -108,9 +158,36 @@ export class Scene {
     this.drawNote(noteOf(frame, geometry));
   }
 
-  /** Frame of what the magnifier shows. */
-  drawWindow([x, y], half) {
-    this.pen.line([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half], [x - half, y - half]], pen.GREY, 0.8);
+  /** What the lens shows, and lines from there to the lens. */
+  drawLeader(centre, lens) {
+    const small = Math.max((lens.window / 2) * this.pen.scale, 2);
+    this.pen.disc(centre, small, null, pen.CAP, 1);
+    const now = performance.now();
+    if (now > this.lens.at + MEASURED) this.lens = { at: now, ...this.placeOf(lens.sheet.canvas) };
+    const { x, y, radius } = this.lens;
+    if (!radius || !pen.finite(centre)) return;
+    const from = this.pen.pixel(centre);
+    const [dx, dy] = [x - from[0], y - from[1]];
+    const far = Math.hypot(dx, dy);
+    if (far < 1.1 * (radius + small)) return;
+    const { context } = this.pen;
+    for (const side of [-1, 1]) {
+      const turn = Math.atan2(dy, dx) + side * Math.acos((small - radius) / far);
+      const [ux, uy] = [Math.cos(turn), Math.sin(turn)];
+      context.beginPath();
+      context.moveTo(from[0] + small * ux, from[1] + small * uy);
+      context.lineTo(x + radius * ux, y + radius * uy);
+      context.strokeStyle = pen.CAP;
+      context.lineWidth = 1;
+      context.stroke();
+    }
+  }
+
+  /** Middle and radius, px, of a round canvas that lies on this one; nothing of one that lies elsewhere. */
+  placeOf(canvas) {
+    const [own, its] = [this.sheet.canvas, canvas].map((one) => one.getBoundingClientRect());
+    const [x, y] = [(its.left + its.right) / 2 - own.left, (its.top + its.bottom) / 2 - own.top];
+    return x > 0 && x < own.width && y > 0 && y < own.height ? { x, y, radius: its.width / 2 } : {};
   }
 
   /** The spring from the hand's hold on the end effector to the pointer. */
@@ -119,7 +196,7 @@ export class Scene {
     const from = this.pen.pixel([frame.position[0] + hx, frame.position[1] + hy]);
     const to = this.pen.pixel([frame.pointer[0] + hx, frame.pointer[1] + hy]);
     const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
-    const turns = 5;
+    const turns = Math.max(5, Math.round(length / 16));
     context.beginPath();
     context.moveTo(...from);
     if (length > 8) {
@@ -147,7 +224,8 @@ export class Scene {
   drawCue({ position }) {
     const part = STILL.matches ? 0.7 : (performance.now() % CUE_TIME) / CUE_TIME;
     const passed = Math.min(1, part / 0.7);
-    const ahead = (CUE_LENGTH * this.unit * passed * passed * (3 - 2 * passed)) / this.pen.scale;
+    const length = Math.min(CUE_LENGTH * this.unit, this.roomAlong(this.pen.pixel(position), [1, 0]) - CUE_LENGTH / 3);
+    const ahead = (length * passed * passed * (3 - 2 * passed)) / this.pen.scale;
     const { context } = this.pen;
     const from = [position[0], position[1]];
     const to = [position[0] + ahead, position[1]];
@@ -180,7 +258,7 @@ export class Scene {
    * Arrow of the user's force at the head, or beyond the `hand` where that pulls the same way; returns the arrow's label and
    * where that belongs, px.
    */
-  drawForce([fx, fy], pose, hand) {
+  drawForce({ force: [fx, fy], drag_force: drag }, pose, hand) {
     const newtons = Math.hypot(fx, fy);
     if (!(newtons > LEAST_FORCE && Number.isFinite(newtons))) return null;
     const { unit } = this;
@@ -190,13 +268,14 @@ export class Scene {
     const along = hand ? dx * hand[0] + dy * hand[1] : 0;
     const start = hand && Math.abs(dx * hand[1] - dy * hand[0]) < 0.5 * along ? Math.max(edge, along + 9) : edge;
     const length = unit * Math.min(14 + 0.8 * newtons, 110);
-    const words = `${newtons < 1e5 ? newtons.toFixed(0) : newtons.toExponential(1)} N`;
+    const most = Math.hypot(...drag) > this.limit - 0.5 ? ", the most" : "";
+    const words = `${newtons < 1e5 ? newtons.toFixed(0) : newtons.toExponential(1)} N${most}`;
     const half = [4.2 * words.length + 4, 9];
     const inside = (at, room) =>
       at[0] > room[0] && at[0] < this.sheet.width - room[0] && at[1] > room[1] && at[1] < this.sheet.height - STRIP - room[1];
     const free = (distance) => inside([x + dx * distance, y + dy * distance], [4, 4]);
     // Clear of the cylinders where there is room: a pull leaves the head, a force into the machine ends at it as a push.
-    const pull = [start, start + length];
+    const pull = [start, Math.max(Math.min(start + length, this.roomAlong([x, y], [dx, dy]) - 6), start + LEAST_ARROW)];
     const push = [-edge - length, -edge];
     const [ax, ay] = pose.axes[1].along;
     const intoMachine = fx * ax + fy * ay < -0.5 * newtons;
@@ -211,6 +290,13 @@ export class Scene {
       ...[aside, -aside].map((s) => [x + dx * middle - dy * s, y + dy * middle + dx * s]),
     ];
     return { words, at: places.find((place) => inside(place, half)) ?? this.nearest(places[0], half) };
+  }
+
+  /** How far it is, px, from a pixel to the edge of the picture. */
+  roomAlong([x, y], [dx, dy]) {
+    const [right, foot] = [this.sheet.width, this.sheet.height - STRIP];
+    const ways = [dx > 0 ? (right - x) / dx : -x / dx, dy > 0 ? (foot - y) / dy : -y / dy];
+    return Math.min(...ways.filter((way) => way >= 0));
   }
 
   /** Off limits, a label stays in the picture on the side where the head has left it. */

@@ -23,6 +23,12 @@ export class Trail {
     while (this.points[0].time < time - SPAN) this.points.shift();
   }
 
+  /** How far, m, a share of its points lies from zero at most, along either axis. */
+  reach(share) {
+    const far = this.points.flatMap(({ point }) => (finite(point) ? [Math.max(...point.map(Math.abs))] : []));
+    return far.sort((a, b) => a - b)[Math.floor(share * far.length)] ?? 0;
+  }
+
   /** Draw it with a pen, the older the fainter; `origin`, m, is added to every point. */
   draw(pen, colour, px, origin = [0, 0]) {
     const { points } = this;

@@ -3,16 +3,24 @@
 import { STIFFNESSES } from "./worker/settings.js";
 
 const byId = (id) => document.getElementById(id);
+const SLOW = 0.85; // of real time
+const PATIENCE = 2000; // ms
+const HALF = 0.5; // of real time
 
 export class Transport {
-  /** `address(name)` is where a recording can be saved from. */
-  constructor(send, address) {
+  /** `address(name)` is where a recording can be saved from, `tell(words)` says what the page does by itself. */
+  constructor(send, address, tell) {
+    this.tell = tell;
+    this.late = null; // ms since when the machine is too slow; Infinity once speed has been seen to
     this.send = send;
     this.address = address;
     this.state = { paused: false, speed: 1, recording: null };
     byId("pause").addEventListener("click", () => this.togglePause());
     byId("reset").addEventListener("click", () => this.reset());
-    byId("speed").addEventListener("change", (event) => send({ type: "speed", speed: Number(event.target.value) }));
+    byId("speed").addEventListener("change", (event) => {
+      this.late = Infinity;
+      send({ type: "speed", speed: Number(event.target.value) });
+    });
     byId("record").addEventListener("click", () => send({ type: "record", on: !this.state.recording }));
     this.scrub = byId("scrub");
     this.held = false;
@@ -93,6 +101,16 @@ export class Transport {
       this.scrub.value = frame.time;
       this.writeTime(frame.time);
     }
+  }
+
+  /** A machine that is too slow for real time gets half of it, once, unless a person has chosen the speed. */
+  keepUp({ real_time: share }, now) {
+    if (this.replay || this.late === Infinity || share === null) return;
+    this.late = share < SLOW && this.state.speed === 1 ? Math.min(this.late ?? now, now) : null;
+    if (this.late === null || now < this.late + PATIENCE) return;
+    this.late = Infinity;
+    this.send({ type: "speed", speed: HALF });
+    this.tell("This machine is too slow for real time: the rig runs at half speed. The Lab has other speeds.");
   }
 
   writeTime(time) {

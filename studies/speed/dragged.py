@@ -1,8 +1,7 @@
 """Frame rate, real-time factor and latency of the live page while somebody drags, in headless Chromium.
 
 ``python -m studies.speed.dragged`` starts a server, drags the end effector around for some seconds, several times, and
-prints a table; ``--controller NAME`` does so with a controller that runs in Python, ``--compare NAME`` with two rigs;
-``--picture FILE`` also writes the screenshot of docs/live.md.
+prints a table; ``--controller NAME`` does so with a controller that runs in Python, ``--compare NAME`` with two rigs.
 """
 
 import argparse
@@ -21,6 +20,7 @@ HEADINGS = ("run", "drawn (1/s)", "real-time factor, least", "behind (s)", "late
 
 def drag(window: Any, seconds: float) -> dict[str, Any]:
     """Drag in circles like a mouse that reports 60 times a second; the page's report, with real-time factors on the way."""
+    window.page.locator("#speed").select_option("1")  # chosen, it stays where the machine is slow
     window.page.locator("body").press("r")
     window.wait("birthsim.frame.real_time !== null && birthsim.frame.pointer === null")
     window.hold()
@@ -61,20 +61,6 @@ def row(run: int, report: dict[str, Any]) -> tuple[str, ...]:
     return (str(run), *figures)
 
 
-def picture(window: Any, path: str) -> None:
-    """A screenshot with something to see: two rigs under one hand, a pull, and the plots full."""
-    window.page.locator("#guide").select_option("What the force sensor buys")
-    window.wait("birthsim.frame.second !== null && birthsim.frame.pointer === null")
-    window.page.locator("#reset").click()
-    window.wait("birthsim.frame.time < 1")
-    window.page.locator("#reset").blur()
-    window.wait("birthsim.frame.time > 6")
-    window.hold(across=45, up=30)
-    window.live(2.0)
-    window.page.screenshot(path=path)
-    window.page.mouse.up()
-
-
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -82,7 +68,6 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3, help="how many (default: %(default)s)")
     parser.add_argument("--controller", metavar="NAME", default="admittance-backstepping", help="what drives the rig")
     parser.add_argument("--compare", metavar="NAME", default="nothing", help="with a second rig beside the first")
-    parser.add_argument("--picture", help="write a screenshot, 1280x800, to this PNG")
     arguments = parser.parse_args()
     if lack := browser.missing():
         raise SystemExit(lack)
@@ -94,8 +79,6 @@ def main() -> None:
             window.wait(f"birthsim.settings.compare === '{arguments.compare}'")
             first = window.wait("birthsim.monitor.first")
             rows = [row(k + 1, drag(window, arguments.seconds)) for k in range(arguments.runs)]
-            if arguments.picture:
-                picture(window, arguments.picture)
         chromium.close()
     print(f"first frame drawn {first / 1e3:.2f} s after the address was opened\n")
     print("| " + " | ".join(HEADINGS) + " |")

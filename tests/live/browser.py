@@ -146,9 +146,10 @@ def launch(playwright):
 
 
 class Window:
-    """One tab with the page; ``complaints`` collects console errors, ``foreign`` requests that left this machine."""
+    """One tab with the page, and with its ``lab`` open unless told otherwise; ``complaints`` collects console errors,
+    ``foreign`` requests that left this machine."""
 
-    def __init__(self, browser, url, size=WIDE, touch=False):
+    def __init__(self, browser, url, size=WIDE, touch=False, lab=True):
         self.context = browser.new_context(viewport=size, accept_downloads=True, has_touch=touch)
         self.context.set_default_timeout(1000 * PATIENCE)
         self.page = self.context.new_page()
@@ -156,7 +157,7 @@ class Window:
         self.page.on("console", lambda message: message.type in ("error", "warning") and self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", self._asked)
-        self.page.goto(url)
+        self.page.goto(f"{url}#lab" if lab else url)
         self.wait("birthsim.connected && birthsim.frame !== null && birthsim.state !== null")
 
     def __enter__(self):

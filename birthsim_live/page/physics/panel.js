@@ -19,16 +19,16 @@ export class Physics {
     this.button = button;
     this.rigs = [0, 1].map(() => ({ ellipse: new Ellipse(), work: new Work() }));
     this.last = 0;
-    const pictures = document.createElement("div");
-    pictures.className = "pictures";
+    const pictures = document.getElementById("pictures");
     this.sheets = ["valves and air", "forces in the cylinders", "stiffness at the head"].map((name) => picture(pictures, name));
     this.values = figures(pictures);
-    section.querySelector(".plots").before(pictures);
     button.addEventListener("click", () => this.open(section.hidden));
   }
 
+  /** It takes the place of the plots. */
   open(wanted) {
     this.section.hidden = !wanted;
+    document.getElementById("plots").hidden = wanted;
     this.button.setAttribute("aria-expanded", String(wanted));
   }
 

@@ -23,6 +23,7 @@ BLUE = """(() => {
     copy.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--beside');
     copy.fillRect(0, 0, 1, 1);
     const [r, g, b] = copy.getImageData(0, 0, 1, 1).data;
+    copy.clearRect(0, 0, 1, 1); // the lens is round
     copy.drawImage(canvas, 0, 0);
     const { data } = copy.getImageData(0, 0, width, height);
     let found = 0;
@@ -198,11 +199,11 @@ def test_two_rigs_fit_a_window_of_any_size(chromium, server, pictures, width, he
         boxes = window.value(
             "[...document.querySelectorAll('.rigs canvas')].map((one) => one.getBoundingClientRect().toJSON())"
         )
-        assert all(box["width"] > 250 and box["height"] > 150 for box in boxes)
-        if width <= 700:
-            assert boxes[1]["top"] > boxes[0]["bottom"]
+        if width <= 700:  # the second head is an outline in the first's picture
+            assert boxes.pop()["width"] == 0
         else:
             assert boxes[1]["left"] >= boxes[0]["right"]
+        assert all(box["width"] > 250 and box["height"] > 150 for box in boxes)
         cut = window.value(
             "[...document.querySelectorAll('.view figcaption, .view p, .view b, .list')]"
             ".filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"

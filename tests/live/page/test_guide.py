@@ -1,4 +1,4 @@
-"""What the page teaches: it opens with a problem that can be seen, leads through five lessons, and is a link."""
+"""What the page teaches: it opens with a problem that can be seen, leads through six lessons, and is a link."""
 
 import json
 
@@ -30,6 +30,7 @@ def test_the_page_opens_with_a_problem_a_cue_and_its_headline(chromium, server, 
 def test_the_lessons_follow_each_other_set_the_rig_and_show_where_to_look(window):
     wanted = {
         "Feel the friction": {"controller": "backstepping", "mass": 3, "stiffness_source": "scenario"},
+        "Take the friction away": {"controller": "backstepping", "friction": 0},
         "Halve the stiffness": {"controller": "backstepping", "Kclx": 1000, "Kcly": 1000, "stiffness_source": "sliders"},
         "What the force sensor buys": {"controller": "admittance-backstepping", "compare": "backstepping"},
         "What learning adds": {"controller": "residual:circle", "compare": "backstepping", "scenario": "circle", "mass": 4},

@@ -106,12 +106,13 @@ def test_the_physics_open_and_close_and_tell_of_a_pull(window, pictures):
 
 @pytest.mark.slow
 def test_every_name_explains_itself(window):
-    window.page.locator("#open-physics").click()
     names = window.value("[...document.querySelectorAll('.term')].map((e) => e.textContent)")
     assert set(names) == set(FIGURES)
     explanation = window.page.locator("#explanation")
     for k, name in enumerate(names):
         term = window.page.locator(".term").nth(k)
+        if not term.is_visible():  # the physics stand where the plots were
+            window.page.locator("#open-physics").click()
         term.click()
         assert explanation.text_content() == FIGURES[name]
         box, size = explanation.bounding_box(), window.page.viewport_size

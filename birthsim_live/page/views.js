@@ -1,0 +1,51 @@
+// What of the page is in sight: the story alone, with its lab, or, embedded in another page, the rig and its switch alone.
+
+import { EMBED } from "./link.js";
+
+const LAB = "#lab";
+
+export class Views {
+  /** `change(settings)` asks the rig, `pause(wanted)` halts it. */
+  constructor(change, pause) {
+    this.button = document.getElementById("open-lab");
+    this.button.addEventListener("click", () => this.toggle());
+    this.choices = [...document.querySelectorAll("[name=under]")];
+    for (const choice of this.choices) choice.addEventListener("change", () => change({ controller: choice.value }));
+    if (new URLSearchParams(location.search).has(EMBED)) this.embed(pause);
+    const whole = document.getElementById("whole");
+    whole.addEventListener("click", () => {
+      const search = new URLSearchParams(location.search);
+      search.delete(EMBED);
+      whole.href = `${location.pathname}?${search}`;
+    });
+    addEventListener("hashchange", () => this.open(location.hash === LAB));
+    this.open(location.hash === LAB);
+  }
+
+  /** Of several rigs in a long page only those in sight run. */
+  embed(pause) {
+    document.body.dataset.embed = "";
+    new IntersectionObserver((entries) => pause(!entries.at(-1).isIntersecting)).observe(document.querySelector(".stage"));
+  }
+
+  /** A recording is looked at in the lab. */
+  setUp({ mode }) {
+    this.open(mode !== "live" || location.hash === LAB);
+  }
+
+  toggle() {
+    const wanted = !("lab" in document.body.dataset);
+    history.replaceState(null, "", wanted ? LAB : location.pathname + location.search);
+    this.open(wanted);
+  }
+
+  open(wanted) {
+    document.body.toggleAttribute("data-lab", wanted);
+    this.button.setAttribute("aria-expanded", String(wanted));
+  }
+
+  /** Which of the two controllers of the switch it is, if it is one of them. */
+  show({ controller }) {
+    for (const choice of this.choices) choice.checked = choice.value === controller;
+  }
+}
