@@ -17,9 +17,11 @@ from agents.residual.settings import LAWS, ResidualSettings
 from agents.training.checkpoint import NAME as CHECKPOINT
 from agents.training.configuration import TrainingSettings
 from agents.training.events import EVENTS, events_in
+from agents.training.margin import widened
 from agents.training.policy_gradient import PolicyGradient
 from agents.training.reached import Reached, described
 from agents.training.stable_baselines import StableBaselines
+from birthsim_env.physics.rig.parameters import load_parameters
 
 
 class Learner(Protocol):
@@ -56,16 +58,17 @@ def train(
             if (folder / name).exists():
                 raise ValueError(f"{str(folder)!r} has {name} but not its {CHECKPOINT}; allowed: another folder")
     torch.set_num_threads(1)
+    rig = load_parameters(parameters)
     arguments = {
-        "sensors": settings.sensors, "randomize": settings.randomize, "parameters": parameters, **residual.to_dict(),
+        "sensors": settings.sensors, "randomize": settings.randomize, **residual.to_dict(),
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }  # fmt: skip
 
-    def made(lanes: int) -> list[Any]:
-        worlds = settings.worlds()
-        return [gymnasium.make_vec(name, num_envs=lanes // len(worlds), **hand, **arguments) for name, hand in worlds]
+    def made(lanes: int, margin: float = 0.0) -> list[Any]:
+        worlds, more = settings.worlds(), {**arguments, "parameters": widened(rig, margin) if margin else rig}
+        return [gymnasium.make_vec(name, num_envs=lanes // len(worlds), **hand, **more) for name, hand in worlds]
 
-    envs, checks, paper = made(settings.lanes), made(settings.validation_lanes), None
+    envs, checks, paper = made(settings.lanes, settings.margin), made(settings.validation_lanes), None
     if settings.until < 100:
         arguments |= ResidualSettings(law=LAWS[0], policy_period=residual.policy_period).to_dict()
         paper = made(settings.validation_lanes)

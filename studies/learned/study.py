@@ -11,14 +11,14 @@ from agents.policy.files import WEIGHTS
 from agents.policy.seeds import as_table, policy_folders, seed_figures
 from baselines.bench.evaluation import DATA, data, merged
 from baselines.bench.pieces import controller_settings, evaluation_tasks, file_hash, file_stem, gathered
-from baselines.bench.statistics import jsonable, number
+from baselines.bench.statistics import jsonable
 from baselines.work.tasks import Result, Task
 from birthsim_env.physics.compiled.sources import ROOT
 from birthsim_env.physics.rig.parameters import load_parameters
 from studies.learned import felt
 from studies.results import Content
 from studies.study import Found, Options, Study
-from studies.tables import markdown
+from studies.tables import cells, markdown
 
 
 class Run(NamedTuple):
@@ -147,18 +147,12 @@ def _beside(figures: dict[str, Any]) -> str:
         every, world = found["metrics"]["rows"], f"{policy.partition('_')[0]}, {RUNS[policy].sensors}"
         for controller in dict.fromkeys(row[2] for row in every):
             own = {row[0]: row[1:] for row in every if row[2] == controller}
-            cells = [
-                " / ".join(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()
-            ]
-            touch = [" / ".join(map(_number, found["felt"][controller][name][:2])) for name in felt.COLUMNS]
+            tracks = [cells(own[metric][2 : 2 + count]) if metric in own else "-" for metric, (_, count) in COMPARED.items()]
+            touch = [cells(found["felt"][controller][name][:2]) for name in felt.COLUMNS]
             name = controller.replace("residual", policy) if controller.startswith("residual") else controller
             of, _, lost, *_ = own["lost episodes"]
-            rows.append([world, name, cells[0], *touch, *cells[1:], f"{lost} {of}"])
+            rows.append([world, name, tracks[0], *touch, *tracks[1:], f"{lost} {of}"])
     return markdown(rows) + "\n"
-
-
-def _number(value: Any) -> str:
-    return value if isinstance(value, str) else number(value)
 
 
 def _by_gradients(content: Content) -> dict[str, str]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from birthsim_env.physics import dynamics, options, spools
 from birthsim_env.physics.compiled import lanes as at
+from birthsim_env.physics.compiled.compilation import BLOCK
 from birthsim_env.physics.compiled.lanes import Array
 from birthsim_env.physics.gradients import steps
 from birthsim_env.physics.gradients.right_hand_side import EVERY, INPUTS, RIG
@@ -55,7 +56,8 @@ def vjp(plant: Plant, command: Array, forces: Array, duration: float) -> Callabl
     held = duration / len(forces)
     count = dynamics.steps_in(held)
     step = held / count
-    tape, rig_rows = np.empty((len(forces) * count, at.STATES, plant.num_envs)), plant.lane_parameters.copy()
+    blocks, rig_rows = -(-plant.num_envs // BLOCK), plant.lane_parameters.copy()
+    tape = np.empty((blocks, len(forces) * count, at.STATES, BLOCK))
     steps.advance(plant.state, command, forces, rig_rows, count, step, plant.impacts, tape)
 
     def pullback(gradient: ArrayLike, rig: bool = False) -> Derivatives:

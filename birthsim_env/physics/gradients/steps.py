@@ -86,7 +86,7 @@ def back_over(
 def advance(
     state: Array, command: Array, forces: Array, parameters: Array, steps: int, step: float, impacts: Array, tape: Array
 ) -> None:
-    """``dynamics.advance``, which keeps the state before every step in ``tape`` (K steps, 18, N)."""
+    """``dynamics.advance``, which keeps the state before every step in ``tape`` (blocks, K steps, 18, BLOCK)."""
     x, u, f = np.empty((at.STATES, BLOCK)), np.empty((4, BLOCK)), np.empty((2, BLOCK))
     p, dx = np.empty((at.PARAMETERS, BLOCK)), np.empty((at.STATES, BLOCK))
     total, trial, hit = np.empty((at.STATES, BLOCK)), np.empty((at.STATES, BLOCK)), np.empty((2, BLOCK))
@@ -96,9 +96,9 @@ def advance(
         load(command, first, n, u)
         load(parameters, first, n, p)
         hit[:] = 0.0
-        for k in range(tape.shape[0]):
+        for k in range(tape.shape[1]):
             load(forces[k // steps], first, n, f)
-            store(x, first, n, tape[k])
+            store(x, 0, n, tape[first // BLOCK, k])
             dynamics.integrate(x, u, f, p, 1, step, hit, dx, total, trial, n)
         dynamics.settle(x, n)
         store(x, first, n, state)
@@ -123,8 +123,8 @@ def backward(
         load(parameters, first, n, p)
         load(late, first, n, lam)
         total[:], out[:] = 0.0, 0.0
-        for k in range(tape.shape[0] - 1, -1, -1):
-            load(tape[k], first, n, points[0])
+        for k in range(tape.shape[1] - 1, -1, -1):
+            load(tape[first // BLOCK, k], 0, n, points[0])
             load(forces[k // steps], first, n, f)
             lay_out(points, u, f, p, 1, step, x, dx, sums, trial, n)
             if rig:
