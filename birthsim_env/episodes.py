@@ -92,6 +92,12 @@ class Episodes:
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
         self._path = None
 
+    def begin_as(self, seeds: list[int], numbers: list[int], options: dict[str, Any] | None = None) -> None:
+        """Start episodes of other lanes in the first of these: those of the ``numbers`` of lanes with these ``seeds``."""
+        self._seeds[: len(seeds)], self._numbers[: len(seeds)] = seeds, numbers
+        self._seeds += self._seeds[:1] * (len(self.elapsed) - len(self._seeds))
+        self.begin(np.arange(len(self.elapsed)) < len(seeds), options, again=True)
+
     def step(self, actions: Array) -> tuple[Array, NDArray[np.bool_]]:
         """One policy step; returns terms of the reward and the reward, (6, N), and which lanes have left the physical range."""
         if not self.begun:
@@ -104,6 +110,10 @@ class Episodes:
     def success(self) -> NDArray[np.bool_]:
         """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
         return np.asarray(self._outcome.ends[1] > 0.0)
+
+    def outcome_rows(self) -> list[tuple[Array, list[str]]]:
+        """Arrays (rows, N) of what a policy step pays, how episodes are doing, and info, with the names of their rows."""
+        return self._outcome.named()
 
     def observation(self) -> NDArray[np.float32]:
         """Observations of all lanes now, (N, size)."""
