@@ -12,7 +12,7 @@ from birthsim_build.code.ptx import assemble
 from birthsim_build.code.stack import stack_bytes
 from birthsim_build.device.export import write_programs
 from birthsim_build.estimate import estimates
-from birthsim_build.faces.c import write_example, write_header
+from birthsim_build.faces.c import write_example, write_header, write_kernels
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
 from birthsim_env.physics.rig.parameters import Parameters
@@ -75,6 +75,7 @@ def build_threads(loops: Sequence[Loop], rig: Parameters, seed: int, gpu: str | 
     """Write kernels, PTX or for one ``gpu`` a cubin, and the program of each loop; returns sizes in bytes, and what a thread
     takes where that is known."""
     functions, space, data = write_programs(loops, rig, seed, folder)
+    write_kernels(folder)
     compile_object(functions, "ptx", folder / "birthsim.o", space=space)
     ptx = folder / "birthsim.ptx"
     report: Report = {"target": "ptx", "code": ptx.stat().st_size, "a lane of": data}

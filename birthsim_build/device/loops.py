@@ -1,5 +1,7 @@
 """The loops of environments as ``Pieces``."""
 
+import numpy as np
+
 from baselines.staged import driving
 from birthsim_build.device.program import Pieces
 from birthsim_build.loops import compiled_law
@@ -31,5 +33,5 @@ def controlled(scenario: str, sensors: str, rig: Parameters, controller: str, se
     """``lanes`` of a scenario under a compiled controller, where the episode seeded ``seed`` begins in each."""
     law = compiled_law(controller, rig)
     episodes = Episodes(assemble(lanes, scenario, sensors=sensors, parameters=rig, actuation=driving(law, controller)))
-    episodes.begin_as([seed] * lanes, [0] * lanes)
+    episodes.begin_first([seed] * lanes, np.zeros(lanes, dtype=np.int64))
     return episodes

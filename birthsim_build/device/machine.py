@@ -119,6 +119,8 @@ class Cuda:
             path.write_bytes(_compiled(functions, "ptx", space, ".ptx"))
             module = self.arrays.RawModule(path=str(path))
             entries = {name: module.get_function(f"birthsim_{name}") for name in RUNS}
+            for entry in entries.values():
+                entry.compile()  # else the file is read at the first call
 
         def run(name: str, threads: int, *arguments: int) -> None:
             entries[name]((-(-threads // WIDTH),), (WIDTH,), tuple(map(np.int64, arguments)))

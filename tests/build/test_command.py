@@ -57,6 +57,7 @@ def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
     status, said, _ = call("export", monkeypatch, capsys, "--to", "ptx", "--controller", "pid", "--out", tmp_path / "out")
     assert status == 0
     assert "a lane of circle_ideal_pid" in said
+    assert f"Word {threads.MISSED} of the program" in (tmp_path / "out" / "kernels.h").read_text()
     words = np.fromfile(tmp_path / "out" / "circle_ideal_pid.bin", dtype=np.int64)
     assert words[0] == threads.MAGIC
     about = json.loads((tmp_path / "out" / "circle_ideal_pid.json").read_text())

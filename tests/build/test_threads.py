@@ -31,7 +31,7 @@ def begun(lanes, scenario="circle", controller=None, **arguments):
     if controller is not None:
         return controlled(scenario, arguments["sensors"], Parameters(), controller, SEED, lanes)
     episodes = Episodes(assemble(lanes, scenario, randomize=True, **arguments))
-    episodes.begin_as(list(range(SEED, SEED + lanes)), [0] * lanes)
+    episodes.begin_first(list(range(SEED, SEED + lanes)), np.zeros(lanes, dtype=np.int64))
     return episodes
 
 

@@ -39,17 +39,17 @@ def rows() -> dict[str, tuple[str, str, str]]:
     return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}
 
 
-def fingerprint(scenario: str, sensors: str, who: str) -> str:
+def fingerprint(scenario: str, sensors: str, who: str, device: str | None = None) -> str:
     """SHA-256 of one run."""
     digest = hashlib.sha256()
-    for arrays in _run(scenario, sensors, who):
+    for arrays in _run(scenario, sensors, who, device):
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
 
-def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
-    shared = {"num_envs": LANES, "sensors": sensors, "randomize": True}
+def _run(scenario: str, sensors: str, who: str, device: str | None) -> Iterator[tuple[Any, ...]]:
+    shared = {"num_envs": LANES, "sensors": sensors, "randomize": True, "device": device}
     if who == "residual":
         policy = load_policy(best_policy(scenario))
         act = policy.network.acting()
@@ -68,7 +68,7 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
         observation, reward, terminated, *_ = env.step(action)
         if controller and terminated.any():
             controller.reset(terminated)
-        yield env.simulation.plant.state, observation, reward
+        yield env.plant_state, observation, reward
     env.close()
 
 
