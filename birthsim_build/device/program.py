@@ -5,7 +5,7 @@ what a lane begins with. What lanes have of their own, rows of the world, memori
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -74,8 +74,12 @@ class Region:
         return (*(slice(None) for _ in self.before), lanes)
 
 
-def key_of(array: NDArray[Any]) -> tuple[int, int]:
-    """Address and size, by which an array is known: views of the same memory are one."""
+Key = tuple[int, int]
+"""Address and size of an array: views of the same memory are one."""
+
+
+def key_of(array: NDArray[Any]) -> Key:
+    """What tells an array from others."""
     return array.__array_interface__["data"][0], array.nbytes
 
 
@@ -107,6 +111,51 @@ def _regions(many: Pieces, other: Pieces) -> list[Region | None]:
     return found
 
 
+class _Writer:
+    """Writes words behind the lists of a program, from word ``size`` on, and notes what a device has to put into place."""
+
+    def __init__(self, size: int) -> None:
+        self.size, self.pieces, self.relocations = size, list[Words](), list[tuple[int, int, int]]()
+
+    def put(self, array: NDArray[Any]) -> int:
+        """The word at which the content of an array stands."""
+        content = np.ascontiguousarray(array).tobytes()
+        self.pieces.append(np.frombuffer(content + bytes(-len(content) % 8), dtype=np.int64))
+        self.size += len(self.pieces[-1])
+        return self.size - len(self.pieces[-1])
+
+    def refer(self, where: int, kind: int, value: int) -> None:
+        """A device puts something into the word ``where``, see ``code.threads.place``."""
+        self.relocations.append((where, kind, value))
+
+    def tables(self, stage: Stage, regions: Mapping[Key, Region]) -> int:
+        """The word at which the descriptions of a stage's tables stand."""
+        about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
+        for entry, table in zip(about, stage.tables, strict=False):
+            entry[1 : 1 + table.ndim] = table.shape
+        first = self.put(about)
+        for where, table in enumerate(stage.tables):
+            entry_at, region = first + TABLE * where, regions.get(key_of(table))
+            if region is None:
+                self.refer(entry_at, IN_PROGRAM, self.put(table))
+            else:
+                self.refer(entry_at, IN_DATA, region.first)
+                self.refer(entry_at + 1 + len(region.before), COUNT, 0)
+        return first
+
+
+def _moves(loop: Pieces) -> tuple[list[Place], dict[int, int], int]:
+    """Arrays with the rows of a lane's memory to which they are copied, those rows for what stages remember, and all rows."""
+    moves = [*loop.world, *((array, WORLD + row) for array, row in loop.seen)]
+    rows, memories = WORLD + SEEN, dict[int, int]()
+    for stage in loop.every:
+        if stage.memory is not None and id(stage.memory) not in memories:
+            memories[id(stage.memory)] = rows
+            moves.append((stage.memory, rows))
+            rows += len(stage.memory)
+    return [(array, row) for array, row in moves if array.size], memories, rows
+
+
 def program_of(many: Pieces, other: Pieces, functions: Sequence[str]) -> Program:
     """The program of a loop; lanes begin as the first of ``many`` does. ``functions`` are those of the code, in order.
 
@@ -114,61 +163,26 @@ def program_of(many: Pieces, other: Pieces, functions: Sequence[str]) -> Program
     found = _regions(many, other)
     arrays = [(array, region) for array, region in zip(many.arrays(), found, strict=True) if region]
     regions = {key_of(array): region for array, region in arrays}
+    moves, memories, space = _moves(many)
     tables = [table for stage in many.every for table in stage.tables]
-    own = sum(key_of(table) in regions for table in tables)
-    moves = [(array, row) for array, row in many.world] + [(array, WORLD + row) for array, row in many.seen]
-    space, memories = WORLD + SEEN, dict[int, int]()
-    for stage in many.every:
-        if stage.memory is not None and id(stage.memory) not in memories:
-            memories[id(stage.memory)] = space
-            moves.append((stage.memory, space))
-            space += len(stage.memory)
-    moves = [(array, row) for array, row in moves if array.size]
-    relocations: list[tuple[int, int, int]] = []
-    pieces: list[Words] = []
-    counts = (len(moves), len(many.every), len(arrays), len(moves) + 2 * len(many.every) + len(tables) + own)
-    size = HEAD + sum(count * words for count, words in zip(counts, (MOVE, STAGE, FILL, RELOCATION), strict=True))
-
-    def put(array: NDArray[Any]) -> int:
-        """The word at which the content of an array stands."""
-        nonlocal size
-        content = np.ascontiguousarray(array).tobytes()
-        pieces.append(np.frombuffer(content + bytes(-len(content) % 8), dtype=np.int64))
-        size += len(pieces[-1])
-        return size - len(pieces[-1])
-
-    def refer(where: int, kind: int, value: int) -> None:
-        relocations.append((where, kind, value))
-
-    moved = np.zeros((len(moves), MOVE), dtype=np.int64)
+    of_lanes = sum(key_of(table) in regions for table in tables)
+    counts = (len(moves), len(many.every), len(arrays), len(moves) + 2 * len(many.every) + len(tables) + of_lanes)
+    writer = _Writer(HEAD + sum(count * words for count, words in zip(counts, (MOVE, STAGE, FILL, RELOCATION), strict=True)))
+    moved, staged, fills = [], [], []
     for k, (array, row) in enumerate(moves):
-        refer(HEAD + MOVE * k, IN_DATA, regions[key_of(array)].first)
-        moved[k, 1:] = len(array), row, array.flags.writeable
-    staged = np.zeros((len(many.every), STAGE), dtype=np.int64)
+        writer.refer(HEAD + MOVE * k, IN_DATA, regions[key_of(array)].first)
+        moved.append((0, len(array), row, int(array.flags.writeable)))
     for k, stage in enumerate(many.every):
-        where = HEAD + MOVE * len(moves) + STAGE * k
         memory = space if stage.memory is None else memories[id(stage.memory)]
-        staged[k, :4] = functions.index(function_name(stage)), k >= len(many.stages), stage.sees_world, memory
-        about = np.zeros((max(1, len(stage.tables)), TABLE), dtype=np.int64)
-        shared = [None if key_of(table) in regions else put(table) for table in stage.tables]
-        for entry, table in zip(about, stage.tables, strict=False):
-            entry[1 : 1 + table.ndim] = table.shape
-        described = put(about)
-        for t, (table, place) in enumerate(zip(stage.tables, shared, strict=True)):
-            if place is None:
-                region = regions[key_of(table)]
-                refer(described + TABLE * t, IN_DATA, region.first)
-                refer(described + TABLE * t + 1 + len(region.before), COUNT, 0)
-            else:
-                refer(described + TABLE * t, IN_PROGRAM, place)
-        refer(where + 4, IN_PROGRAM, put(stage.constants))
-        refer(where + 5, IN_PROGRAM, described)
-    fills = []
+        number, closes = functions.index(function_name(stage)), int(k >= len(many.stages))
+        staged.append((number, closes, int(stage.sees_world), memory, 0, 0))
+        constants = HEAD + MOVE * len(moves) + STAGE * k + 4
+        writer.refer(constants, IN_PROGRAM, writer.put(stage.constants))
+        writer.refer(constants + 1, IN_PROGRAM, writer.tables(stage, regions))
     for array, region in arrays:
-        begun = array[region.at(0)]
         before, behind = math.prod(region.before), math.prod(region.behind) * region.dtype.itemsize // HALF
-        fills.append((region.first, before, behind, put(begun)))
+        fills.append((region.first, before, behind, writer.put(array[region.at(0)])))
     rows = sum(region.rows for region in regions.values())
-    head = np.array([MAGIC, size, 0, 0, rows, space, 0, *counts, 0], dtype=np.int64)
-    lists = [np.ravel(np.array(one, dtype=np.int64)) for one in (moved, staged, fills, relocations)]
-    return Program(np.concatenate([head, *lists, *pieces]), tuple(found), rows, space)
+    head = np.array([MAGIC, writer.size, 0, 0, rows, space, 0, *counts, 0], dtype=np.int64)
+    lists = [np.ravel(np.array(one, dtype=np.int64)) for one in (moved, staged, fills, writer.relocations)]
+    return Program(np.concatenate([head, *lists, *writer.pieces]), tuple(found), rows, space)
