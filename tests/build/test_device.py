@@ -111,10 +111,15 @@ def test_two_devices_are_one():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("device", ["host", "cuda"])
 @pytest.mark.parametrize("row", fingerprints.rows())
-def test_the_stored_fingerprints(row):
+def test_the_stored_fingerprints(row, device):
+    try:
+        machine.machine_named(device)
+    except ValueError as missing:
+        pytest.skip(str(missing))
     stored = json.loads(fingerprints.FILE.read_text(encoding="utf-8"))
-    assert fingerprints.fingerprint(*fingerprints.rows()[row], device="host") == stored[row]
+    assert fingerprints.fingerprint(*fingerprints.rows()[row], device=device) == stored[row]
 
 
 @pytest.mark.slow

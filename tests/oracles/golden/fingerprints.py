@@ -48,6 +48,11 @@ def fingerprint(scenario: str, sensors: str, who: str, device: str | None = None
     return digest.hexdigest()
 
 
+def _here(array: Any) -> Any:
+    """An array of NumPy's, also of one that CuPy has on a GPU."""
+    return array.get() if hasattr(array, "get") else array
+
+
 def _run(scenario: str, sensors: str, who: str, device: str | None) -> Iterator[tuple[Any, ...]]:
     shared = {"num_envs": LANES, "sensors": sensors, "randomize": True, "device": device}
     if who == "residual":
@@ -59,16 +64,16 @@ def _run(scenario: str, sensors: str, who: str, device: str | None) -> Iterator[
         env = gymnasium.make_vec(environment_id(scenario), **shared, policy_period=period)
     controller = None if who in ("openings", "residual") else make_controller(who, Parameters())
     rng = np.random.default_rng(SEED)
-    observation, _ = env.reset(seed=SEED)
+    observation = _here(env.reset(seed=SEED)[0])
     for _ in range(PERIODS if controller else STEPS):
         if controller:
             action = controller.command(env.measurement, env.reference).T
         else:
             action = act(observation) if who == "residual" else rng.uniform(-0.4, 0.4, (LANES, 4))
-        observation, reward, terminated, *_ = env.step(action)
+        observation, reward, terminated = map(_here, env.step(action)[:3])
         if controller and terminated.any():
             controller.reset(terminated)
-        yield env.plant_state, observation, reward
+        yield _here(env.plant_state), observation, reward
     env.close()
 
 
