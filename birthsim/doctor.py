@@ -11,7 +11,7 @@ ABOUT = {
     "agents": "policies: train, explain, residual", "live": "the page: live", "onnx": "export --to onnx",
     "build": "export --to wasm, c, fmu", "log": "export --to parquet, mcap", "tune": "tune", "video": "films of episodes",
     "control": "linear models for python-control", "cluster": "--cluster ray",
-    "sweep": "sweeps of trainings", "jax": "gradients for JAX",
+    "sweep": "sweeps of trainings", "jax": "gradients for JAX", "cuda": 'device="cuda", export --to cubin',
 }  # fmt: skip
 """Extra -> what it is for."""
 
@@ -64,9 +64,13 @@ def extras() -> dict[str, list[str]]:
 
 
 def graphics() -> str:
-    """What PyTorch finds; no command of BirthSIM needs a GPU."""
-    if found("torch") is None:
-        return "not looked for, PyTorch is missing; no command needs one"
-    import torch
-
-    return torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none; no command needs one"
+    """What CuPy finds, which launches BirthSIM's kernels; no command needs a GPU."""
+    try:
+        import cupy
+    except ImportError:
+        return "not looked for, CuPy is missing (extra cuda); no command needs one"
+    try:
+        name = cupy.cuda.runtime.getDeviceProperties(0)["name"].decode()
+    except cupy.cuda.runtime.CUDARuntimeError as error:
+        return f"none for CuPy {cupy.__version__} ({error}); no command needs one"
+    return f"{name}, by CuPy {cupy.__version__}"

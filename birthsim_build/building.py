@@ -1,24 +1,30 @@
 """Builds a bundle for a target into a folder."""
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from birthsim_build.bundle import Bundle
 from birthsim_build.code.compiler import EMULATIONS, compile_object, link
 from birthsim_build.code.elf import sections_of, undefined_in
+from birthsim_build.code.ptx import assemble
 from birthsim_build.code.stack import stack_bytes
+from birthsim_build.device.export import write_programs
 from birthsim_build.estimate import estimates
-from birthsim_build.faces.c import write_example, write_header
+from birthsim_build.faces.c import write_example, write_header, write_kernels
 from birthsim_build.faces.javascript import write_javascript
 from birthsim_build.image import Words
+from birthsim_env.physics.rig.parameters import Parameters
 
 EXPORTS = ("birthsim_advance", "__heap_base")
 STACK = 65536
 """Bytes of stack in WebAssembly; the largest loop takes a tenth."""
 
 Report = dict[str, Any]
+
+Loop = tuple[str, str, str]
+"""Scenario, sensors and controller."""
 
 
 def write_wasm(functions: list[str], out: Path) -> None:
@@ -63,6 +69,22 @@ def build_cortex(bundle: Bundle, folder: Path) -> Report:
     stack = stack_bytes(assembly.read_text(), "birthsim_advance", "birthsim_stage_")
     assembly.unlink()
     return {"target": "cortex-m7", **built, "stack": stack, "estimate": estimates(bundle)}
+
+
+def build_threads(loops: Sequence[Loop], rig: Parameters, seed: int, gpu: str | None, folder: Path) -> Report:
+    """Write kernels, PTX or for one ``gpu`` a cubin, and the program of each loop; returns sizes in bytes, and what a thread
+    takes where that is known."""
+    functions, space, data = write_programs(loops, rig, seed, folder)
+    write_kernels(folder)
+    compile_object(functions, "ptx", folder / "birthsim.o", space=space)
+    ptx = folder / "birthsim.ptx"
+    report: Report = {"target": "ptx", "code": ptx.stat().st_size, "a lane of": data}
+    if gpu is None:
+        return report
+    cubin = folder / "birthsim.cubin"
+    thread = assemble(ptx, cubin, gpu)
+    ptx.unlink()
+    return {**report, "target": f"cubin for {gpu}", "code": cubin.stat().st_size, "thread": thread}
 
 
 def _object(bundle: Bundle, target: str, folder: Path, images: Mapping[str, Words]) -> Report:

@@ -4,7 +4,6 @@ The law runs on this machine, on what sensors said in a closed loop, as code tha
 """
 
 import ctypes
-import platform
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 from birthsim_build.bundle import Bundle, identifier, make_bundle
 from birthsim_build.code.compiler import EMULATIONS, compile_object, has_linker, link
 from birthsim_build.code.counting import COUNTS, OPERATIONS
+from birthsim_build.code.targets import HOST
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import ROWS
 from birthsim_env.loop.rows import ASKED, WORLD
@@ -27,9 +27,6 @@ CYCLES = {
 
 PERIODS = 2000
 """Control periods that are counted: two seconds of the Circle, with its first push."""
-
-HOST = {"x86_64": "x86-64", "aarch64": "aarch64"}.get(platform.machine()) if platform.system() == "Linux" else None
-"""The target whose shared library runs on this machine; None where there is none."""
 
 
 def estimates(bundle: Bundle) -> dict[str, dict[str, float]]:

@@ -55,11 +55,16 @@ def scenario_world(environment: str, sensors: str, rig: Parameters, seed: int = 
 
 def law_part(controller: str, rig: Parameters, sampled: bool) -> Part:
     """A controller as a part, from what is measured to openings. Raises ``ValueError`` for one that is not compiled."""
+    return staged_part(compiled_law(controller, rig), sampled)
+
+
+def compiled_law(controller: str, rig: Parameters) -> StagedController:
+    """A controller that believes in ``rig``. Raises ``ValueError`` for one that is not compiled."""
     law = make_controller(controller, rig)
     if not is_compiled(law):
         compiled = [name for name in controller_names() if name == RESIDUAL or is_compiled(_made(name, rig))]
         raise ValueError(f"controller = {controller!r}; allowed: a compiled one: {', '.join(compiled)}")
-    return staged_part(law, sampled)
+    return law
 
 
 def is_compiled(law: object) -> TypeGuard[StagedController]:

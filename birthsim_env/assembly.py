@@ -1,6 +1,7 @@
 """Builds the simulation of an environment from the arguments of ``gym.make``, refusing what cannot be."""
 
 import inspect
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -183,13 +184,14 @@ def refuse_unknown(unknown: Iterable[str], more: Sequence[str] = (), less: Seque
         raise TypeError(f"got an unexpected keyword argument {', '.join(map(repr, wrong))}; allowed: {', '.join(known)}")
 
 
-def checked_actions(actions: Any, num_envs: int, size: int, clip: bool) -> np.ndarray[Any, np.dtype[np.float64]]:
+def checked_actions(actions: Any, num_envs: int, size: int, clip: bool, arrays: Any = np) -> Any:
     """Actions (num_envs, size) as contiguous (size, num_envs), or a ``ValueError`` that names what is wrong.
 
-    Finite numbers beyond [-1, 1] are clipped where ``clip`` says so.
+    Finite numbers beyond [-1, 1] are clipped where ``clip`` says so. ``arrays`` is NumPy, or the module like it of the arrays
+    that are wanted.
     """
     try:
-        array = np.asarray(actions, dtype=np.float64)
+        array = arrays.asarray(actions, dtype=np.float64)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         raise ValueError(f"action = {shown(actions)}; allowed: {size} numbers in [-1, 1]") from error
     if array.shape != (num_envs, size):
@@ -197,12 +199,12 @@ def checked_actions(actions: Any, num_envs: int, size: int, clip: bool) -> np.nd
         given = array.shape[1:] if num_envs == 1 and array.ndim > 0 else array.shape
         raise ValueError(f"action has shape {given}; allowed: {shape}, in [-1, 1]")
     # A copy even where the layout would allow a view: the caller may use one array for all of its actions.
-    columns = np.array(array.T, order="C")
-    extreme = np.abs(columns).max(initial=0.0)
+    columns = arrays.array(array.T, order="C")
+    extreme = float(abs(columns).max()) if columns.size else 0.0
     if extreme <= 1.0:
         return columns
-    if not (extreme <= 1.0 + ROUNDING or (clip and np.isfinite(extreme))):
-        lane, entry = (int(k) for k in np.argwhere(~(np.abs(array) <= 1.0 + ROUNDING))[0])
+    if not (extreme <= 1.0 + ROUNDING or (clip and math.isfinite(extreme))):
+        lane, entry = (int(k) for k in arrays.argwhere(~(abs(array) <= 1.0 + ROUNDING))[0])
         clips = "" if clip else ", or any with clip_actions=True or gymnasium.wrappers.ClipAction"
         raise ValueError(f"action[{entry}] = {array[lane, entry]} in lane {lane}; allowed: -1 to 1{clips}")
-    return np.clip(columns, -1.0, 1.0)
+    return arrays.clip(columns, -1.0, 1.0)

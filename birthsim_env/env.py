@@ -143,7 +143,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
         self.simulation = setup.simulation
         # A recorder takes a frame per step.
         self.metadata = {**self.metadata, "render_fps": setup.frames_per_second}
-        self._setup, self.steps = setup, setup.steps
+        self.steps = setup.steps
         self._episodes = Episodes(setup)
 
     @property
@@ -182,7 +182,7 @@ class BirthSIMEnv(Face, gymnasium.Env[NDArray[np.float32], NDArray[Any]]):
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One policy step."""
         episodes = self._episodes
-        paid, failed = episodes.step(self._checked([action], 1))
+        paid, failed = episodes.step(episodes.columns([action]))
         terminated = bool(failed[0])
         truncated = not terminated and bool(episodes.elapsed[0] >= self.steps)
         info: dict[str, Any] = single_info(episodes.describe())

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from birthsim_env.assembly import Setup
+from birthsim_env.assembly import Setup, checked_actions
 from birthsim_env.drawing.scene import Scene
-from birthsim_env.loop.signals import Mask
+from birthsim_env.loop.signals import Mask, Measurement, Reference
 from birthsim_env.outcome import Outcome
 from birthsim_env.parts.drawn.seeding import lane_seeds
 from birthsim_env.physics.compiled.lanes import PRESSURES, Y1, Y2, Array
@@ -23,6 +23,9 @@ PATH_POINTS = 160
 
 class Episodes:
     """The lanes of a ``Setup`` with their clocks and seeds; ``elapsed`` (N,) counts policy steps since an episode began."""
+
+    arrays: Any = np
+    """The module of the arrays of lanes."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -50,6 +53,11 @@ class Episodes:
         self.__dict__.update(state)
         beginning, closing = self._outcome.stages()
         self.simulation.beginning, self.simulation.closing = [beginning], [closing]
+
+    @property
+    def setup(self) -> Setup:
+        """What the episodes are made of."""
+        return self._setup
 
     @property
     def begun(self) -> bool:
@@ -84,13 +92,30 @@ class Episodes:
 
     def begin(self, lanes: Mask, options: dict[str, Any] | None = None, again: bool = False) -> None:
         """Start the next episode in the lanes of a mask (N,), or the present one ``again``."""
-        position = _start(options)
+        position = start_of(options)
         if not again:
             self._numbers[lanes] += 1
         self.elapsed[lanes] = 0
         self._outcome.begin(lanes)
         self.simulation.begin(lanes, self._seeds, self._numbers, self._setup.duration, position)
         self._path = None
+
+    def begin_first(self, seeds: list[int], numbers: NDArray[np.int64], position: Array | None = None) -> None:
+        """Put the episodes of these ``numbers`` of lanes with these ``seeds`` into the first lanes, whatever was there."""
+        count, missing = self.simulation.plant.num_envs, self.simulation.plant.num_envs - len(seeds)
+        first = np.arange(count) < len(seeds)
+        self._outcome.begin(first)
+        episodes = np.concatenate([numbers, np.zeros(missing, dtype=np.int64)])
+        self.simulation.begin(first, seeds + [0] * missing, episodes, self._setup.duration, position)
+
+    def columns(self, actions: Any) -> Array:
+        """Actions (N, size) as columns; ``ValueError`` for what they must not be."""
+        columns: Array = checked_actions(actions, len(self.elapsed), self.action_size, self._setup.clip_actions)
+        return columns
+
+    def local(self, array: Any) -> NDArray[Any]:
+        """An array of lanes as one of NumPy's."""
+        return np.asarray(array)
 
     def step(self, actions: Array) -> tuple[Array, NDArray[np.bool_]]:
         """One policy step; returns terms of the reward and the reward, (6, N), and which lanes have left the physical range."""
@@ -101,9 +126,28 @@ class Episodes:
         return self._outcome.terms.copy(), self._outcome.ends[0] > 0.0
 
     @property
+    def measurement(self) -> Measurement:
+        """What the sensors say now."""
+        return self.simulation.measurement
+
+    @property
+    def reference(self) -> Reference:
+        """What is asked for now."""
+        return self.simulation.reference
+
+    @property
+    def plant_state(self) -> Array:
+        """State of the plant, (18, N)."""
+        return self.simulation.plant.state
+
+    @property
     def success(self) -> NDArray[np.bool_]:
         """Whether the episodes are successful so far, (N,): see ``birthsim_env.success``."""
         return np.asarray(self._outcome.ends[1] > 0.0)
+
+    def outcome_rows(self) -> list[tuple[Array, list[str]]]:
+        """Arrays (rows, N) of what a policy step pays, how episodes are doing, and info, with the names of their rows."""
+        return self._outcome.named()
 
     def observation(self) -> NDArray[np.float32]:
         """Observations of all lanes now, (N, size)."""
@@ -159,7 +203,8 @@ class Episodes:
             self._renderer = None
 
 
-def _start(options: dict[str, Any] | None) -> Array | None:
+def start_of(options: dict[str, Any] | None) -> Array | None:
+    """Where episodes are to start: ``options["position"]``, (2,), m, or None; ``ValueError`` for other options."""
     if not isinstance(options, dict | None):
         raise ValueError(f"options = {shown(options)}; allowed: None or a dict")
     unknown = set(options or {}) - {"position"}

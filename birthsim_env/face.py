@@ -1,12 +1,10 @@
 """What the single and the vector environment say of themselves alike."""
 
 import copy
-from typing import Any
 
 from gymnasium.envs.registration import EnvSpec
 
-from birthsim_env.assembly import Setup, checked_actions
-from birthsim_env.physics.compiled.lanes import Array
+from birthsim_env.episodes import Episodes
 from birthsim_env.physics.rig.parameters import Parameters
 
 
@@ -16,22 +14,18 @@ class Face:
     steps: int
     """Policy steps of an episode that nothing ends early."""
 
-    _setup: Setup
+    _episodes: Episodes
     _spec: EnvSpec | None = None
-
-    def _checked(self, actions: Any, num_envs: int) -> Array:
-        """Actions (num_envs, size) as (size, num_envs); ``ValueError`` for what is refused."""
-        return checked_actions(actions, num_envs, self._setup.actuation.size, self._setup.clip_actions)
 
     @property
     def parameters(self) -> Parameters:
         """The rig as described; ``simulation.plant.lane_parameters`` has what an episode has drawn."""
-        return self._setup.simulation.parameters
+        return self._episodes.setup.simulation.parameters
 
     @property
     def dt(self) -> float:
         """s of a policy step."""
-        return self._setup.policy_period
+        return self._episodes.setup.policy_period
 
     @property
     def spec(self) -> EnvSpec | None:

@@ -95,6 +95,14 @@ class Outcome:
             for stepped in (False, True)
         ]  # fmt: skip
 
+    def named(self) -> list[tuple[Array, list[str]]]:
+        """``terms``, ``ends`` and ``rows`` with the names of their rows."""
+        pairs = (self.terms, reward.Terms), (self.ends, Ends), (self.rows, info.Info)
+        return [
+            (array, [f"{name}{k}" if count > 1 else name for name, _, _, count in kind.entries() for k in range(count)])
+            for array, kind in pairs
+        ]
+
     def begin(self, lanes: Mask) -> None:
         """Forget the past of the lanes of a mask (N,)."""
         self._memory[:, lanes], Memory(self._memory).fresh[lanes] = 0.0, 1.0

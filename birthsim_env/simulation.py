@@ -151,14 +151,24 @@ class Simulation:
         return self._openings.copy()
 
     @property
+    def seen(self) -> Array:
+        """The first rows of ``Seen``: what the sensors say and what is asked for."""
+        return self._seen
+
+    @property
     def reference(self) -> Reference:
         """What is asked for now."""
-        return Reference(self._seen[at.REFERENCE : at.ASKED].copy())
+        return self.signals_in(self._seen)[1]
 
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now."""
-        return measurement_of(self._seen, self._sampled, self._sampled and self._has_acceleration)
+        return self.signals_in(self._seen)[0]
+
+    def signals_in(self, seen: Array) -> tuple[Measurement, Reference]:
+        """What the sensors say and what is asked for in rows as those of ``seen``."""
+        said = measurement_of(seen, self._sampled, self._sampled and self._has_acceleration)
+        return said, Reference(seen[at.REFERENCE : at.ASKED].copy())
 
     def begin(
         self, lanes: Mask, seeds: list[int], episodes: NDArray[np.int64], duration: float, position: Array | None = None

@@ -1,5 +1,7 @@
 """The native vector environment: N lanes of one scenario in one kernel call."""
 
+import copy
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,10 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
     carry the lane first. ``reset(seed=s)`` seeds lane i with s + i; a list gives every lane its own seed. A lane gives the same
     numbers, to the last bit, as a single environment with its seed. ``max_episode_steps`` shortens episodes.
 
+    With ``device="cuda"`` the lanes live on an NVIDIA GPU, with the same bits, and so do all arrays that are returned. They are
+    CuPy's, which PyTorch and JAX take by DLPack without a copy. Actions may be NumPy's, or be there. New episodes are drawn on
+    this processor and copied there. ``device="host"`` runs a GPU's code on this processor.
+
     ``autoreset_mode`` says what happens to a lane that ends, as in Gymnasium (``AutoresetMode`` or its value):
     - ``NEXT_STEP`` (default): the next step ignores its action and returns the first observation of its new episode, reward 0;
     - ``SAME_STEP``: it starts anew within the same step; ``infos["final_obs"]`` and ``infos["final_info"]`` hold what it ended
@@ -44,6 +50,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        device: str | None = None,
         **arguments: Any,
     ) -> None:
         checked_count("num_envs", num_envs, 1, MOST_LANES)
@@ -58,7 +65,14 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         except (ValueError, TypeError):
             allowed = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ValueError(f"autoreset_mode = {shown(autoreset_mode)}; allowed: {allowed}") from None
-        setup = assemble(int(num_envs), scenario, **arguments)
+        if device is None:
+            self._episodes = Episodes(assemble(int(num_envs), scenario, **arguments))
+        else:
+            one_of("render_mode, with a device,", render_mode, (None,))
+            on_device = import_module("birthsim_build.device.episodes").DeviceEpisodes
+            # Each setup prepares the parts that it is given for its own lanes.
+            self._episodes = on_device(device, int(num_envs), lambda n: assemble(n, scenario, **copy.deepcopy(arguments)))
+        setup = self._episodes.setup
         frames = setup.frames_per_second
         self.metadata = {**self.metadata, "render_fps": frames, "autoreset_mode": self.autoreset_mode}
         self.num_envs = int(num_envs)
@@ -67,19 +81,23 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_names = setup.observation_names
         self.simulation = setup.simulation
-        self._setup, self.steps = setup, min(setup.steps, max_episode_steps or setup.steps)
-        self._episodes = Episodes(setup)
-        self._ended: NDArray[np.bool_] = np.zeros(self.num_envs, dtype=np.bool_)
+        self.steps = min(setup.steps, max_episode_steps or setup.steps)
+        self._ended: NDArray[np.bool_] = self._episodes.arrays.zeros(self.num_envs, dtype=np.bool_)
 
     @property
     def measurement(self) -> Measurement:
         """What the sensors say now, over the lanes: the input of a controller."""
-        return self.simulation.measurement
+        return self._episodes.measurement
 
     @property
     def reference(self) -> Reference:
         """What is asked for now, over the lanes: the other input of a controller."""
-        return self.simulation.reference
+        return self._episodes.reference
+
+    @property
+    def plant_state(self) -> Array:
+        """State of the plant, (18, num_envs), with the rows of ``STATE_NAMES``, SI units."""
+        return self._episodes.plant_state
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -97,10 +115,11 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             raise ValueError(f"options['staggered'] = {shown(staggered)}; allowed: True or False")
         self._episodes.seed(seed, self.np_random)
         self._episodes.begin(lanes, options)
-        self._ended = self._ended & ~lanes
+        arrays = self._episodes.arrays
+        self._ended = self._ended & ~arrays.asarray(lanes)
         if staggered:
-            self._episodes.elapsed[:] = np.arange(self.num_envs) * self.steps // self.num_envs
-        terms = {name: np.zeros(self.num_envs) for name in REWARD_TERMS}
+            self._episodes.elapsed[:] = arrays.arange(self.num_envs) * self.steps // self.num_envs
+        terms = {name: arrays.zeros(self.num_envs) for name in REWARD_TERMS}
         success = self._episodes.success
         return self._episodes.observation(), {**vector_info(self._episodes.describe()), **terms, "is_success": success}
 
@@ -120,7 +139,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             raise ValueError(
                 f"lanes {np.flatnonzero(self._ended).tolist()} have ended; allowed: reset(options={{'reset_mask': ...}})"
             )
-        paid, terminated = episodes.step(self._checked(actions, self.num_envs))
+        paid, terminated = episodes.step(episodes.columns(actions))
         if self._ended.any():
             # They have begun when they ended, so that nothing that is lost is integrated further; their first step is undone.
             episodes.begin(self._ended, again=True)
@@ -142,7 +161,7 @@ class BirthSIMVectorEnv(Face, VectorEnv[Observations, NDArray[Any], NDArray[Any]
             infos = {**vector_info(episodes.describe()), **terms, "is_success": episodes.success}
             infos["final_info"] = {**final, **{f"_{name}": ended for name in final}}
             infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
-            for lane in np.flatnonzero(ended):
+            for lane in np.flatnonzero(episodes.local(ended)):
                 infos["final_obs"][lane] = last[lane]
             infos["_final_obs"] = infos["_final_info"] = ended
         return observation, rewards, terminated, truncated, infos

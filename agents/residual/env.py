@@ -19,7 +19,7 @@ class _LawInside:
             if name in arguments:
                 raise ValueError(f"{name} = {arguments[name]!r}; allowed: not given, the law drives one valve per chamber")
         own = ("law", "impedance", "authority", "time_constant", "informed")
-        refuse_unknown(arguments, (*own, "num_envs", "max_episode_steps", "autoreset_mode"), inside)
+        refuse_unknown(arguments, (*own, "num_envs", "max_episode_steps", "autoreset_mode", "device"), inside)
         rig = load_parameters(arguments.pop("parameters", None))
         shared = {name: arguments[name] for name in ("policy_period", "force_sensor") if name in arguments}
         settings = ResidualSettings(**shared, **{name: arguments.pop(name) for name in own if name in arguments})

@@ -15,7 +15,8 @@ STAGE_ARGUMENTS = 5
 
 
 @helper
-def _words(address: int, count: int) -> Words:
+def words(address: int, count: int) -> Words:
+    """Words at an address."""
     return carray(pointer(address, np.int64), (count,))
 
 
@@ -26,21 +27,21 @@ def advance(image: int, periods: int, dispatch: int) -> int:
     ``dispatch`` is the address of what calls a stage by its number. Before the first period the addresses of tables are put
     into their descriptions, so that an image may have been copied.
     """
-    parts, rows, missed, left_out = _words(image, HEAD)[2], image + 8 * HEAD, 0, _words(image, HEAD)[LEFT_OUT]
+    parts, rows, missed, left_out = words(image, HEAD)[2], image + 8 * HEAD, 0, words(image, HEAD)[LEFT_OUT]
     seen, inputs, first = rows + 8 * WORLD, rows + 8 * (ROWS - Inputs.size), rows + 8 * ROWS
     part = first
     for _ in range(parts):
-        size, stages, tables, _ = _words(part, PART_HEAD)
+        size, stages, tables, _ = words(part, PART_HEAD)
         for k in range(tables):
-            described, table = _words(part + 8 * (PART_HEAD + ENTRY * stages + 2 * k), 2)
-            _words(part + 8 * described, 1)[0] = part + 8 * table
+            described, table = words(part + 8 * (PART_HEAD + ENTRY * stages + 2 * k), 2)
+            words(part + 8 * described, 1)[0] = part + 8 * table
         part += 8 * size
     for _ in range(periods):
         part = first
         for p in range(parts):
-            size, stages, _, _ = _words(part, PART_HEAD)
+            size, stages, _, _ = words(part, PART_HEAD)
             for s in range(0 if (left_out >> p) & 1 else stages):
-                number, memory, constants, tables = _words(part + 8 * (PART_HEAD + ENTRY * s), ENTRY)
+                number, memory, constants, tables = words(part + 8 * (PART_HEAD + ENTRY * s), ENTRY)
                 own = inputs if memory < 0 else part + 8 * memory
                 missed += call(dispatch, number, rows, seen, own, part + 8 * constants, part + 8 * tables, 0)
             part += 8 * size
@@ -50,7 +51,7 @@ def advance(image: int, periods: int, dispatch: int) -> int:
 def advance_code(stages: Sequence[str], kernel: str) -> str:
     """LLVM code of ``int32_t birthsim_advance(int64_t *image, int32_t periods)``; ``stages`` are symbols of compiled kernels,
     ``kernel`` is that of ``advance``."""
-    wrappers = "\n".join(_wrapper(number, symbol) for number, symbol in enumerate(stages))
+    wrappers = "\n".join(wrapper(number, symbol) for number, symbol in enumerate(stages))
     pointers = ", ".join(f"ptr @birthsim_stage_{number}" for number in range(len(stages)))
     given = ", ".join(f"i64 %{k}" for k in range(1, 1 + STAGE_ARGUMENTS))
     return f"""
@@ -76,14 +77,15 @@ define i32 @birthsim_advance(ptr noundef %image, i32 noundef %periods) nounwind 
 """
 
 
-def _wrapper(number: int, symbol: str) -> str:
-    """A stage for one lane, without the status and the exception of a compiled kernel: stages raise none."""
-    lanes = ", ".join(f"i64 {value}" for value in (0, 1))
+def wrapper(number: int, symbol: str, lane: str = "i64 0") -> str:
+    """A stage for one lane, a constant or an argument, without the status and the exception of a compiled kernel: stages raise
+    none."""
+    lanes, own = f"{lane}, i64 1", lane.startswith("i64 %")
     given = ", ".join(f"i64 %{k}" for k in range(STAGE_ARGUMENTS))
     types = ", ".join(["i64"] * ARGUMENTS)
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, {types})
-define hidden i64 @birthsim_stage_{number}({given}) nounwind {{
+define {"internal" if own else "hidden"} i64 @birthsim_stage_{number}({given}{f", {lane}" if own else ""}) nounwind {{
   %missed = alloca i64
   %error = alloca ptr
   store i64 0, ptr %missed

@@ -38,14 +38,16 @@ EMULATIONS = {"x86-64": "elf_x86_64", "aarch64": "aarch64linux"}
 
 
 def compile_object(
-    functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False
-) -> None:
+    functions: Sequence[str], target: str, out: Path, data: Mapping[str, Words] | None = None, count: bool = False,
+    space: int = 0,
+) -> None:  # fmt: skip
     """Write the object file ``out`` of stages (``module:name``), ``birthsim_advance`` and constant arrays of words.
 
-    For a Cortex-M7 the assembly stands beside it, ``.s``. Where it is to ``count``, the code counts its operations. Objects are
+    For a Cortex-M7 the assembly stands beside it, ``.s``; for PTX the text, ``.ptx``, stands in its place. Where it is to
+    ``count``, the code counts its operations. With ``space``, rows of a lane's memory, threads run lanes. Objects are
     kept beside the kernels' machine code: the same one of the same sources is not compiled twice.
     """
-    request = {"functions": list(functions), "target": target, "count": count}
+    request = {"functions": list(functions), "target": target, "count": count, "space": space}
     arrays = dict(data or {})
     place = _place(request, arrays)
     content = place and kept(place)

@@ -2,12 +2,18 @@
 
 import struct
 
-SYMBOL_TABLE = 2
+SYMBOL_TABLE, EMPTY = 2, 8
+"""Kinds of sections: names, and those that take memory where the code runs only."""
 
 
 def sections_of(content: bytes) -> dict[str, int]:
     """Bytes of every section, by name."""
     return {name: size for name, _, _, size, _ in _sections(content)}
+
+
+def contents_of(content: bytes) -> dict[str, bytes]:
+    """What is in every section, by name."""
+    return {name: content[start : start + size] for name, kind, start, size, _ in _sections(content) if kind != EMPTY}
 
 
 def undefined_in(content: bytes) -> list[str]:

@@ -2,8 +2,8 @@
 
     python -m birthsim_build.code.emit <REQUEST.json
 
-The request names functions (``module:name``), the target, data (an NPZ file of words by name), the object file,
-and whether the code counts its operations.
+The request names functions (``module:name``), the target, data (an NPZ file of words by name), the object file, whether the
+code counts its operations, and the rows of a lane's memory where threads run lanes (``code.threads``); else they are 0.
 """
 
 import json
@@ -19,6 +19,7 @@ import numpy as np
 from birthsim_build.code.advance import advance_code
 from birthsim_build.code.counting import counted
 from birthsim_build.code.targets import TARGETS, Target
+from birthsim_build.code.threads import RUNS, threads_code
 from birthsim_env.loop.stage import compiled
 from birthsim_env.physics.compiled.compilation import BLOCK
 
@@ -30,13 +31,14 @@ def main() -> None:
     request: dict[str, Any] = json.load(sys.stdin)
     if BLOCK != 1:
         raise RuntimeError(f"BIRTHSIM_BLOCK = {BLOCK}; allowed: 1")
-    emit(request["functions"], TARGETS[request["target"]], Path(request["data"]), Path(request["out"]), request["count"])
+    place, out = Path(request["data"]), Path(request["out"])
+    emit(request["functions"], TARGETS[request["target"]], place, out, request["count"], request["space"])
 
 
-def emit(functions: list[str], target: Target, data: Path, out: Path, count: bool) -> None:
-    """Write the object of ``functions`` with ``birthsim_advance`` and the constants of ``data``.
+def emit(functions: list[str], target: Target, data: Path, out: Path, count: bool, space: int) -> None:
+    """Write the object of ``functions`` with what runs them and the constants of ``data``; for PTX, its text.
 
-    Where it is to ``count``, the code counts its operations.
+    Where it is to ``count``, the code counts its operations. ``space`` as in the request.
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
@@ -46,9 +48,15 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
     )
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
     kernels = [_kernel_code(function) for function in functions]
-    symbol, runs = _kernel_code(f"{advance_code.__module__}:advance")
-    module = llvm.parse_assembly(head + advance_code([own for own, _ in kernels], symbol) + _constants(data))
-    for code in [runs, *(own for _, own in kernels)]:
+    stages, on_device = [own for own, _ in kernels], target.triple.startswith("nvptx")
+    if space:
+        runs = [_kernel_code(f"{threads_code.__module__}:{name}") for name in RUNS]
+        entry = threads_code(stages, [own for own, _ in runs], space, on_device)
+    else:
+        runs = [_kernel_code(f"{advance_code.__module__}:advance")]
+        entry = advance_code(stages, runs[0][0])
+    module = llvm.parse_assembly(head + entry + _constants(data))
+    for _, code in [*runs, *kernels]:
         module.link_in(llvm.parse_assembly(head + code))
     for one in [*module.functions, *module.global_variables]:
         if not one.is_declaration and not one.name.startswith(EXPORTED):
@@ -61,7 +69,10 @@ def emit(functions: list[str], target: Target, data: Path, out: Path, count: boo
         module = llvm.parse_assembly(counted(str(module)))
     if target.triple.startswith("thumb"):
         out.with_suffix(".s").write_text(machine.emit_assembly(module))
-    out.write_bytes(machine.emit_object(module))
+    if on_device:
+        out.with_suffix(".ptx").write_text(machine.emit_assembly(module))
+    else:
+        out.write_bytes(machine.emit_object(module))
 
 
 def _kernel_code(function: str) -> tuple[str, str]:

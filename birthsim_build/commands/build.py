@@ -2,6 +2,7 @@
 
 import platform
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from textwrap import fill
 from typing import Annotated
@@ -12,20 +13,25 @@ from baselines.about import RESIDUAL
 from baselines.commands.settings import CONTROL, CONTROLLER, MANY, WORLD, Configured, Kind, RigFile, Seed
 from baselines.commands.tables import aligned
 from baselines.registry import LISTED
-from birthsim_build.building import Report, build_c, build_cortex, build_wasm
-from birthsim_build.bundle import Bundle, make_bundle, scenario_of
+from birthsim_build.building import Report, build_c, build_cortex, build_threads, build_wasm
+from birthsim_build.bundle import make_bundle, scenario_of
 from birthsim_build.code.compiler import require_linker, require_llvm
-from birthsim_build.code.targets import BUILT
+from birthsim_build.code.ptx import require_assembler
+from birthsim_build.code.targets import BUILT, TARGETS
 from birthsim_env.files import make_folder, whole_results, write_json
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
 from birthsim_env.physics.rig.parameters import load_parameters
 
+OLDEST = TARGETS["ptx"].processor
+"""The GPU that PTX is for, and all after it."""
+
 
 @dataclass(kw_only=True)
 class Settings(Configured):
     """Compile closed loops, controllers alone and the plant alone into code that needs no Python: a WebAssembly module with
-    JavaScript, a shared library with a C header, or an object for a Cortex-M7 with the controllers alone.
+    JavaScript, a shared library with a C header, an object for a Cortex-M7 with the controllers alone, or kernels for an NVIDIA
+    GPU, one thread a lane.
 
     Every target computes the same bits as Python. The files are described in docs/build.md.
     """
@@ -42,6 +48,8 @@ class Settings(Configured):
     """Residual policies besides: folders that birthsim train wrote, or names of what is shipped."""
     all: bool = False
     """All environments, sensors, compiled controllers and policies."""
+    gpu: str | None = None
+    """Architecture of a cubin, as sm_90; else sm_80. PTX runs on any from there on."""
     parameters: RigFile = None
     seed: Seed = 0
     """Of the episode that begins."""
@@ -52,13 +60,26 @@ class Settings(Configured):
 def main(settings: Settings) -> None:
     """Build what is asked for, and say how large it is."""
     target = _this_processor() if settings.to == "c" else settings.to
-    bundle = _bundle(settings)
+    threads = target in ("ptx", "cubin")
+    if settings.gpu and target != "cubin":
+        raise ValueError(f"--gpu with {target}; allowed: with cubin")
+    rig = load_parameters(settings.parameters)
+    scenarios, sensors, controllers, policies = _chosen(settings)
     require_llvm()
-    if target != "cortex-m7":
+    if target == "cubin":
+        require_assembler()
+    elif not threads and target != "cortex-m7":
         require_linker()
+    bundle = None
+    if not threads:
+        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, target == "cortex-m7")
     folder = make_folder(settings.out)
     with whole_results(folder) as place:
-        if target == "wasm":
+        if bundle is None:
+            laws = [*controllers, *(f"{RESIDUAL}:{name}" for name in policies)]
+            gpu = (settings.gpu or OLDEST) if target == "cubin" else None
+            report = build_threads(list(product(scenarios, sensors, laws)), rig, settings.seed, gpu, place)
+        elif target == "wasm":
             report = build_wasm(bundle, place)
         elif target == "cortex-m7":
             report = build_cortex(bundle, place)
@@ -69,23 +90,20 @@ def main(settings: Settings) -> None:
     print(f"written to {folder}")
 
 
-def _bundle(settings: Settings) -> Bundle:
+def _chosen(settings: Settings) -> tuple[list[str], list[str], list[str], list[str]]:
+    """Scenarios, sensors, controllers and policies."""
     named = [name for name in ("env", "sensors", "controller", "policy") if getattr(settings, name)]
     if settings.all and named:
         raise ValueError(f"--all with --{named[0]}; allowed: one of them")
-    alone = settings.to == "cortex-m7"
-    if alone and settings.env:
+    if settings.to == "cortex-m7" and settings.env:
         raise ValueError("--env with cortex-m7; allowed: without it, the object has the laws alone")
-    rig = load_parameters(settings.parameters)
-    scenarios = list(SCENARIOS) if settings.all else [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
-    sensors = list(SENSORS) if settings.all else settings.sensors or ["ideal"]
-    policies = _shipped() if settings.all else settings.policy
-    controllers = settings.controller or ([] if policies else ["backstepping"])
-    if RESIDUAL in controllers:
+    if RESIDUAL in settings.controller:
         raise ValueError("--controller residual; allowed: --policy NAME")
     if settings.all:
-        controllers = list(LISTED)
-    return make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, alone)
+        return list(SCENARIOS), list(SENSORS), list(LISTED), _shipped()
+    scenarios = [scenario_of(one) for one in settings.env or ["BirthSIM/Circle-v1"]]
+    controllers = settings.controller or ([] if settings.policy else ["backstepping"])
+    return scenarios, list(settings.sensors or ["ideal"]), controllers, settings.policy
 
 
 def _this_processor() -> str:
@@ -107,7 +125,7 @@ def _shipped() -> list[str]:
 def _show(report: Report) -> None:
     sizes: list[tuple[str, str]] = []
     for name, value in report.items():
-        if name == "estimate":
+        if name in ("estimate", "thread"):
             continue
         if isinstance(value, dict):
             sizes += [(f"{name} {key}", f"{size:,}") for key, size in value.items()]
@@ -117,6 +135,9 @@ def _show(report: Report) -> None:
             said = ", ".join(value) or "nothing" if isinstance(value, list) else value
             print(fill(f"{name}: {said}", 80, subsequent_indent="    "))
     print(aligned(("", "bytes"), sizes))
+    if thread := report.get("thread"):
+        memory, spilled, registers = (thread[one] for one in ("memory", "spilled", "registers"))
+        print(f"a thread takes {registers} registers and {memory:,} bytes of memory; {spilled:,} bytes are spilled registers")
     if laws := report.get("estimate"):
         counts = [(law, *(f"{found[one]:,.0f}" for one in ("operations", "cycles", "most"))) for law, found in laws.items()]
         print(f"\n{aligned(('a period, estimated', 'operations', 'cycles', 'at most'), counts)}")

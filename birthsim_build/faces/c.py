@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from birthsim_build.code.threads import MISSED
 from birthsim_build.image import HEAD, Words
 from birthsim_build.layout import LAYOUT, ROWS
 from birthsim_env import __version__
@@ -28,6 +29,11 @@ def write_header(images: Mapping[str, Words], folder: Path, example: str | None 
     for mark, value in (("HEAD", str(HEAD)), ("ROWS", str(ROWS)), ("ENUM", rows), ("LOOPS", loops), ("EXAMPLE", chosen)):
         text = text.replace(f"@{mark}@", value)
     (folder / "birthsim.h").write_text(text)
+
+
+def write_kernels(folder: Path) -> None:
+    """Write ``kernels.h``, which says how the kernels of a GPU are launched."""
+    (folder / "kernels.h").write_text((HERE / "kernels.h").read_text().replace("@MISSED@", str(MISSED)))
 
 
 def write_example(folder: Path) -> None:

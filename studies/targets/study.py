@@ -13,7 +13,8 @@ from baselines.work.tasks import Result, Task
 from birthsim_build.building import build_c, build_cortex, build_wasm
 from birthsim_build.bundle import Bundle, identifier, make_bundle
 from birthsim_build.code.compiler import require_linker, require_llvm
-from birthsim_build.estimate import CYCLES, HOST
+from birthsim_build.code.targets import HOST
+from birthsim_build.estimate import CYCLES
 from birthsim_env.files import write_json
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS

@@ -3,7 +3,7 @@ import os
 import pytest
 from filelock import FileLock
 
-from birthsim_build.estimate import HOST
+from birthsim_build.code.targets import HOST
 from tests.build.targets import BUILT, build, need_linker
 
 

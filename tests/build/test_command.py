@@ -1,8 +1,13 @@
 """``birthsim export`` without what it needs: a line that says what to install, and nothing written."""
 
+import json
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+
+from birthsim_build.code import ptx, threads
 from tests.console import call
 
 
@@ -39,3 +44,36 @@ def test_laws_need_nothing_that_trains_policies():
     done = subprocess.run([sys.executable, "-c", WITHOUT_POLICIES], capture_output=True, text=True, check=False)
     assert int(done.stdout) > 1
     assert done.stderr.rstrip().endswith("a policy needs the extra: pip install 'birthsim[agents]'")
+
+
+def test_kernels_and_programs(tmp_path, monkeypatch, capsys):
+    def compiled(functions, target, out, space):
+        assert target == "ptx"
+        assert "baselines.rivals.pid:control" in functions
+        assert space == np.fromfile(out.parent / "circle_ideal_pid.bin", dtype=np.int64)[threads.SPACE]
+        out.with_suffix(".ptx").write_text("text")
+
+    monkeypatch.setattr("birthsim_build.building.compile_object", compiled)
+    status, said, _ = call("export", monkeypatch, capsys, "--to", "ptx", "--controller", "pid", "--out", tmp_path / "out")
+    assert status == 0
+    assert "a lane of circle_ideal_pid" in said
+    assert f"Word {threads.MISSED} of the program" in (tmp_path / "out" / "kernels.h").read_text()
+    words = np.fromfile(tmp_path / "out" / "circle_ideal_pid.bin", dtype=np.int64)
+    assert words[0] == threads.MAGIC
+    about = json.loads((tmp_path / "out" / "circle_ideal_pid.json").read_text())
+    assert about["words_of_data"] == words[threads.ROWS]
+    assert about["rows"]["rig_mass"] == 8
+    assert {"y1", "measured_x", "reward", "failed", "tracking_error1"} <= about["rows"].keys()
+    assert max(about["rows"].values()) < words[threads.ROWS]
+
+
+def test_a_cubin_needs_ptxas_and_only_a_cubin_a_gpu(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("birthsim_build.code.ptx.assembler", lambda: None)
+    status, _, complained = call("export", monkeypatch, capsys, "--to", "cubin", "--out", tmp_path / "out")
+    assert (status, complained) == (
+        2, "birthsim export: error: a cubin needs NVIDIA's ptxas: pip install 'birthsim[cuda]'\n"
+    )  # fmt: skip
+    _, _, complained = call("export", monkeypatch, capsys, "--to", "ptx", "--gpu", "sm_90", "--out", tmp_path / "out")
+    assert complained == "birthsim export: error: --gpu with ptx; allowed: with cubin\n"
+    with pytest.raises(ValueError, match="gpu = 'h100'; allowed: sm_"):
+        ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "h100")

@@ -7,7 +7,7 @@ import pytest
 
 from birthsim_build.building import build_c
 from birthsim_build.bundle import Bundle
-from birthsim_build.estimate import HOST
+from birthsim_build.code.targets import HOST
 from birthsim_build.loops import plant_world
 from birthsim_env import Parameters, Plant
 from studies.targets.reference import plant_states

@@ -3,7 +3,7 @@
 import pytest
 
 from birthsim_build.bundle import identifier
-from birthsim_build.estimate import HOST
+from birthsim_build.code.targets import HOST
 from studies.targets.reference import PERIODS, SHARED, law_openings, loop_rows
 from studies.targets.running import EMULATED, ROW, emulated_rows
 from tests.build.targets import BUILT, assert_same_bits, build, need_linker, need_program

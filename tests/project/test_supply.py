@@ -58,8 +58,8 @@ def test_every_dependency_of_the_project_is_locked():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = [*project["dependencies"], *(one for extra in project["optional-dependencies"].values() for one in extra)]
     names = {plain(re.match(r"[\w.-]+", one)[0]) for one in wanted}
-    # PyTorch has a file of its own; make installs no cluster.
-    assert names - {plain(name) for name in PINS["project"]} == {"torch", "ray"}
+    # PyTorch has a file of its own; make installs no cluster, and nothing for a GPU.
+    assert names - {plain(name) for name in PINS["project"]} == {"torch", "ray", "cupy-cuda12x", "nvidia-cuda-nvcc-cu12"}
 
 
 def test_what_is_vendored_is_the_published_package():

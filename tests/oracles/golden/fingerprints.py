@@ -39,17 +39,22 @@ def rows() -> dict[str, tuple[str, str, str]]:
     return {f"{scenario}, {sensors}, {who}": (scenario, sensors, who) for scenario, sensors, who in dict.fromkeys(chosen)}
 
 
-def fingerprint(scenario: str, sensors: str, who: str) -> str:
+def fingerprint(scenario: str, sensors: str, who: str, device: str | None = None) -> str:
     """SHA-256 of one run."""
     digest = hashlib.sha256()
-    for arrays in _run(scenario, sensors, who):
+    for arrays in _run(scenario, sensors, who, device):
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
 
-def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
-    shared = {"num_envs": LANES, "sensors": sensors, "randomize": True}
+def _here(array: Any) -> Any:
+    """An array of NumPy's, also of one that CuPy has on a GPU."""
+    return array.get() if hasattr(array, "get") else array
+
+
+def _run(scenario: str, sensors: str, who: str, device: str | None) -> Iterator[tuple[Any, ...]]:
+    shared = {"num_envs": LANES, "sensors": sensors, "randomize": True, "device": device}
     if who == "residual":
         policy = load_policy(best_policy(scenario))
         act = policy.network.acting()
@@ -59,16 +64,16 @@ def _run(scenario: str, sensors: str, who: str) -> Iterator[tuple[Any, ...]]:
         env = gymnasium.make_vec(environment_id(scenario), **shared, policy_period=period)
     controller = None if who in ("openings", "residual") else make_controller(who, Parameters())
     rng = np.random.default_rng(SEED)
-    observation, _ = env.reset(seed=SEED)
+    observation = _here(env.reset(seed=SEED)[0])
     for _ in range(PERIODS if controller else STEPS):
         if controller:
             action = controller.command(env.measurement, env.reference).T
         else:
             action = act(observation) if who == "residual" else rng.uniform(-0.4, 0.4, (LANES, 4))
-        observation, reward, terminated, *_ = env.step(action)
+        observation, reward, terminated = map(_here, env.step(action)[:3])
         if controller and terminated.any():
             controller.reset(terminated)
-        yield env.simulation.plant.state, observation, reward
+        yield _here(env.plant_state), observation, reward
     env.close()
 
 

@@ -1,0 +1,170 @@
+"""What runs a program (``device.program``) on a device: one thread a lane, a lane's rows in the thread's own memory.
+
+A graphics processor lays out the memory of neighbouring threads word by word side by side, and so do programs with the data of
+their lanes: what 32 threads read or write at once lies together.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from birthsim_build.code.advance import words, wrapper
+from birthsim_env.loop.loop import load_rows, store_rows
+from birthsim_env.loop.rows import WORLD
+from birthsim_env.loop.stage import call, carray, pointer
+from birthsim_env.physics.compiled.compilation import kernel
+
+MAGIC = 0x31_73_64_61_65_72_68_74
+"""First word of a program: the version of this format, "threads1"."""
+
+HEAD = 12
+FORMAT, WORDS, LANES, DATA, ROWS, SPACE, MISSED, MOVES, STAGES, FILLS, RELOCATIONS = range(11)
+"""Words of a program's head: ``MAGIC``; its words in all; lanes, and the address of their data; words of data of a lane, and
+rows of its memory in a period; how often a stage could not serve a lane; and how many of each of these follow, in this order:
+"""
+
+MOVE, STAGE, FILL, RELOCATION = 4, 6, 4, 3
+"""Words of each. A move: address of an array (rows, lanes), its rows, the first row of a lane's memory, whether it is written.
+A stage: number of its function, 1 if it closes a policy step, 1 if it sees the world, the first row of what it remembers;
+addresses of its constants and of what describes its tables. A fill: first row of an array in the data, its numbers of 32 bits
+before and behind its lanes, and the word at which those of a lane that begins are. A relocation: see ``place``."""
+
+IN_PROGRAM, IN_DATA, COUNT = range(3)
+"""Kinds of relocation: the address of a word of the program, that of a row of the data, the number of lanes."""
+
+
+@kernel
+def place(program: int, lane: int, data: int, lanes: int) -> int:
+    """Put what depends on where program and ``data`` are, and on the number of ``lanes``, into a program; lane 0 does it.
+
+    A relocation is the word to be written, its kind, and a number of words or rows."""
+    if lane > 0:
+        return 0
+    head = words(program, HEAD)
+    head[LANES], head[DATA], head[MISSED] = lanes, data, 0
+    first = HEAD + MOVE * head[MOVES] + STAGE * head[STAGES] + FILL * head[FILLS]
+    for k in range(head[RELOCATIONS]):
+        where, kind, value = words(program + 8 * (first + RELOCATION * k), RELOCATION)
+        to = program + 8 * value if kind == IN_PROGRAM else data + 8 * lanes * value
+        words(program + 8 * where, 1)[0] = lanes if kind == COUNT else to
+    return 0
+
+
+@kernel
+def fill(program: int, lane: int, unused: int, also_unused: int) -> int:
+    """A lane begins as the program says."""
+    head = words(program, HEAD)
+    lanes, first = head[LANES], HEAD + MOVE * head[MOVES] + STAGE * head[STAGES]
+    if lane >= lanes:
+        return 0
+    for k in range(head[FILLS]):
+        row, before, behind, at = words(program + 8 * (first + FILL * k), FILL)
+        begun = carray(pointer(program + 8 * at, np.int32), (before, behind))
+        array = carray(pointer(head[DATA] + 8 * lanes * row, np.int32), (before, lanes, behind))
+        for j in range(before):
+            for i in range(behind):
+                array[j, lane, i] = begun[j, i]
+    return 0
+
+
+@kernel
+def advance(program: int, lane: int, periods: int, unused: int, space: int, dispatch: int) -> int:
+    """Run control periods of a lane, with its memory at the address ``space``; how often a stage could not serve it.
+
+    ``dispatch`` is the address of what calls a stage by its number.
+    """
+    head, missed = words(program, HEAD), 0
+    lanes, stages = head[LANES], head[STAGES]
+    if lane >= lanes:
+        return 0
+    moves = carray(pointer(program + 8 * HEAD, np.int64), (head[MOVES], MOVE))
+    rows, first = carray(pointer(space, np.float64), (head[SPACE], 1)), program + 8 * (HEAD + MOVE * head[MOVES])
+    load_rows(moves, lanes, lane, 1, rows)
+    for period in range(periods):
+        for s in range(stages):
+            number, closes, sees, memory, constants, tables = words(first + 8 * STAGE * s, STAGE)
+            if closes == 0 or period == periods - 1:
+                own, world = space + 8 * memory, space if sees else 0
+                missed += call(dispatch, number, world, space + 8 * WORLD, own, constants, tables, lane)
+    store_rows(moves, lanes, lane, 1, rows)
+    return missed
+
+
+RUNS = ("place", "fill", "advance")
+"""What a device is asked to run, each with the address of a program and two whole numbers."""
+
+
+def threads_code(stages: Sequence[str], kernels: Sequence[str], space: int, device: bool) -> str:
+    """LLVM code of ``birthsim_place``, ``birthsim_fill`` and ``birthsim_advance``.
+
+    ``stages`` and ``kernels`` are the symbols of the stages and of ``RUNS``; a lane's memory has room for ``space`` rows. On a
+    ``device`` these are kernels, which know their thread; elsewhere functions that are told it: thread, block, threads a block.
+    """
+    numbers = range(len(stages))
+    wrappers = "\n".join(wrapper(k, symbol, "i64 %lane") for k, symbol in enumerate(stages))
+    cases = " ".join(f"i64 {k}, label %case{k}" for k in numbers)
+    given = ", ".join(f"i64 %{k}" for k in range(1, 6))
+    calls = "\n".join(f"case{k}:\n  %m{k} = call i64 @birthsim_stage_{k}({given}, i64 %lane)\n  ret i64 %m{k}" for k in numbers)
+    return f"""
+{wrappers}
+define internal i64 @dispatch(i64 %0, {given}, i64 %lane) nounwind {{
+  switch i64 %0, label %none [ {cases} ]
+{calls}
+none:
+  ret i64 1
+}}
+{"".join(_entry(name, symbol, space) for name, symbol in zip(RUNS, kernels, strict=True))}
+{_KERNELS if device else _FUNCTIONS}"""
+
+
+def _entry(name: str, symbol: str, space: int) -> str:
+    """What a thread does: the same code on a device and elsewhere."""
+    more, types, room = "", "", ""
+    if name == "advance":
+        more, types = ", i64 %space, i64 ptrtoint (ptr @dispatch to i64)", ", i64, i64"
+        room = f"  %rows = alloca [{space} x double], align 8\n  %space = ptrtoint ptr %rows to i64\n"
+    return f"""
+declare i32 @"{symbol}"(ptr, ptr, i64, i64, i64, i64{types})
+define internal void @{name}(i64 %thread, i64 %block, i64 %width, ptr %program, i64 %one, i64 %two) nounwind {{
+  %missed = alloca i64
+  %error = alloca ptr
+{room}  %first = mul i64 %block, %width
+  %lane = add i64 %first, %thread
+  %at = ptrtoint ptr %program to i64
+  store i64 0, ptr %missed
+  %status = call i32 @"{symbol}"(ptr %missed, ptr %error, i64 %at, i64 %lane, i64 %one, i64 %two{more})
+  %value = load i64, ptr %missed
+  %some = icmp ne i64 %value, 0
+  br i1 %some, label %add, label %end
+add:
+  %counter = getelementptr i64, ptr %program, i64 {MISSED}
+  %before = atomicrmw add ptr %counter, i64 %value monotonic
+  br label %end
+end:
+  ret void
+}}"""
+
+
+_FUNCTIONS = "".join(
+    f"""
+define void @birthsim_{name}(i64 %thread, i64 %block, i64 %width, ptr %program, i64 %one, i64 %two) nounwind {{
+  call void @{name}(i64 %thread, i64 %block, i64 %width, ptr %program, i64 %one, i64 %two)
+  ret void
+}}"""
+    for name in RUNS
+)
+
+_PLACES = {"thread": "tid", "block": "ctaid", "width": "ntid"}
+_KERNELS = "".join(f"\ndeclare i32 @llvm.nvvm.read.ptx.sreg.{place}.x()" for place in _PLACES.values()) + "".join(
+    f"""
+define ptx_kernel void @birthsim_{name}(ptr %program, i64 %one, i64 %two) nounwind {{
+"""
+    + "".join(
+        f"  %{one} = call i32 @llvm.nvvm.read.ptx.sreg.{place}.x()\n  %{one}64 = zext i32 %{one} to i64\n"
+        for one, place in _PLACES.items()
+    )
+    + f"""  call void @{name}(i64 %thread64, i64 %block64, i64 %width64, ptr %program, i64 %one, i64 %two)
+  ret void
+}}"""
+    for name in RUNS
+)

@@ -1,0 +1,58 @@
+"""Programs as files, for those who launch kernels by themselves."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from birthsim_build.bundle import identifier
+from birthsim_build.device.loops import controlled, pieces_of
+from birthsim_build.device.program import Pieces, Program, key_of, program_of
+from birthsim_build.layout import LAYOUT
+from birthsim_env.episodes import Episodes
+from birthsim_env.files import write_json
+from birthsim_env.loop.rows import WORLD
+from birthsim_env.physics.rig.parameters import Parameters
+
+SEVERAL = (3, 2)
+"""Two numbers of lanes, which tell what lanes have of their own."""
+
+
+def write_programs(
+    loops: Iterable[tuple[str, str, str]], rig: Parameters, seed: int, folder: Path
+) -> tuple[list[str], int, dict[str, int]]:
+    """Write ``NAME.bin`` and ``NAME.json`` of loops (scenario, sensors, controller) into ``folder``.
+
+    Returns the functions that the code must have, rows of a thread's memory, and bytes of data of a lane by name. Lanes begin
+    where the episode seeded ``seed`` does. The words are those of ``program``; the JSON names rows of the data.
+    """
+    made: dict[str, tuple[Episodes, Pieces, Pieces]] = {}
+    for scenario, sensors, controller in loops:
+        many, other = (controlled(scenario, sensors, rig, controller, seed, lanes) for lanes in SEVERAL)
+        name = f"{scenario}_{sensors}_{identifier(controller)}"
+        made[name] = many, pieces_of(many.simulation), pieces_of(other.simulation)
+    functions = sorted({function for _, pieces, _ in made.values() for function in pieces.functions})
+    space, data = 0, {}
+    for name, (episodes, pieces, like) in made.items():
+        program = program_of(pieces, like, functions)
+        program.words.tofile(folder / f"{name}.bin")
+        about = {"words_of_data": program.rows, "periods": episodes.simulation.periods}
+        write_json(folder / f"{name}.json", {**about, "rows": rows_of(episodes, pieces, program)})
+        space, data[name] = max(space, program.space), 8 * program.rows
+    return functions, space, data
+
+
+def rows_of(episodes: Episodes, pieces: Pieces, program: Program) -> dict[str, Any]:
+    """Name -> row of the data, of all that is one number a lane: what stages share, reward, ends and info."""
+    regions = {key_of(array): region for array, region in zip(pieces.arrays(), program.regions, strict=True)}
+    rows: dict[str, int] = {}
+    placed = [*pieces.world, *((array, WORLD + row) for array, row in pieces.seen)]
+    for array, first in placed:
+        region = regions[key_of(array)]
+        for row in LAYOUT:
+            if region and row.count == 1 and first <= row.number < first + len(array):
+                rows[row.name] = region.first + row.number - first
+    for array, names in episodes.outcome_rows():
+        region = regions[key_of(array)]
+        assert region, "an outcome is one of lanes"
+        rows |= {name: region.first + k for k, name in enumerate(names)}
+    return rows

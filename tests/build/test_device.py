@@ -1,0 +1,248 @@
+"""Environments on a device: the code of a GPU's thread run by this processor gives the bits of the native environment."""
+
+import json
+import sys
+import types
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from llvmlite.binding import llvm_version_info
+
+from birthsim_build.code.compiler import LEAST_LLVM
+from birthsim_build.code.targets import HOST
+from birthsim_build.device import episodes, machine
+from birthsim_env import ForceProfile, StiffnessSchedule
+from birthsim_env.parts.references import Trajectory
+from tests.build.targets import imported
+from tests.oracles.golden import fingerprints
+
+SEED = 2_100_000
+CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
+
+
+@pytest.fixture(autouse=True)
+def _threads_run_here():
+    if HOST is None or llvm_version_info[0] < LEAST_LLVM:
+        pytest.skip("needs Linux on x86-64 or aarch64, and LLVM 22")
+
+
+def made(device, name=CIRCLE, lanes=7, **arguments):
+    return gymnasium.make_vec(name, num_envs=lanes, randomize=True, device=device, **arguments)
+
+
+def assert_equal(one, other):
+    assert type(one) is type(other)
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for name in one:
+            assert_equal(one[name], other[name])
+    elif isinstance(one, np.ndarray) and one.dtype == object:
+        for first, second in zip(one, other, strict=True):
+            assert_equal(first, second)
+    elif isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
+    else:
+        assert one is other is None
+
+
+def assert_same_run(here, there, steps, seed=SEED):
+    rng = np.random.default_rng(2)
+    for one, other in zip(here.reset(seed=seed), there.reset(seed=seed), strict=True):
+        assert_equal(one, other)
+    for _ in range(steps):
+        actions = rng.uniform(-0.3, 0.3, here.action_space.shape)
+        for one, other in zip(here.step(actions), there.step(actions), strict=True):
+            assert_equal(one, other)
+    assert_equal(here.plant_state, there.plant_state)
+    assert_equal(here.measurement.pressures, there.measurement.pressures)
+    assert_equal(here.reference.rows, there.reference.rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
+def test_the_bits_of_the_native_environment(monkeypatch, mode, name, sensors):
+    # Lanes begin in groups of this size, the last of them smaller.
+    monkeypatch.setattr(episodes, "TOGETHER", 3)
+    shared = {"sensors": sensors, "autoreset_mode": mode, "max_episode_steps": 4}
+    assert_same_run(made(None, name, **shared), made("host", name, **shared), 11)
+
+
+@pytest.mark.slow
+def test_lanes_that_wait_begin_where_they_are_told():
+    envs = [made(device, autoreset_mode="Disabled", max_episode_steps=2) for device in (None, "host")]
+    mask = np.arange(7) % 2 == 0
+    for env in envs:
+        env.reset(seed=[5, 3, None, 8, 1, 0, 2], options={"staggered": True})
+        env.step(np.zeros((7, 4)))
+        with pytest.raises(ValueError, match=r"lanes \[4, 5, 6\] have ended; allowed: reset"):
+            env.step(np.zeros((7, 4)))
+    outcomes = [env.reset(options={"reset_mask": mask | (np.arange(7) > 3), "position": (0.51, 0.01)}) for env in envs]
+    assert_equal(np.delete(outcomes[0][0], 2, axis=0), np.delete(outcomes[1][0], 2, axis=0))  # lane 2 drew its own seed
+
+
+class Taps(ForceProfile):
+    """A user's hand that is compiled, with a number of knots of its own in every episode."""
+
+    def knots(self, rng):
+        return [(0.0, 0.0, 0.0), *((0.01 * k, rng.uniform(-20, 20), 0.0) for k in range(1, rng.integers(2, 30)))]
+
+
+@pytest.mark.slow
+def test_a_table_gets_room_for_more(monkeypatch):
+    monkeypatch.setattr(episodes, "TOGETHER", 2)
+    shared = {"user_force": Taps(), "max_episode_steps": 3}
+    assert_same_run(made(None, **shared), made("host", **shared), 13)
+
+
+@pytest.mark.slow
+def test_two_devices_are_one():
+    whole, parts = made("host", lanes=7), [made("host", lanes=n) for n in (3, 4)]
+    whole.reset(seed=SEED)
+    for env, first in zip(parts, (0, 3), strict=True):
+        env.reset(seed=[SEED + first + k for k in range(env.num_envs)])
+    actions = np.random.default_rng(3).uniform(-1.0, 1.0, (7, 4))
+    for _ in range(3):
+        together, *_ = whole.step(actions)
+        apart = [env.step(given)[0] for env, given in zip(parts, np.split(actions, [3]), strict=True)]
+        assert_equal(together, np.concatenate(apart))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("device", ["host", "cuda"])
+@pytest.mark.parametrize("row", fingerprints.rows())
+def test_the_stored_fingerprints(row, device):
+    try:
+        machine.machine_named(device)
+    except ValueError as missing:
+        pytest.skip(str(missing))
+    stored = json.loads(fingerprints.FILE.read_text(encoding="utf-8"))
+    assert fingerprints.fingerprint(*fingerprints.rows()[row], device=device) == stored[row]
+
+
+@pytest.mark.slow
+def test_tensors_are_taken_without_a_copy():
+    torch = imported("torch")
+    here, there = made(None), made("host")
+    seen, _ = there.reset(seed=SEED)
+    here.reset(seed=SEED)
+    tensor = torch.from_dlpack(seen)
+    assert tensor.data_ptr() == seen.ctypes.data
+    actions = torch.linspace(-0.5, 0.5, 28, dtype=torch.float32).reshape(7, 4)
+    assert_equal(here.step(actions.numpy())[0], there.step(actions)[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [np.zeros((7, 3)), np.full((7, 4), np.nan), np.full((7, 4), 1.1), "forward"])
+def test_wrong_actions_are_refused_in_the_same_words(wrong):
+    said = []
+    for device in (None, "host"):
+        env = made(device)
+        env.reset(seed=SEED)
+        with pytest.raises(ValueError, match="action") as refused:
+            env.step(wrong)
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+
+
+@pytest.mark.slow
+def test_a_law_without_gains_is_explained_in_the_same_words():
+    said = []
+    for device in (None, "host"):
+        env = made(device, RESIDUAL, stiffness=StiffnessSchedule(closed_loop=(10.0,)))
+        env.reset(seed=SEED)
+        with pytest.raises(ValueError, match="10") as refused:
+            env.step(np.zeros(env.action_space.shape))
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+
+
+class Still(Trajectory):
+    def sample(self, time):
+        return np.repeat([[0.5], *[[0.0]] * 7], len(time), axis=1)
+
+
+def test_what_no_device_does_is_refused_by_name(monkeypatch):
+    with pytest.raises(ValueError, match=r"reference = Still, in Python; allowed on a device: what is compiled"):
+        made("host", reference=Still())
+    with pytest.raises(ValueError, match=r"device = 'gpu'; allowed: None, 'host', 'cuda'"):
+        made("gpu")
+    with pytest.raises(ValueError, match=r"render_mode, with a device, = 'rgb_array'; allowed: None"):
+        made("host", render_mode="rgb_array")
+    monkeypatch.setitem(sys.modules, "cupy", None)
+    with pytest.raises(ValueError, match=r"'cuda' needs NVIDIA's driver and the extra: pip install 'birthsim\[cuda\]'"):
+        made("cuda")
+    env = made("host")
+    with pytest.raises(RuntimeError, match=r"step\(\) before reset\(\)"):
+        env.step(np.zeros((7, 4)))
+    with pytest.raises(NotImplementedError, match=r"get_state\(\) of lanes on a device"):
+        env.unwrapped.get_state()
+
+
+class There(np.ndarray):
+    """An array that does not mix with NumPy's, as CuPy's do not."""
+
+    def __array_ufunc__(self, ufunc, method, *inputs, out=None, **more):
+        for one in (*inputs, *(out or ())):
+            if type(one) is np.ndarray and one.ndim:
+                raise TypeError(f"{ufunc.__name__} of an array here and one there")
+        bare = [np.asarray(one) if isinstance(one, There) else one for one in inputs]
+        more |= {} if out is None else {"out": tuple(np.asarray(one) for one in out)}
+        found = getattr(ufunc, method)(*bare, **more)
+        return out[0] if out else np.asarray(found).view(There)
+
+    def __setitem__(self, where, value):
+        for one in (*(where if isinstance(where, tuple) else (where,)), value):
+            if type(one) is np.ndarray and one.ndim:
+                raise TypeError("an array here in one there")
+        super().__setitem__(where, value)
+
+    @property
+    def data(self):
+        return types.SimpleNamespace(ptr=self.ctypes.data)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_what_is_asked_of_cupy(monkeypatch, mode):
+    """With arrays that are in this memory, and kernels that are the host's."""
+    compiled, asked = machine._compiled, []
+
+    def compile_here(functions, target, space, ending):
+        if target != "ptx":
+            return compiled(functions, target, space, ending)
+        asked.append((functions, space))
+        return b"PTX"
+
+    class RawKernel:
+        def __init__(self, path, name):
+            self.path, self.name = path, name
+
+        def compile(self):
+            assert Path(self.path).read_bytes() == b"PTX"
+            self.run = machine.Host().load(*asked[-1])
+
+        def __call__(self, grid, block, arguments):
+            assert all(type(one) is np.int64 for one in arguments)
+            self.run(self.name.removeprefix("birthsim_"), grid[0] * block[0], *map(int, arguments))
+
+    def there_by(made):
+        return lambda *given, **named: made(*given, **named).view(There)
+
+    alike = (np.zeros, np.asarray, np.array, np.arange, np.argwhere, np.clip)
+    cupy = types.SimpleNamespace(**{made.__name__: there_by(made) for made in alike}, asnumpy=np.array)
+    cupy.RawModule = lambda path: types.SimpleNamespace(get_function=lambda name: RawKernel(path, name))
+    cupy.cuda = types.SimpleNamespace(runtime=types.SimpleNamespace(getDeviceCount=lambda: 1))
+    monkeypatch.setitem(sys.modules, "cupy", cupy)
+    monkeypatch.setattr(machine, "_compiled", compile_here)
+    here, there = (made(device, autoreset_mode=mode, max_episode_steps=3) for device in (None, "cuda"))
+    here.reset(seed=SEED)
+    seen, _ = there.reset(seed=SEED, options={"reset_mask": np.ones(7, dtype=bool)})
+    assert type(seen) is There
+    actions = np.random.default_rng(2).uniform(-0.3, 0.3, (7, 4))
+    for _ in range(7):
+        for one, other in zip(here.step(actions)[:4], there.step(actions.view(There))[:4], strict=True):
+            assert type(other) is There
+            assert_equal(one, np.array(other))

@@ -1,0 +1,193 @@
+"""Programs of lanes: the code of a thread, run here, computes the bits of ``Loop``; as PTX it has nothing that could differ."""
+
+import re
+
+import numpy as np
+import pytest
+from llvmlite.binding import llvm_version_info
+
+from baselines.registry import LISTED
+from birthsim_build.code import ptx, threads
+from birthsim_build.code.compiler import LEAST_LLVM, compile_object
+from birthsim_build.code.elf import contents_of
+from birthsim_build.code.targets import HOST
+from birthsim_build.device.lanes import Lanes
+from birthsim_build.device.loops import controlled, pieces_of
+from birthsim_build.device.machine import Host
+from birthsim_build.device.program import key_of, program_of
+from birthsim_env import Parameters
+from birthsim_env.assembly import assemble
+from birthsim_env.episodes import Episodes
+from birthsim_env.parts.scenarios import SCENARIOS
+from birthsim_env.parts.sensors.sensors import SENSORS
+from tests.build.targets import need
+
+SEED = 2_000_000
+WAY = "birthsim_env.parts.references:_path_stage"
+
+
+def begun(lanes, scenario="circle", controller=None, **arguments):
+    """Lanes that begin, each drawn by its own seed."""
+    if controller is not None:
+        return controlled(scenario, arguments["sensors"], Parameters(), controller, SEED, lanes)
+    episodes = Episodes(assemble(lanes, scenario, randomize=True, **arguments))
+    episodes.begin_first(list(range(SEED, SEED + lanes)), np.zeros(lanes, dtype=np.int64))
+    return episodes
+
+
+def both(lanes, **loop):
+    """A simulation, and a program with the data of its lanes."""
+    if HOST is None or llvm_version_info[0] < LEAST_LLVM:
+        pytest.skip("needs Linux on x86-64 or aarch64, and LLVM 22")
+    episodes, other = begun(lanes, **loop), begun(3 if lanes == 2 else 2, **loop)
+    pieces = pieces_of(episodes.simulation)
+    made = Lanes(Host(), pieces, pieces_of(other.simulation), lanes)
+    for view, array in zip(made.views, pieces.arrays(), strict=True):
+        if view is not None:
+            view[...] = array
+    return episodes.simulation, pieces, made
+
+
+def differing(pieces, made):
+    """Numbers of the arrays that differ in a bit."""
+    pairs = enumerate(zip(made.views, pieces.arrays(), strict=True))
+    return [k for k, (view, array) in pairs if view is not None and view.tobytes() != array.tobytes()]
+
+
+def test_a_program_fills_its_lanes_and_finds_its_tables():
+    many, other = begun(5, sensors="lab"), begun(2, sensors="lab")
+    pieces = pieces_of(many.simulation)
+    program = program_of(pieces, pieces_of(other.simulation), pieces.functions)
+    lanes, words = 7, program.words.copy()
+    data = np.full((program.rows, lanes), -1)
+    place = words.ctypes.data, 0, data.ctypes.data, lanes
+    assert threads.place(*place) == 0
+    # What is placed may be placed anew.
+    before = words.copy()
+    threads.place(*place)
+    np.testing.assert_array_equal(words, before)
+    for lane in range(lanes + 1):
+        threads.fill(words.ctypes.data, lane, 0, 0)
+    views = [region and region.of(data, lanes) for region in program.regions]
+    for view, region, array in zip(views, program.regions, pieces.arrays(), strict=True):
+        if region is not None:
+            for lane in range(lanes):
+                np.testing.assert_array_equal(view[region.at(lane)], array[region.at(0)])
+    addresses = {key_of(array): view for view, array in zip(views, pieces.arrays(), strict=True)}
+    first = threads.HEAD + threads.MOVE * words[threads.MOVES]
+    tables = 0
+    for k, stage in enumerate(pieces.every):
+        described = (words[first + threads.STAGE * k + 5] - words.ctypes.data) // 8
+        for t, table in enumerate(stage.tables):
+            address, *shape = words[described + 5 * t : described + 5 * t + 1 + table.ndim]
+            assert (address, tuple(shape)) == (addresses[key_of(table)].ctypes.data, addresses[key_of(table)].shape)
+            tables += 1
+    assert tables > 5
+
+
+EXACT = re.compile(
+    r"(add|sub|mul|div|rcp|sqrt)\.rn\.f(32|64)|(neg|abs|min|max|selp|mov)\.f(32|64)|setp\.[a-z]+\.f(32|64)"
+    r"|cvt\.(rn|rmi|rpi|rzi)\.(f64|f32|[su]\d+)\.(f64|f32|[su]\d+)|cvt\.f64\.f32|copysign\.f64"
+)
+
+
+def assert_exact(text):
+    """No operation but those whose result IEEE 754 defines, and nothing that is elsewhere."""
+    operations = set(re.findall(r"\b([a-z]+(?:\.\w+)*\.f(?:32|64)(?:\.\w+)*)\b", text))
+    assert any(one.startswith("mul.rn") for one in operations)
+    assert {one for one in operations if not EXACT.fullmatch(one)} == set()
+    assert re.search(r"\bfma|\.approx|\.full\b|\.ftz\b|\.extern|\bmad\.[a-z.]*f", text) is None
+
+
+def test_ptx_is_exact(tmp_path):
+    if llvm_version_info[0] < LEAST_LLVM:
+        pytest.skip("needs LLVM 22")
+    compile_object([WAY], "ptx", tmp_path / "code.o", space=512)
+    assert_exact((tmp_path / "code.ptx").read_text())
+
+
+WRONG = (
+    "fma.rn.f64 %fd1, %fd2, %fd3, %fd4;", "sqrt.approx.f64 %fd1, %fd2;", "div.full.f32 %f1, %f2, %f3;",
+    "add.f64 %f1, %f2, %f3;", ".extern .func sin",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_not_exact_is_found(wrong):
+    with pytest.raises(AssertionError):
+        assert_exact(f"mul.rn.f64 %fd1, %fd2, %fd3;\n{wrong}")
+
+
+def test_a_users_python_is_refused_by_name():
+    episodes = Episodes(assemble(2, "circle", user_force=lambda time: (0.0, 0.0)))
+    with pytest.raises(ValueError, match=r"user_force = .*in Python; allowed on a device"):
+        pieces_of(episodes.simulation)
+
+
+CASES = {
+    "openings": {"sensors": "ideal"},
+    "flows of one valve": {"sensors": "honest", "scenario": "forceps", "action_mode": "flow", "valves": "one_valve"},
+    "a law": {"sensors": "lab", "controller": "admittance-backstepping"},
+    "a policy": {"sensors": "lab", "controller": "residual:circle"},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lanes", [1, 33, 1000])
+@pytest.mark.parametrize("loop", CASES.values(), ids=CASES)
+def test_a_thread_computes_the_bits_of_a_lane(loop, lanes):
+    simulation, pieces, made = both(lanes, **loop)
+    rng, places = np.random.default_rng(1), {key_of(array): k for k, array in enumerate(pieces.arrays())}
+    for _ in range(20 if lanes < 100 else 4):
+        actions = rng.uniform(-0.5, 0.5, simulation.action.shape)
+        if actions.size:
+            made.views[places[key_of(simulation.action)]][...] = actions
+        made.views[places[key_of(simulation.impacts)]][...] = 0.0
+        simulation.step(actions)
+        assert made.advance(simulation.periods) == 0
+        assert differing(pieces, made) == []
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_threads():
+    simulation, pieces, made = both(100_000, sensors="lab")
+    simulation.step(simulation.action)
+    assert made.advance(simulation.periods) == 0
+    assert differing(pieces, made) == []
+    assert len(np.unique(simulation.plant.state[0])) > 99_000
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory):
+    """PTX of all scenarios, sensors, compiled controllers and a policy."""
+    folder = tmp_path_factory.mktemp("ptx")
+    made = [begun(2, scenario, sensors=sensors) for scenario in SCENARIOS for sensors in SENSORS]
+    made += [
+        begun(2, sensors=sensors, controller=name) for name in (*LISTED, "residual:circle") for sensors in ("ideal", "lab")
+    ]
+    functions = {function for episodes in made for function in pieces_of(episodes.simulation).functions}
+    compile_object(sorted(functions), "ptx", folder / "all.o", space=1024)
+    return folder / "all.ptx"
+
+
+@pytest.mark.slow
+def test_ptx_of_all_stages_is_exact_and_alone(everything):
+    text = everything.read_text()
+    assert_exact(text)
+    assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == 3
+    assert ".visible .func" not in text
+
+
+@pytest.mark.slow
+def test_fusing_is_given_no_chance(everything, tmp_path):
+    need(ptx.assembler(), "ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
+    made = {}
+    for fuses in ("true", "false"):
+        taken = ptx.assemble(everything, tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
+        sections = contents_of((tmp_path / "code.cubin").read_bytes())
+        made[fuses] = {name: content for name, content in sections.items() if not name.startswith(".note")}
+    assert made["true"] == made["false"]
+    assert len(made["true"][".text.birthsim_advance"]) > 100_000
+    # 1024 rows, and what stages keep beside them: most of it is that of predictive control.
+    assert taken["memory"] < 24 * 1024
+    assert taken["spilled"] < 8192
