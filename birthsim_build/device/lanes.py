@@ -12,7 +12,7 @@ from birthsim_build.device.program import Pieces, Program, program_of
 class Lanes:
     """``count`` lanes of the loop ``many``; ``other`` as for ``program_of``.
 
-    They begin when ``fill`` is called, as lane 0 of ``many``, or with what is written into ``views``.
+    They begin with what is written into ``views``.
     """
 
     def __init__(self, machine: Machine, many: Pieces, other: Pieces, count: int) -> None:
@@ -25,10 +25,6 @@ class Lanes:
         self._run("place", 1, self._address, machine.address(self.data), count)
         self.views: list[Any] = [region and region.of(self.data, count) for region in self.program.regions]
         """The arrays of the lanes, on the device, in the order of ``Pieces.arrays``; None for one that all lanes share."""
-
-    def fill(self) -> None:
-        """All lanes begin as the program says."""
-        self._run("fill", self.count, self._address, 0, 0)
 
     def advance(self, periods: int) -> int:
         """Run control periods, the last of which closes a policy step; how often a stage could not serve a lane."""

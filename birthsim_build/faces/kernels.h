@@ -8,8 +8,9 @@
  *     birthsim_fill    <<<blocks, 32>>>(program, 0, 0);           all lanes begin as the program says
  *     birthsim_advance <<<blocks, 32>>>(program, periods, 0);     control periods, the last of which closes a policy step
  *
- * with 32 * blocks >= lanes. Reward, ends and info in the data are those of the last policy step. Word @MISSED@ of the program
- * counts how often a law could not serve what it was asked for. Nothing here allocates memory.
+ * with 32 * blocks >= lanes. Reward, ends and info in the data are those of the last policy step; the fastest collisions, impact1
+ * and impact2, are those since they were last set to zero. Word @MISSED@ of the program counts how often a law could not serve
+ * what it was asked for. Nothing here allocates memory.
  */
 #ifndef BIRTHSIM_KERNELS_H
 #define BIRTHSIM_KERNELS_H

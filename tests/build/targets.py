@@ -12,6 +12,7 @@ from llvmlite.binding import llvm_version_info
 
 from baselines.commands.command import perform_with
 from birthsim_build.code.compiler import LEAST_LLVM
+from birthsim_build.code.targets import HOST
 from birthsim_build.commands.build import Settings, main
 
 BUILT = (
@@ -39,6 +40,12 @@ def need_linker():
     if llvm_version_info[0] < LEAST_LLVM:
         pytest.skip(f"LLVM {llvm_version_info[0]}; building needs {LEAST_LLVM}")
     need(importlib.util.find_spec("ziglang"), "ziglang is missing: pip install 'birthsim[build]'")
+
+
+def need_threads():
+    """Skip where the threads of a GPU cannot be run by this processor."""
+    if HOST is None or llvm_version_info[0] < LEAST_LLVM:
+        pytest.skip(f"needs Linux on x86-64 or aarch64, and LLVM {LEAST_LLVM}")
 
 
 def build(target, folder, *options):

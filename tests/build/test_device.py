@@ -8,14 +8,11 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from llvmlite.binding import llvm_version_info
 
-from birthsim_build.code.compiler import LEAST_LLVM
-from birthsim_build.code.targets import HOST
 from birthsim_build.device import episodes, machine
 from birthsim_env import ForceProfile, StiffnessSchedule
 from birthsim_env.parts.references import Trajectory
-from tests.build.targets import imported
+from tests.build.targets import imported, need_threads
 from tests.oracles.golden import fingerprints
 
 SEED = 2_100_000
@@ -24,8 +21,7 @@ CIRCLE, RESIDUAL = "BirthSIM/Circle-v1", "BirthSIM/CircleResidual-v1"
 
 @pytest.fixture(autouse=True)
 def _threads_run_here():
-    if HOST is None or llvm_version_info[0] < LEAST_LLVM:
-        pytest.skip("needs Linux on x86-64 or aarch64, and LLVM 22")
+    need_threads()
 
 
 def made(device, name=CIRCLE, lanes=7, **arguments):

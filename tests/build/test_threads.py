@@ -1,5 +1,6 @@
 """Programs of lanes: the code of a thread, run here, computes the bits of ``Loop``; as PTX it has nothing that could differ."""
 
+import json
 import re
 
 import numpy as np
@@ -10,17 +11,18 @@ from baselines.registry import LISTED
 from birthsim_build.code import ptx, threads
 from birthsim_build.code.compiler import LEAST_LLVM, compile_object
 from birthsim_build.code.elf import contents_of
-from birthsim_build.code.targets import HOST
+from birthsim_build.device.export import write_programs
 from birthsim_build.device.lanes import Lanes
 from birthsim_build.device.loops import controlled, pieces_of
 from birthsim_build.device.machine import Host
 from birthsim_build.device.program import key_of, program_of
+from birthsim_build.layout import LAYOUT
 from birthsim_env import Parameters
 from birthsim_env.assembly import assemble
 from birthsim_env.episodes import Episodes
 from birthsim_env.parts.scenarios import SCENARIOS
 from birthsim_env.parts.sensors.sensors import SENSORS
-from tests.build.targets import need
+from tests.build.targets import need_threads
 
 SEED = 2_000_000
 WAY = "birthsim_env.parts.references:_path_stage"
@@ -37,8 +39,7 @@ def begun(lanes, scenario="circle", controller=None, **arguments):
 
 def both(lanes, **loop):
     """A simulation, and a program with the data of its lanes."""
-    if HOST is None or llvm_version_info[0] < LEAST_LLVM:
-        pytest.skip("needs Linux on x86-64 or aarch64, and LLVM 22")
+    need_threads()
     episodes, other = begun(lanes, **loop), begun(3 if lanes == 2 else 2, **loop)
     pieces = pieces_of(episodes.simulation)
     made = Lanes(Host(), pieces, pieces_of(other.simulation), lanes)
@@ -176,18 +177,47 @@ def test_ptx_of_all_stages_is_exact_and_alone(everything):
     assert_exact(text)
     assert len(re.findall(r"^\.visible \.entry", text, re.MULTILINE)) == 3
     assert ".visible .func" not in text
+    # A thread's 1,024 rows, and what stages keep beside them: predictive control needs most.
+    frames = list(map(int, re.findall(r"\.local \.align \d+ \.b8\s+__local_depot\d+\[(\d+)\]", text)))
+    assert 8 * 1024 < sum(frames) < 24 * 1024
 
 
 @pytest.mark.slow
-def test_fusing_is_given_no_chance(everything, tmp_path):
-    need(ptx.assembler(), "ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
+def test_fusing_is_given_no_chance(tmp_path):
+    if ptx.assembler() is None:
+        pytest.skip("ptxas is missing: pip install nvidia-cuda-nvcc-cu12")
+    loop = pieces_of(begun(2, sensors="lab", controller="admittance-backstepping").simulation)
+    compile_object(loop.functions, "ptx", tmp_path / "code.o", space=448)
     made = {}
     for fuses in ("true", "false"):
-        taken = ptx.assemble(everything, tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
+        taken = ptx.assemble(tmp_path / "code.ptx", tmp_path / "code.cubin", "sm_90", "--fmad", fuses)
         sections = contents_of((tmp_path / "code.cubin").read_bytes())
         made[fuses] = {name: content for name, content in sections.items() if not name.startswith(".note")}
     assert made["true"] == made["false"]
     assert len(made["true"][".text.birthsim_advance"]) > 100_000
-    # 1024 rows, and what stages keep beside them: most of it is that of predictive control.
-    assert taken["memory"] < 24 * 1024
-    assert taken["spilled"] < 8192
+    # 448 rows, what stages keep beside them, and registers that did not fit.
+    assert taken["memory"] < 6 * 1024
+    assert taken["spilled"] < 2 * 1024
+
+
+@pytest.mark.slow
+def test_an_exported_program_runs_by_its_own_kernels(tmp_path):
+    functions, space, data = write_programs([("circle", "lab", "admittance-backstepping")], Parameters(), SEED, tmp_path)
+    (name,) = data
+    words, about = np.fromfile(tmp_path / f"{name}.bin", dtype=np.int64), json.loads((tmp_path / f"{name}.json").read_text())
+    lanes, run = 33, Host().load(tuple(functions), space)
+    rows = np.full((about["words_of_data"], lanes), -1.0)
+    for kernel, *numbers in (("place", rows.ctypes.data, lanes), ("fill", 0, 0), *[("advance", about["periods"], 0)] * 3):
+        run(kernel, lanes, words.ctypes.data, *numbers)
+    assert words[threads.MISSED] == 0
+    simulation = (episodes := begun(1, sensors="lab", controller="admittance-backstepping")).simulation
+    for _ in range(3):
+        simulation.run(simulation.periods)
+    found = np.concatenate(simulation.rows())[:, 0]
+    expected = {row.name: found[row.number] for row in LAYOUT if row.number < len(found) and row.name in about["rows"]}
+    for array, names in episodes.outcome_rows():
+        expected |= dict(zip(names, array[:, 0], strict=True))
+    assert expected.keys() == about["rows"].keys()
+    for name, row in about["rows"].items():
+        np.testing.assert_array_equal(rows[row], expected[name], err_msg=name)
+    assert expected["time"] == 0.03
