@@ -89,7 +89,15 @@ export class Scene {
     ];
     this.unit = Math.min(Math.max(scale / 490, 0.6), 1.5); // 490 px/m is the scale of the 640x480 drawing
     this.pen = new Pen(this.sheet.context, origin, scale);
+    this.leaveLens();
     this.drawBackdrop(origin, scale);
+  }
+
+  /** Say how large a lens above the head's path may be, px. */
+  leaveLens() {
+    const highest = Math.max(...this.path.map(([, y]) => y)) + this.geometry.head.radius;
+    const room = this.pen.pixel([0, highest])[1] - 2 * MARGIN;
+    if (Number.isFinite(room)) this.sheet.canvas.closest(".view").style.setProperty("--lens", `${Math.round(room)}px`);
   }
 
   drawBackdrop(origin, scale) {
