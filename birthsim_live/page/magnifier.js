@@ -93,7 +93,7 @@ export class Magnifier {
       const look = { colour: [pen.FORCE, beside][k], weight: 700, size: Math.max(12, 0.06 * width) };
       world.text(`error ${error.toFixed(2)} mm`, [width / 2, (second ? 0.19 : 0.14) * height + 1.25 * look.size * k], look);
     });
-    this.name(`${(scale / mainScale).toFixed(0)} times`);
+    this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
   }
 
   drawDashed(world, points, colour) {

@@ -160,7 +160,7 @@ export class Scene {
     const label = pose && this.drawForce(frame, pose, this.hand(frame, held ?? [0, 0]));
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
-    if (pose) this.drawNames(pose);
+    if (pose && "lab" in document.body.dataset) this.drawNames(pose);
     if (this.cue && pose && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
     if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));
