@@ -15,7 +15,7 @@ const LESSONS = [
   },
   {
     name: "Halve the stiffness",
-    says: "Pull as hard as before: the head gives way twice as far. The rendered stiffness settles near 1000 N/m.",
+    says: "Pull as hard as before: the head gives way almost twice as far. The softer the spring, the more of its stiffness is friction.",
     settings: { Kclx: 1000, Kcly: 1000 },
     look: ".felt",
   },

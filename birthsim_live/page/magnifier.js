@@ -91,9 +91,9 @@ export class Magnifier {
       const error = means[k]?.error_mm;
       if (!Number.isFinite(error)) return;
       const look = { colour: [pen.FORCE, beside][k], weight: 700, size: Math.max(12, 0.06 * width) };
-      world.text(`error ${error.toFixed(2)} mm`, [width / 2, 0.14 * height + 1.25 * look.size * k], look);
+      world.text(`error ${error.toFixed(2)} mm`, [width / 2, (second ? 0.19 : 0.14) * height + 1.25 * look.size * k], look);
     });
-    this.name(`${(scale / mainScale).toFixed(0)} times`);
+    this.name(`magnified ${(scale / mainScale).toFixed(0)} times`);
   }
 
   drawDashed(world, points, colour) {

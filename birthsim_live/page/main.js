@@ -4,6 +4,7 @@ import { About } from "./about.js";
 import { Challenge } from "./challenge.js";
 import { DEEPER, PLOTS, RMS, UNITS, rowOf } from "./curves.js";
 import { Files } from "./files.js";
+import { Gamepad } from "./gamepad.js";
 import { Gauges } from "./gauges.js";
 import { Guide } from "./guide.js";
 import { Hand } from "./hand.js";
@@ -73,6 +74,7 @@ const hand = new Hand({
 const rigs = new Rigs(hand, { frame: () => rig.frame, enabled });
 rig.scenes = rigs.scenes;
 new Keys(hand, enabled);
+const gamepad = new Gamepad(hand, enabled);
 
 const source = new Source({
   failed: ({ message }) => {
@@ -198,6 +200,7 @@ function draw(now) {
     rig.monitor.drew(frame);
     for (const [id, one] of [["lost", frame], ["second-lost", frame.second]]) banner(id, one?.lost ? `${one.lost.replace(/[.]?$/, ".")} Press R to reset.` : "");
   }
+  gamepad.step();
   transport.step(frame);
   transport.keepUp(frame, now);
   const [one, k] = [rigs.rigOf(frame), rigs.chosen];

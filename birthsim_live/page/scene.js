@@ -89,7 +89,15 @@ export class Scene {
     ];
     this.unit = Math.min(Math.max(scale / 490, 0.6), 1.5); // 490 px/m is the scale of the 640x480 drawing
     this.pen = new Pen(this.sheet.context, origin, scale);
+    this.leaveLens();
     this.drawBackdrop(origin, scale);
+  }
+
+  /** Say how large a lens above the head's path may be, px. */
+  leaveLens() {
+    const highest = Math.max(...this.path.map(([, y]) => y)) + this.geometry.head.radius;
+    const room = this.pen.pixel([0, highest])[1] - 2 * MARGIN;
+    if (Number.isFinite(room)) this.sheet.canvas.closest(".view").style.setProperty("--lens", `${Math.round(room)}px`);
   }
 
   drawBackdrop(origin, scale) {
@@ -152,7 +160,7 @@ export class Scene {
     const label = pose && this.drawForce(frame, pose, this.hand(frame, held ?? [0, 0]));
     if (frame.pointer) this.drawSpring(frame, held ?? [0, 0]);
     pen.endEffectorMarker(world, frame.position, 0.75 * size);
-    if (pose) this.drawNames(pose);
+    if (pose && "lab" in document.body.dataset) this.drawNames(pose);
     if (this.cue && pose && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
     if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));

@@ -5,7 +5,8 @@ import { STIFFNESSES } from "./worker/settings.js";
 const byId = (id) => document.getElementById(id);
 const SLOW = 0.85; // of real time
 const PATIENCE = 2000; // ms
-const HALF = 0.5; // of real time
+const SPEEDS = [0.5, 0.2, 0.1]; // that it may then go over to
+const SPARE = 0.9; // of what it can
 
 export class Transport {
   /** `address(name)` is where a recording can be saved from, `tell(words)` says what the page does by itself. */
@@ -21,6 +22,7 @@ export class Transport {
       this.late = Infinity;
       send({ type: "speed", speed: Number(event.target.value) });
     });
+    byId("device").addEventListener("click", () => send({ type: "device", on: !this.state.device }));
     byId("record").addEventListener("click", () => send({ type: "record", on: !this.state.recording }));
     this.scrub = byId("scrub");
     this.held = false;
@@ -82,7 +84,8 @@ export class Transport {
     byId("played").textContent = [...words, ...numbers, ...rig].join(" · ");
   }
 
-  showRecording({ recording, last_recording: last }) {
+  showRecording({ recording, last_recording: last, device }) {
+    byId("device").setAttribute("aria-pressed", String(device));
     const record = byId("record");
     record.setAttribute("aria-pressed", String(Boolean(recording)));
     record.querySelector("span").textContent = recording ? `Stop, ${recording.seconds.toFixed(0)} s` : "Record";
@@ -103,14 +106,16 @@ export class Transport {
     }
   }
 
-  /** A machine that is too slow for real time gets half of it, once, unless a person has chosen the speed. */
+  /** A machine that is too slow for real time goes over to slow motion, once, unless a person has chosen the speed. */
   keepUp({ real_time: share }, now) {
     if (this.replay || this.late === Infinity || share === null) return;
     this.late = share < SLOW && this.state.speed === 1 ? Math.min(this.late ?? now, now) : null;
     if (this.late === null || now < this.late + PATIENCE) return;
+    const speed = SPEEDS.find((one) => one <= SPARE * share);
+    if (!speed) return;
     this.late = Infinity;
-    this.send({ type: "speed", speed: HALF });
-    this.tell("This machine is too slow for real time: the rig runs at half speed. The Lab has other speeds.");
+    this.send({ type: "speed", speed });
+    this.tell(`This machine is too slow for real time: the rig runs at 1 : ${1 / speed}. The Lab has other speeds.`);
   }
 
   writeTime(time) {

@@ -27,14 +27,14 @@ export function drawBar(context, width, row, name, share, figure, colour) {
   context.fillText(figure, width, top + ROW / 2);
 }
 
-/** A line of small words below the bars: at their left end, in the middle and at their right end. */
+/** A line of small words below the bars: on their left, in the middle and on their right. */
 export function drawEnds(context, width, row, words) {
-  const [left, room] = [LEFT, width - LEFT - RIGHT];
+  const places = [0, LEFT + (width - LEFT - RIGHT) / 2, width];
   context.font = `500 11px ${pen.FONT}`;
   context.fillStyle = pen.INK;
   context.textBaseline = "middle";
   words.forEach((text, k) => {
     context.textAlign = ["left", "center", "right"][k];
-    context.fillText(text, left + (k * room) / 2, row * ROW + 8);
+    context.fillText(text, places[k], row * ROW + 8);
   });
 }

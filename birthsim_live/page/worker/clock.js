@@ -95,6 +95,11 @@ export class Clock {
     setTimeout(() => this.slice(), Math.max(1, begun + SLICE - performance.now()));
   }
 
+  /** Be where the wall's time is, between two slices: a haptic device waits for its force. */
+  catchUp() {
+    if (!(this.paused || this.session.halted || this.busy)) this.advance(performance.now());
+  }
+
   async advance(begun) {
     this.busy = true;
     const periods = this.pace.due(begun / 1e3, this.speed);

@@ -1,6 +1,7 @@
 // The page's messages in, news out.
 
 import { Clock } from "./clock.js";
+import { Device } from "./device.js";
 import { frameOf } from "./frames.js";
 import { Recorder } from "./recorder.js";
 import { Session } from "./session.js";
@@ -27,7 +28,7 @@ export class Hub {
   async receive(message) {
     try {
       const act = this[`on_${message.type}`];
-      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, set, pause, speed, reset, record`);
+      if (!act) throw new Error(`${message.type} in a live session; allowed: drag, push, release, device, set, pause, speed, reset, record`);
       await act.call(this, message);
       this.clock.touch();
     } catch (error) {
@@ -46,6 +47,15 @@ export class Hub {
 
   on_release() {
     this.session.hands.hold = null;
+  }
+
+  /** A haptic device is the hand, or is no longer. */
+  on_device({ on }) {
+    if (!on) this.device?.end();
+    else this.device ??= new Device(this, (reason) => {
+      this.device = null;
+      if (reason) this.post({ type: "error", message: reason });
+    });
   }
 
   on_pause({ paused }) {
@@ -97,6 +107,7 @@ export class Hub {
         recording: recorder && { file: recorder.name, seconds: Math.floor(recorder.seconds) },
         last_recording: this.lastRecording,
         dragging: session.hands.hold !== null,
+        device: Boolean(this.device),
         duration: session.duration,
       },
       path: { type: "path", points: session.path() },

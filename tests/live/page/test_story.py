@@ -131,7 +131,9 @@ def test_on_a_phone_the_second_head_is_an_outline(chromium, server):
 def test_five_seconds_are_saved_as_a_film(story):
     size = story.page.evaluate("""async () => {
         const { filmOf } = await import(new URL("film.js", location));
-        const film = await filmOf(document.querySelector(".view"), 500);
+        let [film, long] = [null, 500]; // a busy machine needs longer for the first picture
+        do film = await filmOf(document.querySelector(".view"), long);
+        while (film.size < 5000 && (long *= 2) < 60e3);
         const head = new Uint8Array(await film.slice(0, 4).arrayBuffer());
         return [film.size, ...head];
     }""")
@@ -139,15 +141,27 @@ def test_five_seconds_are_saved_as_a_film(story):
     assert size[1:] == [0x1A, 0x45, 0xDF, 0xA3]  # of Matroska, which WebM is
 
 
-def test_a_slow_machine_gets_half_speed_once_unless_a_person_chose(story):
+def test_a_slow_machine_goes_over_to_slow_motion_once_unless_a_person_chose(story):
     found = story.page.evaluate("""async () => {
         const { Transport } = await import(new URL("transport.js", location));
         const sent = [];
         const said = [];
         const one = new Transport((message) => sent.push(message), () => "", (words) => said.push(words));
-        for (const [share, now] of [[0.5, 0], [0.5, 1000], [0.99, 1500], [0.5, 1600], [0.5, 3500], [0.5, 3700], [0.5, 9000]]) {
+        const shares = [[0.6, 0], [0.6, 1000], [0.99, 1500], [0.01, 1600], [0.01, 3700], [0.6, 3800], [0.6, 9000]];
+        for (const [share, now] of shares) {
             one.keepUp({ real_time: share }, now);
         }
         return [sent, said.length];
     }""")
     assert found == [[{"type": "speed", "speed": 0.5}], 1]
+
+
+def test_the_stick_of_a_gamepad_pushes(story):
+    """A stub stands for the gamepad: no browser has one without hands."""
+    story.page.evaluate("""() => {
+        window.stick = [0.5, -0.25, 0, 0];
+        Object.defineProperty(navigator, "getGamepads", { value: () => [null, { axes: window.stick }] });
+    }""")
+    story.wait("Math.abs(birthsim.frame.force[0] - 30) < 1e-9 && Math.abs(birthsim.frame.force[1] - 15) < 1e-9")
+    story.page.evaluate("() => { window.stick = [0.05, 0, 0, 0]; }")
+    story.wait("birthsim.frame.pointer === null")
