@@ -1,6 +1,7 @@
 """The whole identification of a trial: fit, certainty, a rig to write, and its description in words."""
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 import tomli_w
@@ -12,6 +13,7 @@ from baselines.identification.quantities import LATENCY, QUANTITIES, Quantity, v
 from baselines.identification.starts import Noise
 from baselines.identification.trial import Trial
 from birthsim_env.files import write_text
+from birthsim_env.parts.drawn.randomization import documented_ranges
 from birthsim_env.physics.rig.parameters import Parameters, field_of
 
 
@@ -64,6 +66,14 @@ class Identified:
         lines.append(f"residuals over the noise of neighbouring samples: pressures {pressure:.2f}, positions {position:.2f}")
         if max(pressure, position) > MISFIT:
             lines.append("the model leaves more than noise: hands, leaks or play that it does not know; see the residuals")
+        for row in self.rows:
+            low, high = TUNED.get(row.name, (-inf, inf))
+            if row.determined and not low <= row.value <= high:
+                unit = field_of(row.name).metadata["unit"]
+                lines.append(
+                    f"{row.name} is outside {low:g} to {high:g} {unit}, for which controllers are tuned: "
+                    "one that believes another rig may swing; give it this one (--parameters)"
+                )
         for direction in self.certainty.weakest:
             named = ", ".join(f"{part:+.2f} {name}" for name, part in direction.parts)
             lines.append(f"least known: {named}; {direction.deviation:.2g} of what was unknown before")
@@ -74,6 +84,11 @@ class Identified:
         head = [f"Identified by birthsim identify from {source}.", *self.words()]
         text = "".join(f"# {line}\n" for line in head)
         write_text(path, f"{text}\n{tomli_w.dumps(self.rig.to_dict())}")
+
+
+TUNED = documented_ranges(Parameters(), "honest")
+"""What the rigs have on which the controllers' gains were found. Where a controller believes the default rig, lighter ones
+swing, and so do those with a later tracker (``birthsim study wide-rigs``)."""
 
 
 MISFIT = 1.1
