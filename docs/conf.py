@@ -11,7 +11,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
 import _generate  # noqa: E402
-from _generate import notebooks  # noqa: E402
+from _generate import notebooks, words  # noqa: E402
 from _generate.figure import figure_role  # noqa: E402
 from _generate.landing import install_role, rig_role  # noqa: E402
 
@@ -63,7 +63,7 @@ html_theme_options = (
 )
 html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
-html_js_files = ["access.js", "tables.js", "data.js"]
+html_js_files = ["access.js", "tables.js", "data.js", "words.js", "glossary.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
@@ -114,6 +114,12 @@ def build_notebooks(app, exception):
         notebooks.write(app.outdir / "notebooks")
 
 
+def build_words(app, exception):
+    """The glossary for pages that use its words."""
+    if exception is None and app.builder.name == "html":
+        (app.outdir / "_static" / "words.js").write_text(words.script(), encoding="utf-8")
+
+
 def build_rig(app, exception):
     """The folder of static files that runs the rig, beside the pages."""
     if exception is None and app.builder.name == "html":
@@ -130,6 +136,7 @@ def setup(app):
     app.connect("html-page-context", with_card)
     app.connect("html-page-context", with_notebook)
     app.connect("build-finished", build_rig)
+    app.connect("build-finished", build_words)
     app.connect("build-finished", build_notebooks)
     app.connect("builder-inited", lambda _: _generate.write(HERE.parent / "out" / "docs-generated"))
     return {"parallel_read_safe": False}

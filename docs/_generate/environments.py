@@ -16,8 +16,21 @@ LEFT_OUT = ("scenario", "num_envs", "unknown")
 
 
 def environments() -> str:
-    """What all share, then a section per id."""
-    return "\n\n".join([_shared(), *(_section(name) for name in SCENARIOS)])
+    """A card per id, what all share, then a section per id."""
+    cards = "\n\n".join(_card(name) for name in SCENARIOS)
+    return "\n\n".join([f":::{{container}} cards\n{cards}\n:::", _shared(), *(_section(name) for name in SCENARIOS)])
+
+
+def _picture(scenario: str) -> str:
+    """How a section and its card show an experiment."""
+    return (
+        f"![{environment_id(scenario)} under admittance-backstepping, in real time](../../out/docs-generated/{scenario}.webp)"
+    )
+
+
+def _card(scenario: str) -> str:
+    anchor = re.sub(r"[^a-z0-9-]", "", environment_id(scenario).lower())
+    return f"[{_picture(scenario)}](#{anchor}) **{scenario.capitalize()}.** {SCENARIOS[scenario].about}"
 
 
 def _shared() -> str:
@@ -54,10 +67,9 @@ def _section(scenario: str) -> str:
         **{f"{kind}, law inside": text for kind, text in _spaces(environment_id(scenario, "Residual")).items()},
     }
     rows = [f"| {fact} | {text} |" for fact, text in facts.items()]
-    picture = f"![{name} under admittance-backstepping, in real time](../../out/docs-generated/{scenario}.webp)"
     made = [inspect.getsource(part) for part in (SCENARIOS[scenario].nominal, SCENARIOS[scenario].varied)]
     return "\n".join([
-        f"## `{name}`", "", picture, "", "| what | value |", "|---|---|", *rows, "",
+        f"## `{name}`", "", _picture(scenario), "", "| what | value |", "|---|---|", *rows, "",
         "What it is made of, as it stands and as `randomize` draws it (SI units):", "", "```py",
         "\n\n".join(made).rstrip(), "```",
     ])  # fmt: skip

@@ -138,6 +138,19 @@ def test_a_data_file_is_chosen_from_and_sorted(page_of):
     assert "4 of 4 rows" in page.locator("article").inner_text()
 
 
+def test_the_first_word_of_the_glossary_in_a_page_explains_itself(page_of):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        from _generate import words
+    script = (DOCS / "_static" / "glossary.js").read_text(encoding="utf-8")
+    text = "<article><p><a>Hunting</a> is hunting in a control period; hunting</p><h2>lane</h2></article>"
+    page = page_of(f"<!doctype html>{text}<script>{words.script()}{script}</script>")
+    marked = page.locator("abbr")
+    assert marked.all_text_contents() == ["hunting", "control period"]
+    assert marked.nth(1).get_attribute("title") == "1 ms: how often the controller runs."
+    assert page.locator("p").inner_text() == "Hunting is hunting in a control period; hunting"
+
+
 @pytest.fixture
 def page_of(chromium):
     """A function that shows HTML in a browser."""
@@ -189,7 +202,15 @@ def test_the_site_builds_without_a_warning_and_its_notebooks_run(site):
         links = (site / f"{page}.html").read_text("utf-8").partition('<p class="notebook">')[2].partition("</p>")[0]
         assert re.findall(r">(\w[^<]+)<", links) == ["Download this notebook", "Open in Colab", "Open in Binder"]
     assert (site / "rig" / "rig" / "loop.wasm").exists()
-    assert 'src="rig/index.html' in (site / "index.html").read_text("utf-8")
+    landing = (site / "index.html").read_text("utf-8")
+    assert 'src="rig/index.html' in landing
+    # Of a site that has a repository a shared link shows a picture, and the install line leads there.
+    assert '"https://someone.github.io/birthsim/rig/card.png"' in landing
+    assert landing.count("https://github.com/someone/birthsim") >= 2
+    assert (site / "rig" / "card.png").exists()
+    steps = (site / "explanation" / "steps.html").read_text("utf-8")
+    assert steps.count('src="../rig/index.html?embed=1&amp;') == 5
+    assert "GLOSSARY" in (site / "_static" / "words.js").read_text("utf-8")
 
 
 @pytest.mark.slow
