@@ -43,9 +43,9 @@ def assert_equal(one, other):
         assert one is other is None
 
 
-def assert_same_run(here, there, steps, seed=SEED):
+def assert_same_run(here, there, steps, **options):
     rng = np.random.default_rng(2)
-    for one, other in zip(here.reset(seed=seed), there.reset(seed=seed), strict=True):
+    for one, other in zip(*(env.reset(seed=SEED, options=options) for env in (here, there)), strict=True):
         assert_equal(one, other)
     for _ in range(steps):
         actions = rng.uniform(-0.3, 0.3, here.action_space.shape)
@@ -57,13 +57,13 @@ def assert_same_run(here, there, steps, seed=SEED):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize(("mode", "staggered"), [("NextStep", False), ("NextStep", True), ("SameStep", True)])
 @pytest.mark.parametrize(("name", "sensors"), [(CIRCLE, "ideal"), ("BirthSIM/Forceps-v1", "honest"), (RESIDUAL, "lab")])
-def test_the_bits_of_the_native_environment(monkeypatch, mode, name, sensors):
+def test_the_bits_of_the_native_environment(monkeypatch, mode, staggered, name, sensors):
     # Lanes begin in groups of this size, the last of them smaller.
     monkeypatch.setattr(episodes, "TOGETHER", 3)
     shared = {"sensors": sensors, "autoreset_mode": mode, "max_episode_steps": 4}
-    assert_same_run(made(None, name, **shared), made("host", name, **shared), 11)
+    assert_same_run(made(None, name, **shared), made("host", name, **shared), 11, staggered=staggered)
 
 
 @pytest.mark.slow
