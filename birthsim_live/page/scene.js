@@ -1,5 +1,6 @@
 // The main view: rig, path, targets, the user's force and the spring to the pointer (birthsim_env/drawing/picture.py).
 
+import { Leader } from "./leader.js";
 import * as pen from "./pen.js";
 import { Pen } from "./pen.js";
 import { chamberNames, drawGhost, drawGround, drawRig, extent, noteOf, poseOf } from "./rig.js";
@@ -19,7 +20,6 @@ const ROOM = 0.06;
 const PHONE = 500; // px; narrower ones go without the far end of cylinder 2, m
 const CUT = 0.13;
 const LEAST_ARROW = 24; // px
-const MEASURED = 500; // ms between looks at where the lens is
 
 export class Scene {
   /** `cue`: until somebody has pulled, a hint shows what to do. */
@@ -28,7 +28,7 @@ export class Scene {
     this.path = [];
     this.soft = false;
     this.escaped = false; // the head has left what is in sight
-    this.lens = { at: -Infinity };
+    this.leader = new Leader(canvas);
     this.trail = new Trail();
     this.cue = cue;
     this.sheet = new Sheet(canvas, { changed: () => this.layOut(), opaque: true });
@@ -89,15 +89,8 @@ export class Scene {
     ];
     this.unit = Math.min(Math.max(scale / 490, 0.6), 1.5); // 490 px/m is the scale of the 640x480 drawing
     this.pen = new Pen(this.sheet.context, origin, scale);
-    this.leaveLens();
+    this.leader.leaveRoom(this.pen, this.path, this.geometry.head);
     this.drawBackdrop(origin, scale);
-  }
-
-  /** Say how large a lens above the head's path may be, px. */
-  leaveLens() {
-    const highest = Math.max(...this.path.map(([, y]) => y)) + this.geometry.head.radius;
-    const room = this.pen.pixel([0, highest])[1] - 2 * MARGIN;
-    if (Number.isFinite(room)) this.sheet.canvas.closest(".view").style.setProperty("--lens", `${Math.round(room)}px`);
   }
 
   drawBackdrop(origin, scale) {
@@ -153,7 +146,7 @@ export class Scene {
     this.trail.draw(world, pen.INK, 1.6 * unit);
     const other = ghost && poseOf(ghost, geometry);
     if (other) drawGhost(world, other, geometry, pen.colour("beside"));
-    this.drawLeader(frame.compliant, lens);
+    this.leader.draw(world, frame.compliant, lens);
     const size = Math.max(2.8, 3.8 * unit);
     pen.targetMarker(world, frame.target, 1.75 * size);
     pen.compliantMarker(world, frame.compliant, 1.35 * size);
@@ -164,38 +157,6 @@ export class Scene {
     if (this.cue && pose && !frame.pointer && document.body.dataset.mode === "live") this.drawCue(frame);
     if (label) world.text(label.words, label.at, { colour: pen.FORCE, size: 14, weight: 700 });
     this.drawNote(noteOf(frame, geometry));
-  }
-
-  /** What the lens shows, and lines from there to the lens. */
-  drawLeader(centre, lens) {
-    const small = Math.max((lens.window / 2) * this.pen.scale, 2);
-    this.pen.disc(centre, small, null, pen.CAP, 1);
-    const now = performance.now();
-    if (now > this.lens.at + MEASURED) this.lens = { at: now, ...this.placeOf(lens.sheet.canvas) };
-    const { x, y, radius } = this.lens;
-    if (!radius || !pen.finite(centre)) return;
-    const from = this.pen.pixel(centre);
-    const [dx, dy] = [x - from[0], y - from[1]];
-    const far = Math.hypot(dx, dy);
-    if (far < 1.1 * (radius + small)) return;
-    const { context } = this.pen;
-    for (const side of [-1, 1]) {
-      const turn = Math.atan2(dy, dx) + side * Math.acos((small - radius) / far);
-      const [ux, uy] = [Math.cos(turn), Math.sin(turn)];
-      context.beginPath();
-      context.moveTo(from[0] + small * ux, from[1] + small * uy);
-      context.lineTo(x + radius * ux, y + radius * uy);
-      context.strokeStyle = pen.CAP;
-      context.lineWidth = 1;
-      context.stroke();
-    }
-  }
-
-  /** Middle and radius, px, of a round canvas that lies on this one; nothing of one that lies elsewhere. */
-  placeOf(canvas) {
-    const [own, its] = [this.sheet.canvas, canvas].map((one) => one.getBoundingClientRect());
-    const [x, y] = [(its.left + its.right) / 2 - own.left, (its.top + its.bottom) / 2 - own.top];
-    return x > 0 && x < own.width && y > 0 && y < own.height ? { x, y, radius: its.width / 2 } : {};
   }
 
   /** The spring from the hand's hold on the end effector to the pointer. */

@@ -52,6 +52,16 @@ def test_nothing_is_found_on_the_page(chromium, server, theme, size):
         assert window.complaints == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("asked", ["", "?embed=1", "?compare=pid"])
+def test_nothing_is_found_on_the_story(chromium, server, theme, asked):
+    with Window(chromium, server.url + asked, lab=False) as window:
+        window.page.emulate_media(color_scheme=theme)
+        window.live(0.2)
+        assert violations(window.page) == []
+
+
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_is_found_on_a_replay(chromium, tmp_path, theme):
     write_recording(tmp_path / "rest.rec", example(100))

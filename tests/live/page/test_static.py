@@ -166,3 +166,23 @@ def test_from_a_disk_it_explains_itself(chromium, built):
     page.goto((built / "index.html").as_uri())
     page.locator("#offline", has_text="run birthsim live, or any server of files").wait_for()
     page.close()
+
+
+def test_in_a_long_page_only_a_rig_in_sight_runs(chromium, built):
+    frame = f'<iframe src="{built.name}/index.html?embed=1" width="700" height="430"></iframe>'
+    (built.parent / "long.html").write_text(f'<!doctype html>{frame}<div style="height: 5000px"></div>')
+    page = chromium.new_page()
+    with Folder(built.parent) as served:
+        page.goto(f"{served}long.html")
+        (inner,) = page.frames[1:]
+
+        def becomes(paused):
+            while inner.evaluate("() => window.birthsim?.state?.paused") is not paused:
+                page.wait_for_timeout(30)
+
+        becomes(False)
+        page.evaluate("() => scrollTo(0, 4000)")
+        becomes(True)
+        page.evaluate("() => scrollTo(0, 0)")
+        becomes(False)
+    page.close()

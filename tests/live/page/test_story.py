@@ -112,7 +112,8 @@ def test_an_axis_spans_what_is_in_sight(story):
 def test_embedded_it_is_the_rig_its_lens_and_its_switch(chromium, server):
     with Window(chromium, f"{server.url}?embed=1&friction=0.5", {"width": 740, "height": 430}, lab=False) as window:
         window.wait("birthsim.settings.friction === 0.5")
-        seen = "['.bar', '.guide', '.readouts', '.lens', '.switch'].map((one) => document.querySelector(one).checkVisibility())"
+        places = "['.transport', '.guide', '.readouts', '.lens', '.switch']"
+        seen = f"{places}.map((one) => document.querySelector(one).checkVisibility())"
         assert window.value(seen) == [False, False, False, True, True]
         size = "[document.documentElement.scrollHeight, document.documentElement.scrollWidth]"
         assert window.value(size) == [430, 740]
