@@ -92,10 +92,11 @@ def with_card(app, page, template, context, doctree):
     body = context.get("body", "")
     context["body"] = body.replace("<img ", '<img loading="lazy" ')
     address = html_baseurl or "../" * page.count("/")
+    title = project if page == "index" else f"{context.get('title')} · {project}"
     context["metatags"] = (
         context.get("metatags", "")
         + f"""
-<meta property="og:title" content="{context.get("title", project)} · BirthSIM">
+<meta property="og:title" content="{title}">
 <meta property="og:description" content="A fetal head on two air cylinders: pull it, and compare its controllers.">
 <meta property="og:image" content="{address}rig/card.png"><meta name="twitter:card" content="summary_large_image">"""
     )
