@@ -16,7 +16,6 @@ from tests.live.rig.worker import run
 pytestmark = pytest.mark.slow
 
 LARGEST = 1.5e6  # bytes
-SOONEST = 2.0  # s from the address to a rig that moves
 SILENT = """async () => {
   const { load } = await import(new URL("rig/birthsim.js", location));
   const { Hub } = await import(new URL("worker/hub.js", location));
@@ -67,14 +66,6 @@ def window(chromium, address):
 
 def test_the_folder_is_small(built):
     assert sum(path.stat().st_size for path in built.rglob("*") if path.is_file()) < LARGEST
-
-
-def test_the_rig_moves_soon(chromium, address):
-    soonest = []
-    for _ in range(3):  # a busy machine may be late once
-        with Window(chromium, address) as window:
-            soonest.append(window.wait("birthsim.frame.time > 0 && performance.now()"))
-    assert min(soonest) < 1e3 * SOONEST
 
 
 @pytest.mark.parametrize("compare", ["nothing", "backstepping"])
