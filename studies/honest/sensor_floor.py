@@ -37,13 +37,11 @@ STEPS = 12
 def probe_floor(rig: Parameters, episodes: int, seed: int) -> dict[str, Array]:
     """Of the worlds of ``BirthSIM/Probe-v2`` for ``rig``: ``stiffness_error``, %, and ``held_error``, mm, the distance from
     the compliant target while the push is held; (episodes,) each."""
-    env: Any = gymnasium.make_vec(
-        "BirthSIM/Probe-v2", num_envs=episodes, policy_period=HELD, parameters=rig, sensors="honest", randomize=True
-    )
+    env: Any = gymnasium.make_vec("BirthSIM/Probe-v2", num_envs=episodes, parameters=rig, sensors="honest", randomize=True)
     _, info = env.reset(seed=[seed + k for k in range(episodes)])
     target, stiffness = info["target"].T, info["stiffness_setpoint"].T
-    info = env.step(np.zeros((episodes, env.single_action_space.shape[0]), dtype=np.float32))[4]
-    force = info.get("final_info", info)["user_force"].T
+    env.simulation.run(round(HELD / env.simulation.period))
+    force = env.simulation.force.copy()
     env.close()
     static = _static_sensors(rig, episodes, seed)
 

@@ -144,21 +144,19 @@ def _number(value: float | str) -> str:
 
 def _world(rig: Parameters, sensors: str, seed: int) -> tuple[dict[str, float], float, float]:
     """Figures of the rig and its sensors in world ``seed``; its push, N, and the way that it asks for, mm."""
-    env: Any = gymnasium.make_vec(
-        ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True, policy_period=PROBE_REST + PUSHED / 2
-    )
+    env: Any = gymnasium.make_vec(ENVIRONMENT, sensors=sensors, parameters=rig, randomize=True)
     env.reset(seed=[seed])
-    # Before the step: a lane whose episode ends in it is drawn anew.
     shown = {name: float(values[0]) for name, values in getattr(env.simulation.sensors, "figures", {}).items()}
-    _, _, _, _, info = env.step(np.zeros((1, env.single_action_space.shape[0]), dtype=np.float32))
+    simulation = env.simulation
+    simulation.run(round((PROBE_REST + PUSHED / 2) / simulation.period))
+    force, target = simulation.force, simulation.reference.position
+    way = simulation.reference.compliant_target(force) - target
     env.close()
-    info = info.get("final_info", info)
     ranges = {name: pair for name, pair in documented_ranges(rig, sensors).items() if name not in drawn_by(sensors)}
     drawn = draw_parameters(rig, ranges, stream(seed, 0, "parameters"))
     figures = {name: value_of(drawn, name) for name in ranges}
     figures |= {f"electronics.{name}": value for name, value in shown.items()}
-    way = info["compliant_target"] - info["target"]
-    return figures, float(np.hypot(*info["user_force"][0])), float(1e3 * np.hypot(*way[0]))
+    return figures, float(np.hypot(*force[:, 0])), float(1e3 * np.hypot(*way[:, 0]))
 
 
 def sizes_of(evaluation: Evaluation, metric: str) -> Array:

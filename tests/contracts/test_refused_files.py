@@ -116,7 +116,7 @@ TABLE = {
         ("import numpy\nimport no_such_module\n", ":Own", "own.py', line 2: ModuleNotFoundError: No module named 'no_such"),
     ],
     ("training", "own.toml"): [
-        (None, "", "own.toml", "is no file; allowed: circle, ", "vacuum, or a TOML file"),
+        (None, "", "own.toml", "is no file; allowed: circle, ", "vacuum", ", or a TOML file"),
         (BINARY, "", "own.toml", "is no TOML: "),
         ("[experiment]\nsteps = 3", "", "own.toml", "table 'experiment'; allowed: training, residual"),
         ("steps = 3", "", "own.toml", "table 'steps'; allowed: training, residual"),

@@ -201,7 +201,7 @@ def test_a_network_of_another_task_is_refused_by_the_controller(tmp_path, inputs
 @pytest.mark.parametrize("period", [0.0105, 0.0004])
 def test_a_policy_period_that_the_rig_cannot_keep_is_refused(tmp_path, period):
     save_policy(Policy(network(), ENVIRONMENT, ResidualSettings(policy_period=period), {}), tmp_path)
-    with pytest.raises(ValueError, match=rf"policy_period = {period}; allowed: a multiple of the control period 0\.001 s"):
+    with pytest.raises(ValueError, match=rf"policy_period = {period} s; allowed: a multiple of the control period 0\.001 s"):
         ResidualController(policy=tmp_path)
 
 
