@@ -55,7 +55,12 @@ html_baseurl = f"https://{REPOSITORY.replace(chr(47), '.github.io/')}/" if REPOS
 html_theme_options = (
     {
         "footer_icons": [
-            {"name": "Repository", "url": f"https://github.com/{REPOSITORY}", "html": "Repository on GitHub", "class": ""}
+            {
+                "name": "Repository on GitHub",
+                "url": f"https://github.com/{REPOSITORY}",
+                "html": "Repository on GitHub",
+                "class": "",
+            }
         ]
     }
     if REPOSITORY

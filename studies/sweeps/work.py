@@ -113,7 +113,9 @@ def train_point(
     from agents.training.trainer import train
 
     parameters = Parameters.from_dict(rig)
-    settings = TrainingSettings(**{**training, "hidden": tuple(training["hidden"])})
+    settings = TrainingSettings(
+        **{name: tuple(value) if isinstance(value, list) else value for name, value in training.items()}
+    )
     with own_folder(Path(place)) as folder:
         train(settings, ResidualSettings(**residual), folder, parameters)
     result = evaluate_point(

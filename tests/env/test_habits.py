@@ -47,6 +47,11 @@ def test_rig_and_time_step_are_attributes(make):
     assert env.parameters == Parameters().replace({"mechanics.mass": 4.0})
 
 
+def test_a_mapping_that_is_no_rig_is_refused_as_the_argument():
+    with pytest.raises(ValueError, match="parameters: a = 1; allowed: a section"):
+        single(parameters={"a": 1})
+
+
 def test_a_number_is_a_stiffness_of_both_axes_for_all_time():
     env = single(stiffness=1500)
     for time in (0.0, 9.0):

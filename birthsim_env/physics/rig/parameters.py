@@ -221,5 +221,8 @@ def load_parameters(parameters: Parameters | Mapping[str, Any] | str | Path | No
     if isinstance(parameters, (str, Path)):
         return Parameters.from_toml(parameters)
     if isinstance(parameters, Mapping):
-        return Parameters.from_dict(dict(parameters))
+        try:
+            return Parameters.from_dict(dict(parameters))
+        except ValueError as error:
+            raise ValueError(f"parameters: {error}") from None
     raise ValueError(f"parameters = {shown(parameters)}; allowed: None, a Parameters, a mapping or the path of a TOML file")

@@ -17,12 +17,12 @@ TIMES = "Number(document.querySelector('#magnification').textContent.match(/\\d+
 
 @pytest.mark.slow
 def test_the_magnifier_stays_on_the_error_while_one_pulls(window):
-    at_rest = window.wait(f"Math.hypot(...birthsim.frame.velocity) < 1e-3 && {TIMES}")
+    window.wait("Math.hypot(...birthsim.frame.velocity) < 1e-3")
     window.hold(across=60)
     frame = window.settle(least=10)
     assert displacement(frame)[0] > 0.01  # the target is out of its sight
     assert frame["error_mm"] < 2
-    window.wait(f"{TIMES} === {at_rest}")
+    window.wait(f"{TIMES} >= 10")  # with the target in sight it could be 3
     window.page.mouse.up()
 
 
