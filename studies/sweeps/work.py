@@ -113,9 +113,8 @@ def train_point(
     from agents.training.trainer import train
 
     parameters = Parameters.from_dict(rig)
-    settings = TrainingSettings(
-        **{name: tuple(value) if isinstance(value, list) else value for name, value in training.items()}
-    )
+    several = {name: tuple(training[name]) for name in ("hidden", "beside")}
+    settings = TrainingSettings(**{**training, **several})
     with own_folder(Path(place)) as folder:
         train(settings, ResidualSettings(**residual), folder, parameters)
     result = evaluate_point(
