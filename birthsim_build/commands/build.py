@@ -65,14 +65,14 @@ def main(settings: Settings) -> None:
         raise ValueError(f"--gpu with {target}; allowed: with cubin")
     rig = load_parameters(settings.parameters)
     scenarios, sensors, controllers, policies = _chosen(settings)
+    bundle = None
+    if not threads:
+        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, target == "cortex-m7")
     require_llvm()
     if target == "cubin":
         require_assembler()
     elif not threads and target != "cortex-m7":
         require_linker()
-    bundle = None
-    if not threads:
-        bundle = make_bundle(rig, scenarios, sensors, controllers, policies, settings.seed, target == "cortex-m7")
     folder = make_folder(settings.out)
     with whole_results(folder) as place:
         if bundle is None:
