@@ -123,10 +123,17 @@ def _factory(name: str) -> Factory:
     raise ValueError(f"controller = {shown(split_options(name)[0])}{asked}; allowed: {allowed}, or path/to/file.py:Class")
 
 
+def _is_law(part: Any) -> bool:
+    """Whether what a file names is a function of the two signals, rather than what makes a controller of a rig."""
+    return inspect.isfunction(part) and list(inspect.signature(part).parameters) == ["measurement", "reference"]
+
+
 def known_options(name: str) -> list[str] | None:
     """The options of a controller, which its name may carry and ``--set`` sets; None where it takes any."""
     factory: Any = _factory(name)
     kind = factory.args[1] if getattr(factory, "func", None) is _own else getattr(factory, "func", factory)
+    if _is_law(kind):
+        return []
     parameters = list(inspect.signature(kind).parameters.values()) if callable(kind) else []
     named, tunable = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD][1:], getattr(kind, "TUNABLE", {})
     if kind is _backstepping:
@@ -158,9 +165,9 @@ def _own(name: str, factory: Any, parameters: Parameters, **options: Any) -> Con
     """A controller of a user's own class; raises ``ValueError`` naming what it lacks, in one line."""
     expected = (
         "allowed: a class that takes the rig (birthsim_env.Parameters), with command(measurement, reference) and reset(), or a "
-        "function of measurement and reference"
+        "function law(measurement, reference)"
     )
-    if inspect.isfunction(factory) and list(inspect.signature(factory).parameters)[:2] == ["measurement", "reference"]:
+    if _is_law(factory):
         return PlainLaw(factory)
     try:
         own = factory(parameters, **options)

@@ -29,7 +29,10 @@ class Face:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Gymnasium's, with the steps of an episode as ``max_episode_steps``; the environment itself truncates."""
+        """Gymnasium's, with the steps of an episode as ``max_episode_steps``; the environment itself truncates.
+
+        An environment made again from it with another ``policy_period`` or ``duration`` needs ``max_episode_steps=-1``.
+        """
         return self._spec
 
     @spec.setter

@@ -13,7 +13,6 @@ from tests.live.browser import ROOT, WIDE, Server, Window
 
 CARD = {"width": 1200, "height": 630}
 FILM = {"width": 760, "height": 430}
-COLOURS = 128  # of a still picture: a third of the bytes
 RATE = 12.0  # pictures per second of the rig's time
 SLOW = 0.1  # of real time: a screenshot takes some 50 ms
 PULL, SWITCH, END = 0.5, 3.0, 5.5  # s
@@ -25,7 +24,8 @@ def pull(window: Any, path: Path) -> None:
     window.hold(across=70, up=15)
     window.live(3.0)
     taken = Image.open(io.BytesIO(window.page.screenshot())).convert("RGB")
-    taken.quantize(COLOURS).save(path, optimize=True)
+    # A third of the bytes; the median cut would give small things, as the diamond, another colour.
+    taken.quantize(method=Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
     window.page.mouse.up()
 
 

@@ -6,6 +6,7 @@ import pytest
 from gymnasium.wrappers import TimeAwareObservation
 
 from baselines.bench.evaluation import evaluate
+from baselines.registry import make_controller
 from birthsim_env import Parameters
 
 CIRCLE = "BirthSIM/Circle-v1"
@@ -89,6 +90,16 @@ def test_a_function_is_a_controller_and_a_class_is_none():
         evaluate(CIRCLE, Parameters, "class", **shut)
     with pytest.raises(ValueError, match="controller = 3; allowed: an object with command"):
         evaluate(CIRCLE, 3, "number", **shut)
+
+
+def test_a_function_in_a_file_is_a_controller_without_options(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "def law(measurement, reference):\n    return 0 * measurement.pressures\n", encoding="utf-8"
+    )
+    law = make_controller(f"{tmp_path}/own.py:law", Parameters())
+    assert evaluate(CIRCLE, law, "own", 1, 0, progress=False, duration=0.1).seeds == [0]
+    with pytest.raises(ValueError, match=r"gain = 3\.0 is unknown; allowed for .*: no options"):
+        make_controller(f"{tmp_path}/own.py:law[gain=3]", Parameters())
 
 
 def test_openings_of_four_lanes_that_are_turned_are_refused():
