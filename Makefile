@@ -46,7 +46,7 @@ ON_CIRCLE := circle_lab circle_pure
 STUDENT := circle_honest_student
 # Policies by gradients: those with a configuration of their own; scenario, configuration, environment.
 CONFIGURED := probe_apg circle_residual_apg
-BY_GRADIENTS := circle:circle:Circle-v1 descent:circle:Descent-v1 forceps:circle:Forceps-v1 dystocia:vacuum:Dystocia-v1 \
+BY_GRADIENTS := circle:circle:Circle-v1 descent:circle:Descent-v1 forceps:vacuum:Forceps-v1 dystocia:vacuum:Dystocia-v1 \
   vacuum:vacuum:Vacuum-v0
 GRADIENTS := $(foreach one,$(BY_GRADIENTS),$(firstword $(subst :, ,$(one)))_apg) $(CONFIGURED)
 HONEST := circle_honest_apg

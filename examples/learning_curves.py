@@ -1,7 +1,7 @@
 """How PPO from scratch learns, with the defaults of Stable-Baselines3 and of CleanRL: runs both examples, draws their curves.
 
-    python examples/learning_curves.py --out out/scratch       needs pip install 'birthsim[agents]'; a run of 1 million steps
-                                                               takes minutes; what --out holds is kept
+python examples/learning_curves.py --out out/scratch       needs pip install 'birthsim[agents]'; a run of 1 million steps
+                                                           takes minutes; what --out holds is kept
 """
 
 import argparse

@@ -78,7 +78,7 @@ def _tasks(options: Options) -> dict[Any, Task]:
                 ranges = {figure: around(rig, figure, OFF) for figure in RANGES}
             worlds = {"ranges": ranges, "episodes": min(LANES[told], options.seed + options.episodes - first), "seed": first}
             found[scenario, name, told, first] = Task(
-                f"{scenario}-{name}/{'known' if told else 'default'}-{first}", name, measure,
+                f"{scenario}-{name}/{'known' if told else 'default'}-{first}", measure,
                 {"scenario": scenario, **controller_settings(name, rig), **worlds},
             )  # fmt: skip
     return found

@@ -91,8 +91,7 @@ def _listed(values: Array) -> list[float]:
 
 def _tasks(options: Options) -> dict[Any, Task]:
     return {
-        title: Task(f"response_{k}", "responses", measure, {"title": title, "pose": list(options.pose)})
-        for k, title in enumerate(CURVES)
+        title: Task(f"response_{k}", measure, {"title": title, "pose": list(options.pose)}) for k, title in enumerate(CURVES)
     }
 
 

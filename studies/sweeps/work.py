@@ -34,7 +34,7 @@ def pieces_of(points: Sequence[Point], sweep: Sweep, first: int = 0) -> dict[Pie
         try:
             tasks = tasks_of(point, sweep)
         except ValueError as error:
-            tasks = [Task(f"point {number}", "refused", refuse, {"why": str(error)})]
+            tasks = [Task(f"point {number}", refuse, {"why": str(error)})]
         pieces |= {Piece(number, point, len(tasks)): task for task in tasks}
     return pieces
 
@@ -136,7 +136,7 @@ def _trained(asked: dict[str, Any], believed: Parameters, world: dict[str, Any])
         "environment": asked["environment"], "world": world, "files": files, "seed": asked["seed"],
         "episodes": asked["episodes"],
     }  # fmt: skip
-    return Task("training", "trainings", train_point, settings, keeps=True)
+    return Task("training", train_point, settings, keeps=True)
 
 
 def _group(group: str, asked: dict[str, Any]) -> dict[str, Any]:
